@@ -54,7 +54,7 @@ def find(name):
     """Import a public name, and wrap it so that its arguments, or the names of its fields, are checked."""
     found = getattr(import_module(PUBLIC[name].module), name)
     if not isfunction(found):
-        # What pydantic makes has messages of its own.
+        # Classes made by pydantic have their own messages.
         plain = is_dataclass(found) and not hasattr(found, "__pydantic_validator__")
         return spelled(found) if plain else found
     function = checked(found)

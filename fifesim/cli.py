@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from fifesim.output.terminal import Door, Exit, Quiet, Verbose, importing, kept, report, say, stop
+from fifesim.output.terminal import Commands, Exit, Quiet, Verbose, importing, kept, print_lines, report, stop
 
 app = typer.Typer(
-    cls=Door,
-    help="Simulate what a satellite would have seen.",
+    cls=Commands,
+    help="Simulate satellite images of vegetated land, with the true LAI and FPAR of each pixel.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
@@ -19,15 +19,19 @@ app = typer.Typer(
 )
 
 # One BLAS thread, also in scipy and in worker processes: dask has a thread for each core, and on small matrices BLAS
-# threads wait longer than they work. A number set by the user stays.
+# threads spend more time waiting than working. A number set by the user stays.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-_Paper = Annotated[bool, typer.Option("--paper", help="The paper's one stand, in the place of the landscape.")]
+_Paper = Annotated[
+    bool, typer.Option("--paper", help="Use the paper's uniform stand instead of the default landscape.")
+]
 _Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")]
-_Resume = Annotated[bool, typer.Option("--resume", help="Resume an interrupted run; nothing to do if it is finished.")]
-_Scheduler = Annotated[str | None, typer.Option(help="Compute on a dask cluster, such as tcp://head:8786.")]
-_AsJson = Annotated[bool, typer.Option("--json", help="Print progress as lines of JSON.")]
-_Threads = Annotated[int | None, typer.Option(min=1, help="Threads; one for each core by default.")]
+_Resume = Annotated[bool, typer.Option("--resume", help="Resume an interrupted run.")]
+_Scheduler = Annotated[
+    str | None, typer.Option(help="Address of a dask scheduler to compute on, such as tcp://head:8786.")
+]
+_AsJson = Annotated[bool, typer.Option("--json", help="Print progress as JSON lines.")]
+_Threads = Annotated[int | None, typer.Option(min=1, help="Number of threads; by default one per core.")]
 
 
 def _open_remote(context: typer.Context, wanted: bool):
@@ -40,7 +44,7 @@ def _open_remote(context: typer.Context, wanted: bool):
 _AllowRemote = Annotated[
     bool,
     typer.Option(
-        "--allow-remote", callback=_open_remote, help="Rasters may come from addresses, in any format of GDAL."
+        "--allow-remote", callback=_open_remote, help="Allow remote rasters and all GDAL formats, for files you trust."
     ),
 ]
 
@@ -49,7 +53,7 @@ def _version(wanted: bool):
     if wanted:
         from fifesim import __version__
 
-        say(f"fifesim {__version__}")
+        print_lines(f"fifesim {__version__}")
         raise typer.Exit
 
 
@@ -64,13 +68,15 @@ def _main(
 
 @app.command("simulate")
 def simulate_command(
-    scenario: Annotated[Path | None, typer.Argument(help="TOML file; a synthetic landscape by default.")] = None,
+    scenario: Annotated[
+        Path | None, typer.Argument(help="Scenario file (TOML); by default a synthetic landscape at the FIFE site.")
+    ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("fife"),
     overwrite: _Overwrite = False,
     resume: _Resume = False,
-    scene: Annotated[bool, typer.Option("--scene", help="Write the cells too: scene.zarr.")] = False,
+    scene: Annotated[bool, typer.Option("--scene", help="Also write the ground cells, as scene.zarr.")] = False,
     threads: _Threads = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Compute on so many processes.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Number of worker processes.")] = None,
     scheduler: _Scheduler = None,
     as_json: _AsJson = False,
     paper: _Paper = False,
@@ -79,7 +85,7 @@ def simulate_command(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Simulate a scenario. Writes image.tif, truth.tif, quicklook.png, report.html, scenario.toml, item.json (STAC)."""
+    """Simulate an image. Writes image.tif, truth.tif, quicklook.png, report.html, scenario.toml, item.json (STAC)."""
     start = time.monotonic()
     _check_spelling(scenario)
 
@@ -93,12 +99,12 @@ def simulate_command(
 
     finished = check_folder(output, overwrite, resume, names_of(scene))
     if paper and scenario:
-        raise ValueError("--paper stands for a scenario of its own: type either that or a file")
+        raise ValueError("--paper cannot be combined with a scenario file: give one of them")
     found = scenario_to_resume(output) if resume and scenario is None and not paper else None
     found = found or (_default(paper) if scenario is None else read_scenario(scenario))
     if dry_run:
         cost = estimate(found, output, threads=workers or threads, scene=scene, start=since_start())
-        say(estimate_in_words(cost, as_json))
+        print_lines(estimate_in_words(cost, as_json))
         return
     found.complete()
     with kept(output), cluster(workers, scheduler) as client:
@@ -112,39 +118,43 @@ def simulate_command(
 
 @app.command("rerun")
 def rerun_command(
-    file: Annotated[Path, typer.Argument(help="image.tif or truth.tif of a run.")],
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Keep the new file under this name.")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file of that name.")] = False,
+    file: Annotated[Path, typer.Argument(help="File image.tif or truth.tif of a run.")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Save the new file under this name.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing file.")] = False,
     threads: _Threads = None,
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Make a file of a run again from its own tags. Exit code 1 where its bits are not the same."""
+    """Recompute a file of a run from its tags. The exit code is 1 if any value differs."""
     with importing():
         from fifesim.output.run.again import outcome_in_words, rerun
 
     found = rerun(file, output, overwrite=overwrite, threads=threads)
-    say(outcome_in_words(file, found))
+    print_lines(outcome_in_words(file, found))
     if found.differing:
         raise typer.Exit(Exit.FAILURE)
 
 
 @app.command("dataset")
 def dataset_command(
-    study: Annotated[Path | None, typer.Argument(help="TOML file: a scenario, and in [draw] what varies.")] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the chips, a Zarr store.")] = Path(
+    study: Annotated[
+        Path | None, typer.Argument(help="Study file (TOML): a scenario with a table [draw] of distributions.")
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the chips (Zarr store).")] = Path(
         "chips.zarr"
     ),
-    chips: Annotated[int | None, typer.Option("-n", "--chips", min=1, help="How many; 1000 by default.")] = None,
+    chips: Annotated[int | None, typer.Option("-n", "--chips", min=1, help="Number of chips; 1000 by default.")] = None,
     overwrite: _Overwrite = False,
     resume: _Resume = False,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Number of worker processes; by default one per core.")
+    ] = None,
     scheduler: _Scheduler = None,
     as_json: _AsJson = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Make a training set. Images and truth of many chips, as sharded Zarr with a datasheet."""
+    """Create a training set. Writes images and truth of many chips as sharded Zarr, with a datasheet."""
     start = time.monotonic()
     with importing():
         from fifesim.output.chips.folder import WHOLE, dataset_to_folder, study_to_resume
@@ -155,12 +165,14 @@ def dataset_command(
     finished = check_folder(output, overwrite, resume, WHOLE)
     found, count = study_to_resume(output) if resume else (None, None)
     if study is None and found is None:
-        raise ValueError("a dataset is of a study: type its file, such as study.toml; to go on, --resume and -o")
+        raise ValueError(
+            "a study is missing: give its file, such as study.toml, or resume a dataset with --resume and -o"
+        )
     found = found if study is None else read_study(study)
     if scheduler is None:
         workers = workers or usable_cores()
     elif workers is not None:
-        raise ValueError("--workers starts processes and --scheduler uses a cluster that runs: give one of them")
+        raise ValueError("--workers starts processes and --scheduler uses a running cluster: give one of them")
     with kept(output), cluster(scheduler=scheduler) as client:
         count = chips or count or 1000
         files = dataset_to_folder(
@@ -173,7 +185,7 @@ def dataset_command(
 def reproduce_command(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("friedl1995"),
     reading: Annotated[
-        str, typer.Option(help="Of Table 1: native, aligned, narrow, offset, blur-40.8 or blur-48.6.")
+        str, typer.Option(help="Interpretation of Table 1: native, aligned, narrow, offset, blur-40.8 or blur-48.6.")
     ] = "native",
     dem: Annotated[str, typer.Option(help="Elevation: flat, flint-hills (synthetic), or a raster file.")] = "flat",
     densities: Annotated[
@@ -183,20 +195,27 @@ def reproduce_command(
         Path | None, typer.Option(help="CSV file: band,leaf_reflectance,leaf_transmittance; fitted by default.")
     ] = None,
     background: Annotated[
-        str | None, typer.Option(help="CSV file: band,background; or shares, soil_dry:0.5+shade:0.5; else fitted.")
+        str | None,
+        typer.Option(help="CSV file: band,background; or a mixture, soil_dry:0.5+shade:0.5; fitted by default."),
     ] = None,
-    sensor: Annotated[str, typer.Option(help="An instrument with red and near infrared, or its file.")] = "TM",
-    west: Annotated[float | None, typer.Option(help="Easting of the scenes, EPSG:26914: relief depends on it.")] = None,
-    north: Annotated[float | None, typer.Option(help="Northing of their upper edge.")] = None,
-    realisations: Annotated[int, typer.Option(help="How many of each of the nine scenes.")] = 20,
-    cells: Annotated[int | None, typer.Option(help="Along the edge of a scene, of 3.33 m each; 333 for TM.")] = None,
-    seed: Annotated[int, typer.Option(help="Of the first realisation; the others follow.")] = 1995,
-    scenes: Annotated[bool, typer.Option("--scenes", help="Write image, truth and scene of each scenario.")] = False,
+    sensor: Annotated[
+        str, typer.Option(help="Name or file of an instrument with a red and a near infrared band.")
+    ] = "TM",
+    west: Annotated[
+        float | None, typer.Option(help="Easting of the scenes in EPSG:26914, which determines the relief.")
+    ] = None,
+    north: Annotated[float | None, typer.Option(help="Northing of the upper edge of the scenes.")] = None,
+    realisations: Annotated[int, typer.Option(help="Realisations of each of the nine scenes.")] = 20,
+    cells: Annotated[int | None, typer.Option(help="Cells (3.33 m) along the edge of a scene; 333 for TM.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the first realisation; the others count up.")] = 1995,
+    scenes: Annotated[
+        bool, typer.Option("--scenes", help="Also write image, truth and scene of each scenario.")
+    ] = False,
     overwrite: _Overwrite = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Repeat the paper. Writes table2.csv, figures 3 to 9, the nine scenarios, report.html."""
+    """Reproduce Friedl et al. (1995). Writes table2.csv, figures 3 to 9, nine scenarios, report.html."""
     start = time.monotonic()
 
     with importing():
@@ -212,22 +231,28 @@ def reproduce_command(
 
 @app.command("budget")
 def budget_command(
-    scenario: Annotated[Path | None, typer.Argument(help="TOML file; the paper's case by default.")] = None,
+    scenario: Annotated[
+        Path | None, typer.Argument(help="Scenario file (TOML); by default the case of the paper.")
+    ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("budget"),
-    realisations: Annotated[int, typer.Option(help="How many scenes.")] = 20,
-    cells: Annotated[int | None, typer.Option(help="Along the edge of a scene; 333, or 12 large pixels.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Of the first scene; the scenario's by default.")] = None,
-    sensor: Annotated[str | None, typer.Option(help="An instrument over level ground, instead of a file.")] = None,
+    realisations: Annotated[int, typer.Option(help="Number of scenes.")] = 20,
+    cells: Annotated[
+        int | None, typer.Option(help="Cells along the edge of a scene; 333, or 12 pixels of a coarse sensor.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the first scene; by default from the scenario.")] = None,
+    sensor: Annotated[
+        str | None, typer.Option(help="Instrument over level ground, instead of a scenario file.")
+    ] = None,
     overwrite: _Overwrite = False,
     allow_remote: _AllowRemote = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Find where the scatter comes from, stage by stage. Writes budget.csv, budget.png, report.html, scenario.toml."""
+    """Attribute the scatter of LAI and FPAR to stages. Writes budget.csv, budget.png, report.html, scenario.toml."""
     start = time.monotonic()
     _check_spelling(scenario)
     if sensor and scenario:
-        raise ValueError("--sensor stands for a scenario of its own: type either that or a file")
+        raise ValueError("--sensor cannot be combined with a scenario file: give one of them")
 
     with importing():
         from fifesim.experiments.scatter.report import budget_to_folder
@@ -245,14 +270,16 @@ def budget_command(
 
 @app.command("explore")
 def explore_command(
-    scenario: Annotated[Path | None, typer.Argument(help="TOML file; the paper's case by default.")] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="The page.")] = Path("explore.html"),
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier page.")] = False,
+    scenario: Annotated[
+        Path | None, typer.Argument(help="Scenario file (TOML); by default the case of the paper.")
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="HTML file to write.")] = Path("explore.html"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing page.")] = False,
     allow_remote: _AllowRemote = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Make a page to play with. Sliders for ground, air, sun, instrument and registration; takes about a minute."""
+    """Write an interactive page. It has sliders for ground, atmosphere, sun, instrument and registration."""
     start = time.monotonic()
     _check_spelling(scenario)
 
@@ -267,48 +294,48 @@ def explore_command(
 
 @app.command("scenario")
 def scenario_command(paper: _Paper = False):
-    """Print the default scenario, every key with its unit, to edit."""
+    """Print the default scenario as TOML. Every key has its unit and meaning; save it to a file and edit."""
     from fifesim.scenario.toml import write_scenario
 
-    say(write_scenario(_default(paper).complete()).rstrip())
+    print_lines(write_scenario(_default(paper).complete()).rstrip())
 
 
 @app.command("sensors")
 def sensors_command(
-    name: Annotated[str | None, typer.Argument(help="Name or alias of one, or its file; all by default.")] = None,
-    check: Annotated[Path | None, typer.Option("--check", help="Check a file of your own, and say what it is.")] = None,
+    name: Annotated[str | None, typer.Argument(help="Name, alias or file of an instrument; by default all.")] = None,
+    check: Annotated[Path | None, typer.Option("--check", help="Check an instrument file and print it.")] = None,
 ):
-    """List the instruments, or one in detail. Its bands, sampling, point spread, radiometry, noise and sources."""
+    """List all instruments, or describe one. Shows bands, sampling, point spread, radiometry, noise and sources."""
     from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
     from fifesim.sensor.description.listing import instrument_in_words, list_instruments
 
     if check is not None:
-        say(instrument_in_words(read_instrument(check)))
-        say(f"{check} is right: every number has a source, and none looks like another unit.")
+        print_lines(instrument_in_words(read_instrument(check)))
+        print_lines(f"{check} is valid: every number has a source and a plausible unit.")
     elif name is not None:
-        say(instrument_in_words(instrument(name)))
+        print_lines(instrument_in_words(instrument(name)))
     else:
-        say(list_instruments([instrument(known) for known in instrument_names()]))
+        print_lines(list_instruments([instrument(known) for known in instrument_names()]))
 
 
 @app.command("verify")
 def verify_command():
-    """Check this installation against independent results. Exit code 1 where one deviates more than it may."""
-    # The matrices are small: threads of BLAS, which is loaded only now, would wait longer than they work.
+    """Check this installation against independent results. The exit code is 1 if a deviation exceeds its bound."""
+    # The matrices are small, so BLAS threads (loaded only now) would cost time.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
     from fifesim.experiments.verification.areas import deviations
     from fifesim.experiments.verification.deviations import HEADING, by_stage, deviation_summary
 
     found = []
-    say(HEADING)
+    print_lines(HEADING)
     try:
         for text in by_stage(_collected(deviations(), found)):
-            say(text)
+            print_lines(text)
     except FileNotFoundError as error:
         # A table missing from the installation is a failure, not an invalid request.
         stop(error, Exit.FAILURE)
-    say(deviation_summary(found))
+    print_lines(deviation_summary(found))
     if not all(deviation.within for deviation in found):
         raise typer.Exit(Exit.FAILURE)
 

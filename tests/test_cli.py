@@ -136,7 +136,7 @@ def test_printed_scenario_is_the_default_one(invoke, tmp_path):
 def test_the_papers_ground_stands_for_no_file(invoke, tmp_path):
     (tmp_path / "mine.toml").write_text("[grid]\nwidth = 600\nheight = 600\n")
     result = invoke("simulate", "mine.toml", "--paper", "-o", "out")
-    assert result.exit_code == 2 and "--paper stands for a scenario of its own" in result.output
+    assert result.exit_code == 2 and "--paper cannot be combined with a scenario file" in result.output
     assert not (tmp_path / "out").exists()
 
 
@@ -159,7 +159,7 @@ def test_sensors_check_says_what_a_file_is(invoke, tmp_path):
     result = invoke("sensors", "--check", "mine.toml")
     assert result.exit_code == 0, result.output
     assert "own interval 1089.564 along x 791.350 across m" in result.stdout
-    assert "mine.toml is right" in result.stdout
+    assert "mine.toml is valid" in result.stdout
 
 
 def test_sensors_check_names_file_key_and_remedy_with_exit_code_2(invoke, tmp_path):
@@ -242,7 +242,7 @@ def test_resuming_a_finished_run_reports_its_files(first, invoke):
         result = invoke("simulate", *scenario, "-o", out, "--resume")
         assert result.exit_code == 0, result.stderr
         assert all(name in result.stdout for name in FILES)
-        assert "this run was finished before, nothing is left to do: open" in result.stdout
+        assert "this run is already finished: open" in result.stdout
     assert {path.name: path.stat().st_mtime_ns for path in out.iterdir()} == before
     other = invoke("simulate", "--paper", "-o", out, "--resume")
     assert other.exit_code == 2 and "--overwrite" in other.stderr
@@ -310,18 +310,18 @@ def test_dataset_makes_chips_and_names_what_people_read(invoke, tmp_path):
     again = invoke("dataset", "study.toml", "-n", 4, "--workers", 1)
     assert again.exit_code == 2 and "is not empty" in again.stderr
     finished = invoke("dataset", "--resume")
-    assert finished.exit_code == 0 and "nothing is left to do" in finished.stdout
+    assert finished.exit_code == 0 and "already finished" in finished.stdout
 
 
 @pytest.mark.parametrize(
     ("arguments", "text", "said"),
     [
-        ([], STUDY, "a dataset is of a study: type its file"),
-        (["--resume"], STUDY, "a dataset is of a study: type its file"),
+        ([], STUDY, "a study is missing: give its file"),
+        (["--resume"], STUDY, "a study is missing: give its file"),
         (["study.toml"], STUDY.replace("visibility", "visibilty"), "did you mean 'visibility'"),
         (["study.toml"], STUDY.replace("uniform", "unifrom"), "did you mean 'uniform'"),
         (["study.toml"], STUDY.replace('"10 km"', "1"), "draw.atmosphere.visibility"),
-        (["study.toml"], "[grid]\nwidth = 180\nheight = 180\n", "a study draws something"),
+        (["study.toml"], "[grid]\nwidth = 180\nheight = 180\n", "a study needs a table"),
         (["study.toml", "--workers", "2", "--scheduler", "tcp://nowhere:1"], STUDY, "give one of them"),
     ],
 )
@@ -381,7 +381,7 @@ def test_ctrl_c_is_a_line_and_code_130(invoke, tmp_path, monkeypatch, command):
     monkeypatch.setattr("fifesim.output.run.folder.simulate_to_folder", pressed)
     result = invoke(command)
     assert result.exit_code == 130
-    assert "interrupted; nothing is written" in result.stderr and "Traceback" not in result.stderr
+    assert "interrupted; nothing was written" in result.stderr and "Traceback" not in result.stderr
 
 
 def test_a_warning_is_a_line_of_its_own(invoke, small, monkeypatch):

@@ -190,8 +190,8 @@ RECIPES = {
         [
             (
                 "fifesim/scenario/keys.py",
-                '    seed: int = seed(0, "of the noise")\n',
-                '    seed: int = seed(0, "of the noise")\n    polish: float = number(0.5, "1", "of the mirror")\n',
+                '    seed: int = seed(0, "seed of the noise")\n',
+                '    seed: int = seed(0, "seed of the noise")\n    polish: float = number(0.5, "1", "of the mirror")\n',
             ),
             (
                 "fifesim/scenario/sections.py",
@@ -434,8 +434,8 @@ RECIPES = {
         [
             (
                 "fifesim/output/report.py",
-                "        title=title(scenario),\n",
-                '        title=title(scenario),\n        greenest=float(truth["lai"].max()),\n',
+                "        title=headline(scenario),\n",
+                '        title=headline(scenario),\n        greenest=float(truth["lai"].max()),\n',
             ),
             (
                 "fifesim/output/report.html.j2",

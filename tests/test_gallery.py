@@ -31,7 +31,7 @@ def drawn():
 
 
 def test_hot_spot_of_the_canopy_is_drawn_at_the_sun(drawn):
-    names = drawn("ground/plot_5_canopy_reflectance")
+    names = drawn("ground/plot_5_canopy_reflectance", [0, 1, 2])
     for axis in names["axes"]:
         assert axis.get_xlabel().endswith(SIGNED)
         _, *with_hot_spot, sun = axis.get_lines()
@@ -51,7 +51,7 @@ def test_views_below_the_air_are_drawn_with_the_sign_of_their_axis(drawn, monkey
         return (1 + scale * cosine).transpose("band", "y", "x").assign_attrs(ground.attrs)
 
     monkeypatch.setattr(DataArrayAccessor, "to_toa", mirrored)
-    right = drawn("air/plot_2_sun_and_view", [0])["right"]
+    right = drawn("air/plot_1_atmosphere", [0])["right"]
     assert SIGNED in right.get_xlabel() and "sun at 45°" in right.get_xlabel()
     lines = [line for line in right.get_lines() if len(line.get_xdata()) > 10]
     assert len(lines) == 6

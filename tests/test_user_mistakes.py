@@ -214,7 +214,7 @@ ELEVATION = [
     refused(
         "a DEM half a cell off",
         'lai.fifesim.surface_reflectance("TM", dem=dem.assign_coords(x=dem.x + 5))',
-        "dem lies on other cells",
+        "dem has other cells",
     ),
     refused("one elevation as a number", "rho.fifesim.to_toa(elevation=400)", "elevation", "got 400", error=TypeError),
     refused("elevation ten times too high", "rho.fifesim.to_toa(elevation=dem * 10)", "0 to 4 km", "got 4.15"),
@@ -539,8 +539,8 @@ AIR = [
     refused("a number for the air", "rho.fifesim.to_toa(23)", "fifesim.Atmosphere, got 23", error=TypeError),
     refused("a word for the air", 'rho.fifesim.to_toa("clear")', "fifesim.Atmosphere, got 'clear'", error=TypeError),
     warned("no air over an own map", "own(rho.values).fifesim.to_toa(geometry=sun, instrument='TM')",
-           "what air lies over"),
-    refused("no sun over an own map", "own(rho.values).fifesim.to_toa(air, instrument='TM')", "where the sun stands"),
+           "the atmosphere over"),
+    refused("no sun over an own map", "own(rho.values).fifesim.to_toa(air, instrument='TM')", "position of the sun"),
     refused("surroundings in percent", "rho.fifesim.to_toa(adjacency=True, surroundings=30)", "0 to 1", "30"),
     refused("surroundings without adjacency", "rho.fifesim.to_toa(surroundings=0.3)", "adjacency=True"),
 ]  # fmt: skip
@@ -680,7 +680,7 @@ SENSORS = [
     ),
     refused("a negative interval", 'toa.fifesim.sense("TM", interval=-30)', "positive metres", "got -30"),
     refused("one number for an offset", 'toa.fifesim.sense("TM", offset=0.5)', "offset must be two", "got 0.5"),
-    refused("an instrument twice", 'fifesim.compare(lai, ["TM", "TM"])', "each once"),
+    refused("an instrument twice", 'fifesim.compare(lai, ["TM", "TM"])', "different names"),
     refused("a negative radiance", 'fifesim.snr("MSI", "MSI4", -10)', "must not be negative, got -10"),
     refused("altitude in km", 'camera(altitude="705.0")', "interval", "radians"),
     refused("pixel in km, in a file", 'camera(gsd="0.03")', "gsd = 0.03", "multiply by 1000"),
@@ -798,7 +798,7 @@ STUDIES = [
     refused("haze drawn twice", 'study({"visibility": {"uniform": [5, 60]}, "aot": {"uniform": [0, 1]}})', "not both"),
     refused("a split in percent", "study(split={'train': 80, 'test': 20})", "sum to 1"),
     refused("a misspelt sequence", "study(sequence='sobool')", "'sobool'", "'sobol'"),
-    refused("no chips", "fifesim.dataset(study(), 'chips.zarr', n=0)", "from 1 up, got 0"),
+    refused("no chips", "fifesim.dataset(study(), 'chips.zarr', n=0)", "at least 1, got 0"),
     refused(
         "a scenario for a study", "fifesim.dataset(fifesim.Scenario(), 'chips.zarr', n=2)", "Study", error=TypeError
     ),

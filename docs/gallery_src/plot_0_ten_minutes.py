@@ -2,8 +2,8 @@
 Ten minutes
 ===========
 
-One scene, every step seen: from leaf area on the ground to what NDVI tells of it. Each block is a step of the chain,
-and each result is a DataArray that lies in the right place; run them one after the other.
+This page simulates one scene step by step, from leaf area on the ground to a Landsat image, and then estimates leaf
+area from its NDVI. You can run the blocks in sequence. Each result is a georeferenced DataArray.
 """
 
 import matplotlib.pyplot as plt
@@ -11,8 +11,9 @@ import matplotlib.pyplot as plt
 import fifesim
 
 # %%
-# **1. The ground.** Three kilometres of the FIFE site in Kansas, in cells of 3.33 m: pastures of three treatments, each
-# with its own density of leaves, on synthetic hills; leaves are denser in the draws. ``land`` is a Dataset.
+# **1. Create the ground.** The scene covers 3 km x 3 km of the FIFE site in Kansas with cells of 3.33 m. Three
+# grassland treatments are laid out as pastures on synthetic hills, and leaf area is higher in the valleys. ``land`` is
+# a Dataset.
 
 grid = fifesim.fife_site(cell=30 / 9, window=((1800, 2700), (900, 1800)))
 dem = fifesim.flint_hills(grid, seed=7)
@@ -23,53 +24,58 @@ land.lai.fifesim.plot()
 print(land)
 
 # %%
-# **2. The light that leaves it.** SAIL gives the reflectance of each cell, and the slope decides how much sun and sky
-# it has. Bands are those of an instrument: here the green, red and near infrared of the Thematic Mapper.
+# **2. Compute the surface reflectance.** The canopy model SAIL is evaluated for each cell. Slopes change the amount of
+# direct and diffuse light. The bands are green, red and near infrared of the Thematic Mapper (TM).
 
 bands = ["TM2", "TM3", "TM4"]
 rho = land.fifesim.surface_reflectance("TM", bands=bands, dem=dem)
 rho.fifesim.plot()
 
 # %%
-# **3. The air.** Molecules and haze scatter light into the view and out of it. A clear day is the default;
-# ``fifesim.Atmosphere(visibility=10)``, given to ``surface_reflectance``, makes a hazy one.
+# **3. Add the atmosphere.** Molecules and aerosol add path radiance and reduce the contrast. The default is a clear
+# day. For a hazy day, pass ``atmosphere=fifesim.Atmosphere(visibility=10)`` to ``surface_reflectance``.
 
 toa = rho.fifesim.to_toa()
-print(toa.attrs["long_name"], (toa - rho).mean(["y", "x"]).round(3).values)
+change = (toa - rho).mean(["y", "x"])
+for band, value in zip(bands, change.values, strict=True):
+    print(f"{band}: mean reflectance changes by {value:+.3f}")
+toa.sel(band="TM3").fifesim.plot()
 
 # %%
-# **4. The instrument** blurs, samples and rounds: digital numbers of 30 m, as on the tape.
+# **4. Simulate the sensor.** The spatial response blurs the scene, which is sampled at 30 m and digitised.
 
 image = toa.fifesim.sense("TM")
 image.fifesim.plot()
 print(image.dtype, image.shape)
 
 # %%
-# **5. What NDVI tells.** The true leaf area of each pixel is known, so that the scatter about the line is known too.
+# **5. Estimate leaf area from NDVI.** The true leaf area of each pixel is known, so the scatter about the regression
+# line is known too.
 
 ndvi, truth = image.fifesim.ndvi(), land.fifesim.aggregate(30).lai
 fit = fifesim.regress(truth, ndvi)
-fit.plot(truth, ndvi)
-print(
-    f"R² = {fit.r2:.2f}: {100 * (1 - fit.r2):.0f} % of the variance of leaf area"
-    " is not in a line on NDVI"
-)
+axes = fit.plot(truth, ndvi)
+axes.set_title(f"R² = {fit.r2:.2f}")
+print(f"A line on NDVI explains {100 * fit.r2:.0f} % of the variance of leaf area.")
 
 # %%
-# **6. The same ground through other eyes.**
+# **6. Compare instruments over the same ground.** R² is lower for the 10 m pixels of MSI, because a larger part of
+# their signal comes from neighbouring pixels.
 
 images = fifesim.compare(land, ["TM", "OLI", "MSI"], fifesim.Setup(bands=None))
 print(images.fifesim.comparison_table(truth=land.lai)[["pixel", "ndvi_mean", "r2"]])
 
 # %%
-# **7. Take it along.** A GIS opens the image in the right place, with bands, scale and sun.
+# **7. Save the results.** GIS software reads position, bands, scale and sun angles from the files.
 #
 # .. code-block:: python
 #
 #    image.fifesim.to_geotiff("tm.tif")
 #    ndvi.fifesim.to_geotiff("ndvi.tif")
 #
-# Next: :doc:`short pages for what you want to do </howto/index>`, :doc:`the other pictures </gallery/index>`, and
-# ``fifesim simulate -o fife`` for all of the site with a report.
+# Next, see the :doc:`how-to guides </howto/index>` and the :doc:`gallery </gallery/index>`, or run ``fifesim simulate
+# -o fife`` to simulate the whole site with a report.
 
+# sphinx_gallery_start_ignore
 plt.close("all")
+# sphinx_gallery_end_ignore

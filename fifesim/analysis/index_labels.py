@@ -94,7 +94,7 @@ def composite(
     images: xr.DataArray, method: Literal["maximum-value"] = "maximum-value", *, by: xr.DataArray | None = None
 ) -> xr.DataArray:
     """
-    One image of many dates: at each cell that of the date with the largest NDVI, which clouds and haze lower.
+    Composite images of several dates by the maximum NDVI of each cell, which avoids clouds and haze.
 
     Parameters
     ----------
@@ -102,24 +102,23 @@ def composite(
         NDVI, or reflectance in bands with a coordinate ``wavelength``.
     method : {"maximum-value"}, optional
     by : xarray.DataArray, dims (time, y, x), optional
-        What is largest on the date that is kept; by default the images themselves where they have no bands, else their
-        NDVI. Images of anything else than reflectance need it.
+        Index whose maximum selects the date; by default the images if they have no bands, else their NDVI. It is
+        required unless the images are NDVI or reflectance.
 
     Returns
     -------
     composite : xarray.DataArray, dims (y, x) or (band, y, x)
-        With ``date``, that of each cell, as coordinate over (y, x), and so the angles of sun and view where they differ
-        among the dates. The distance of the sun is none of a composite. NaN where no date has data. Lazy where the
-        images are.
+        Values of the selected date; NaN if no date has data. Coordinates over (y, x) are ``date`` and, if they differ
+        between dates, the angles of sun and view. The distance to the sun is dropped. Lazy if the images are.
 
     Raises
     ------
     ValueError
-        If there is no dimension time, no such method, or ``by`` has other dates or cells.
+        If there is no dimension time, the method is unknown, or ``by`` has other dates or cells.
 
     Notes
     -----
-    The largest of many values with errors is too large: see `fifesim.analysis.indices.date_of_maximum`.
+    The maximum of noisy values is biased high: see `fifesim.analysis.indices.date_of_maximum`.
 
     References
     ----------
@@ -146,8 +145,8 @@ def composite(
         raise ValueError(f"method must be one of {', '.join(_METHODS)}, got {method!r}")
     if images.dtype.kind != "f" or cf.QUANTITIES["toa_radiance"].units == images.attrs.get("units"):
         raise ValueError(
-            "a composite is made of reflectance or NDVI: digital numbers and radiance have another sun at each date, "
-            "take .fifesim.to_reflectance() of them first"
+            "a composite needs reflectance or NDVI, as digital numbers and radiance depend on the sun of each date: "
+            "convert them with .fifesim.to_reflectance() first"
         )
     if "time" not in images.dims:
         raise ValueError(
@@ -201,7 +200,7 @@ def _of_date(images, chosen):
             plain = plain.astype(float)
         found[name] = _along_time(values_of_date, plain, chosen, dtype=plain.dtype, missing=missing)
         # xarray may keep the attributes of the index here.
-        found[name].attrs = cf.attributes(name) if name in ANGLES else {"long_name": "date of the image that is kept"}
+        found[name].attrs = cf.attributes(name) if name in ANGLES else {"long_name": "date of the selected image"}
     return found
 
 

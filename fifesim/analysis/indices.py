@@ -167,7 +167,7 @@ def soil_adjusted(nir, red, soil=0.5):
 
 def modified_soil_adjusted(nir, red):
     r"""
-    Modified soil-adjusted vegetation index (MSAVI), which finds L by itself.
+    Modified soil-adjusted vegetation index (MSAVI), without the parameter L.
 
     .. math::
 
@@ -190,7 +190,7 @@ def modified_soil_adjusted(nir, red):
 
     Examples
     --------
-    A leaf that absorbs all of the red, over any soil:
+    The index is 1 if no red light is reflected:
 
     >>> float(modified_soil_adjusted(0.5, 0.0))
     1.0
@@ -250,9 +250,8 @@ def date_of_maximum(index):
 
     Notes
     -----
-    The largest of n values with independent normal errors of deviation s exceeds their mean by the expected maximum
-    of n normal numbers: 0.56 s for 2 dates, 1.16 s for 5. A composite of NDVI is therefore high, the more so the more
-    dates it has.
+    The maximum of n values with independent normal errors of standard deviation s exceeds their mean by 0.56 s for 2
+    dates and 1.16 s for 5. The bias of a maximum NDVI composite therefore increases with the number of dates.
 
     References
     ----------

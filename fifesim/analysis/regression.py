@@ -17,14 +17,14 @@ from fifesim.base.arguments import Method
 @dataclass(frozen=True)
 class Regression:
     """
-    Least-squares line y = intercept + slope x, with what its intervals need.
+    Least-squares line y = intercept + slope x, with its errors and intervals.
 
     Attributes
     ----------
     slope, intercept : float
         Of the line.
     r2 : float
-        Share of the variance of y that the line explains. [1]
+        Fraction of the variance of y explained by the line. [1]
     n : int
         Pairs used.
     residual_deviation : float
@@ -32,7 +32,7 @@ class Regression:
     x_mean, x_sum_of_squares : float
         Mean of x, and the sum of its squared deviations.
     y_name, x_name : str
-        CF standard names of y and x, empty where they are not known.
+        CF standard names of y and x; empty if unknown.
 
     Examples
     --------
@@ -121,7 +121,7 @@ class Regression:
 
     def confidence_interval(self, x: Numbers, level: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
         """
-        Interval that holds the mean of y at x.
+        Confidence interval of the mean of y at x.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class Regression:
 
     def prediction_interval(self, x: Numbers, level: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
         """
-        Interval that holds one new y at x.
+        Prediction interval of a new y at x.
 
         Parameters
         ----------
@@ -229,9 +229,9 @@ def equivalent_noise(deviation, slope, value):
     Parameters
     ----------
     deviation : array
-        Standard deviation of NDVI where the variable has this value. [1]
+        Standard deviation of NDVI at this value of the variable. [1]
     slope : array
-        Of NDVI on the variable.
+        Slope of NDVI with respect to the variable.
     value : array
         Value of the variable.
 
@@ -246,7 +246,7 @@ def equivalent_noise(deviation, slope, value):
 
     Examples
     --------
-    A scatter of 0.02 in NDVI, where NDVI rises by 0.4 per unit of LAI, is a twentieth of an LAI of 1:
+    A scatter of 0.02 in NDVI, with a slope of 0.4 per unit of LAI, is 5 % of an LAI of 1:
 
     >>> round(equivalent_noise(0.02, 0.4, 1.0), 12)
     0.05

@@ -121,24 +121,24 @@ def _common_place(y, x):
 
 def regress(y: xr.DataArray, x: xr.DataArray, *, pair: Pairing = "coordinates") -> Regression:
     """
-    Least-squares line of one raster on another; computes.
+    Fit a least-squares line between two rasters; computes.
 
     Parameters
     ----------
     y, x : xarray.DataArray, dims (y, x)
-        The dependent and the independent variable; pairs with NaN are left out.
+        Dependent and independent variable. Pairs with NaN are ignored.
     pair : {"coordinates", "index"}, optional
-        Match pixels that lie in the same place, or that have the same row and column.
+        Pair pixels by position, or by row and column.
 
     Returns
     -------
     regression : fifesim.analysis.regression.Regression
-        The same to the bit under any chunking.
+        Identical for any chunks.
 
     Raises
     ------
     ValueError
-        If the rasters do not match, or fewer than three pairs are left.
+        If the rasters do not match, or there are fewer than three valid pairs.
 
     See Also
     --------
@@ -181,27 +181,27 @@ def relative_equivalent_noise(
     Parameters
     ----------
     variable, ndvi : xarray.DataArray, dims (y, x)
-        The truth, such as LAI or FPAR, and the index that it is inferred from; pairs with NaN are left out.
+        True variable, such as LAI or FPAR, and the index from which it is inferred. Pairs with NaN are ignored.
     increment : float, optional
-        Width of an increment, in units of the variable. NDVI varies within it by the slope too, which alone makes a
-        relative noise of ``increment / (sqrt(12) variable)``.
+        Width of an increment, in units of the variable. The slope within an increment alone causes a relative noise of
+        ``increment / (sqrt(12) variable)``.
     slope : float, optional
-        Of NDVI on the variable; by default that of its least-squares line.
+        Slope of NDVI with respect to the variable; by default from least squares.
     min_count : int, optional
-        Pairs that an increment needs, at least 2; with fewer its noise is NaN.
+        Minimum number of pairs in an increment, at least 2; with fewer, its noise is NaN.
     pair : {"coordinates", "index"}, optional
         As in `regress`.
 
     Returns
     -------
     noise : xarray.Dataset, dims (increment,)
-        ``ren`` at the mean of the variable in each increment, that ``mean``, the ``deviation`` of NDVI and the
-        ``count`` of pairs, with the middle of the increments as coordinate. The same to the bit under any chunking.
+        ``ren`` at the ``mean`` of the variable in each increment, the standard ``deviation`` of NDVI and the ``count``
+        of pairs; the coordinate is the centre of the increments. Identical for any chunks.
 
     Raises
     ------
     ValueError
-        If the rasters do not match, the increment is not positive, or nothing is left.
+        If the rasters do not match, the increment is not positive, or there are no valid pairs.
 
     References
     ----------
@@ -267,7 +267,7 @@ def invert(
     ndvi: xr.DataArray, fit: Regression, quantity: Literal["lai", "fpar"] = "lai", *, level: float = 0.95
 ) -> xr.Dataset:
     """
-    Map of a variable from an index by a regression, with its prediction interval.
+    Map a variable from an index with a regression, including its prediction interval.
 
     The line may leave the physical range, 0 to 20 for LAI and 0 to 1 for FPAR. Such values and the ends of their
     interval are clipped to it and flagged.
@@ -275,26 +275,26 @@ def invert(
     Parameters
     ----------
     ndvi : xarray.DataArray, dims (y, x)
-        What the variable was regressed on.
+        Index on which the variable was regressed.
     fit : fifesim.analysis.regression.Regression
         From `regress`, of the variable on the index.
     quantity : {"lai", "fpar"}, optional
         The variable.
     level : float, optional
-        Share of new values that the interval holds. [1]
+        Level of the prediction interval. [1]
 
     Returns
     -------
     estimate : xarray.Dataset, dims (y, x)
-        The variable, ``low`` and ``high``, the ends of its interval, and ``flag``. Lazy where ``ndvi`` is. The flag is
-        2 or 3 where the variable was clipped to its minimum or maximum, 1 where the index is more than 3 standard
-        deviations from the mean of the fitted data, -1 without data, else 0; its attributes are CF's ``flag_values``
-        and ``flag_meanings``.
+        The variable, ``low`` and ``high``, the ends of its interval, and ``flag``. Lazy if ``ndvi`` is. The flag is 2
+        or 3 if the variable was clipped to its minimum or maximum, 1 if the index is more than 3 standard deviations
+        from the mean of the fitted data, -1 for no data, and 0 otherwise, as described by the CF attributes
+        ``flag_values`` and ``flag_meanings``.
 
     Raises
     ------
     ValueError
-        If the quantity or the level is not one allowed, or the fit is of another quantity or on another index.
+        If the quantity or the level is invalid, or the fit is for another quantity or index.
 
     See Also
     --------
@@ -358,13 +358,13 @@ def inversion_error(estimate: RasterOrDataset, truth: xr.DataArray, *, pair: Pai
     Returns
     -------
     error : xarray.Dataset
-        ``bias``, mean of estimate less truth; ``rmse``, the root of its mean square; ``n``, the pixels; of a Dataset
-        ``coverage`` also, the share of true values within the interval. The same to the bit under any chunking.
+        ``bias``, mean of estimate minus truth; ``rmse``, root mean square difference; ``n``, number of pixels; and for
+        a Dataset ``coverage``, the fraction of true values within the interval. Identical for any chunks.
 
     Raises
     ------
     ValueError
-        If the rasters do not match, no pixel has both, or a Dataset is not as `invert` gives it.
+        If the rasters do not match, no pixel has both values, or a Dataset is not a result of `invert`.
 
     Examples
     --------

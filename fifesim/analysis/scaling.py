@@ -13,7 +13,7 @@ def linearity_correlation(red, nir):
     .. math:: r = \mathrm{corr}\left[ \rho_\mathrm{nir} - \rho_\mathrm{vis},
         (\rho_\mathrm{nir} + \rho_\mathrm{vis})^{-1} \right]
 
-    Then the mean of the ratio is the product of the two means.
+    If it is 0, the mean of the ratio equals the product of the two means.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def linearity_correlation(red, nir):
 
     Examples
     --------
-    Brightness alone changes the difference and the sum together:
+    If only brightness varies, difference and sum are proportional:
 
     >>> light = np.array([1.0, 2.0, 4.0])
     >>> bool(linearity_correlation(0.1 * light, 0.3 * light) < 0)
@@ -101,7 +101,7 @@ def ndvi_hessian(red, nir):
 
     Examples
     --------
-    NDVI does not depend on brightness, so along it there is no curvature:
+    NDVI does not depend on brightness, so the curvature along brightness is 0:
 
     >>> hessian = ndvi_hessian(0.1, 0.3)
     >>> direction = np.array([0.1, 0.3])
@@ -448,7 +448,7 @@ def shapley(values, causes):
 
     Examples
     --------
-    Two causes that only work together share alike, and one that does nothing gets nothing:
+    Two causes that only act together have equal shares, and a cause without effect has none:
 
     >>> together = np.zeros((2, 2, 2))
     >>> together[1, 1, :] = 3.0

@@ -23,7 +23,7 @@ from fifesim.grids.reductions import areas, extremes, operators, regularized, su
 
 @by_date
 def aggregate_blocks(array, pixel=30.0, *, min_valid=0.98, lsf=None):
-    """Means over square blocks of ground, the truth with which pixels are compared, on the grid of whole blocks."""
+    """Means over square blocks of ground, on the grid of whole blocks."""
     array = sound_cells(array)
     blocks = grids.aligned_grid(grids.geobox(array), pixel)
     spreads = areas(blocks) if lsf is None else (lsf, lsf)
@@ -47,12 +47,12 @@ def scale_bias(
     algorithm: Callable[[xr.DataArray], xr.DataArray], array: xr.DataArray, pixel: Metres = 30.0
 ) -> xr.Dataset:
     """
-    Mean over pixels of an algorithm, less the algorithm of the mean.
+    Mean of an algorithm over pixels, minus the algorithm of the mean.
 
     Parameters
     ----------
     algorithm : callable
-        Takes a raster like ``array`` and gives one, such as ``fifesim.ndvi`` or ``fifesim.fpar``.
+        Function of a raster like ``array`` that returns a raster, such as ``fifesim.ndvi`` or ``fifesim.fpar``.
     array : xarray.DataArray, dims (..., y, x)
         Values of cells.
     pixel : float, optional
@@ -90,7 +90,7 @@ def scale_bias(
 
 def ndvi_bias(reflectance: xr.DataArray, pixel: Metres = 30.0) -> xr.DataArray:
     """
-    Mean NDVI less NDVI of the mean reflectance, predicted from variances and covariance within the pixels.
+    Mean NDVI minus NDVI of the mean reflectance, predicted from variances and covariance within pixels.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def ndvi_bias(reflectance: xr.DataArray, pixel: Metres = 30.0) -> xr.DataArray:
 
 def fpar_bias(lai: xr.DataArray, extinction: float, fpar_inf: float = 0.94, pixel: Metres = 30.0) -> xr.DataArray:
     """
-    Mean FPAR less FPAR of the mean LAI, predicted from the variance of LAI within the pixels.
+    Mean FPAR minus FPAR of the mean LAI, predicted from the variance of LAI within pixels.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def ndvi_linearity(reflectance: xr.DataArray) -> float:
 
 def share_kept(pixels: AnyDimensions, cells: xr.DataArray) -> xr.Dataset:
     """
-    Share of the range and of the variance of cells that pixels keep.
+    Ratios of range and variance of pixels to those between cells.
 
     Parameters
     ----------
@@ -236,13 +236,13 @@ def share_kept(pixels: AnyDimensions, cells: xr.DataArray) -> xr.Dataset:
     Returns
     -------
     kept : xarray.Dataset
-        ``range`` and ``variance``; lazy where an input is, when the chunks may change the last digit of the variance.
+        ``range`` and ``variance``. Lazy if an input is; the last digit of the variance may then depend on the chunks.
         [1]
 
     Raises
     ------
     ValueError
-        If the rasters are of different quantities, hold digital numbers or fill values, or the pixels are finer.
+        If the quantities differ, there are digital numbers or fill values, or the pixels are smaller than the cells.
 
     References
     ----------
@@ -283,7 +283,7 @@ def density(
     array : xarray.DataArray
         NaN is left out.
     points : int, optional
-        Where it is given, evenly over the range of the values.
+        Number of evenly spaced points over the range of the values.
     bandwidth : float, optional
         Bandwidth of the kernel, in units of the values; Silverman's rule of thumb by default.
     reflect : bool, optional
@@ -292,13 +292,13 @@ def density(
     Returns
     -------
     density : xarray.DataArray, dims (value,)
-        Per unit of the values. From counts in 2000 bins, so that the raster need not fit in memory; the same under any
-        chunking.
+        Density per unit of the values, from a histogram of 2000 bins, so that the raster need not fit into memory.
+        Identical for any chunks.
 
     Raises
     ------
     ValueError
-        If fewer than two values are left, they do not vary, or some are negative that are to be reflected.
+        If there are fewer than two values, they do not vary, or values to be reflected are negative.
 
     References
     ----------
@@ -373,14 +373,13 @@ def autocovariance(array: xr.DataArray, reach: float) -> xr.Dataset:
     Returns
     -------
     lags : xarray.Dataset, dims (lag_y, lag_x)
-        ``covariance`` about the mean of all cells, ``semivariance`` and the ``count`` of pairs; lags are in metres,
-        southward from 0 and from west to east: the other half is its mirror image. The same to the bit under any
-        chunking.
+        ``covariance`` about the mean of all cells, ``semivariance`` and the ``count`` of pairs. Lags are in metres,
+        southward from 0 and from west to east; the other half is symmetric. Identical for any chunks.
 
     Raises
     ------
     ValueError
-        If the reach is less than a cell or more than half of the raster, or nothing is there.
+        If the reach is less than a cell or more than half of the raster, or there are no data.
 
     See Also
     --------
@@ -481,14 +480,14 @@ def regularized_variance(array: xr.DataArray, pixel: Metres = 30.0, lsf: Spread 
     pixel : float, optional
         Size of the pixels. [m]
     lsf : line spread function, optional
-        As `fifesim.base.footprints` has it, such as ``instrument("TM").line_spread``; the mean over the pixel by
-        default.
+        Line spread function from `fifesim.base.footprints`, such as ``instrument("TM").line_spread``; by default
+        uniform over the pixel.
 
     Returns
     -------
     variance : xarray.Dataset
-        Variance of the ``cells``, and of the pixels as ``predicted`` and ``simulated``, which differ because pixels at
-        the border are left out.
+        Variance of the ``cells``, and ``predicted`` and ``simulated`` variance of the pixels, which differ because
+        border pixels are omitted.
 
     Raises
     ------

@@ -14,8 +14,8 @@ from fifesim.grids import grid as grids
 from fifesim.grids.grid import with_crs_of
 from fifesim.grids.reductions import areas, regularized
 
-# How far from the scene a raster of its surroundings counts at its place. Beyond it lies 3e-4 of what molecules scatter
-# into the view, and nothing of what aerosol does. [m]
+# Maximum distance of the surroundings. More distant ground contributes 3e-4 of the light scattered by molecules and
+# none of the light scattered by aerosol. [m]
 ENVIRONMENT_REACH = 100_000.0
 
 
@@ -64,7 +64,7 @@ def _per_band(values, array, what):
     """Values of all bands, from one value for all or one for each."""
     values, bands = np.asarray(values, float), array.sizes["band"]
     if values.ndim and len(values) not in (1, bands):
-        raise ValueError(f"{what} must be one number, or one for each of the {bands} bands, got {len(values)}")
+        raise ValueError(f"{what} must be a number, or one for each of the {bands} bands, got {len(values)}")
     return np.broadcast_to(values, bands)
 
 

@@ -40,21 +40,22 @@ def read_aerosol(
     source: FilePath | xr.Dataset, *, scale_height: float | None = None, layer: tuple[float, float] | None = None
 ) -> Aerosol:
     """
-    Aerosol of one's own, for `Atmosphere`.
+    Read a user-defined aerosol for `Atmosphere`.
 
     Parameters
     ----------
     source : path of a NetCDF or CSV file, or xarray.Dataset
         ``wavelength`` [um], ``extinction`` [any one unit] and ``single_scattering_albedo`` [1] by wavelength; ``phase``
-        [1, or sr-1 where its units say so] by ``angle`` [degree] or its cosine ``mu``, and by wavelength, or
-        ``moments`` by ``order``; perhaps ``asymmetry`` [1] by wavelength and ``polarization`` [1] or ``f12``, as
-        ``phase``. All may have a dimension ``component``, whose extinctions add up. A CSV file has one row for each
-        wavelength and angle, or one row with AERONET's columns, such as ``Single_Scattering_Albedo[440nm]``.
+        [1, or sr-1 if stated in its units] by ``angle`` [degree] or its cosine ``mu``, and by wavelength, or
+        ``moments`` by ``order``; optionally ``asymmetry`` [1] by wavelength, and ``polarization`` [1] or ``f12`` with
+        the dimensions of ``phase``. All may have a dimension ``component``, whose extinctions are added. A CSV file has
+        one row for each wavelength and angle, or one row with AERONET's columns, such as
+        ``Single_Scattering_Albedo[440nm]``.
     scale_height : float, optional
-        With which it falls off above the ground; by default the source's attribute of that name, else 2. [km]
+        Scale height of the aerosol above the ground; by default from the attribute ``scale_height``, else 2. [km]
     layer : pair of float, optional
-        Bottom and top of an even layer above the ground, instead; by default the source's attributes ``bottom`` and
-        ``top``. [km]
+        Bottom and top of a uniform layer above the ground, instead of `scale_height`; by default from the attributes
+        ``bottom`` and ``top``. [km]
 
     Returns
     -------
@@ -63,22 +64,22 @@ def read_aerosol(
     Raises
     ------
     ValueError
-        If the file cannot be read, something is missing, or a value cannot be.
+        If the file cannot be read, a variable is missing, or a value is out of range.
 
     Notes
     -----
-    Names of other codes are taken, too, in upper or lower case: ``w``, ``sigma_t``, ``albedo``, ``mu`` and the matrix
-    ``phase`` by ``i`` and ``j`` of Eradiate; ``ext``, ``ssa``, ``gg``, ``theta`` and ``pmom`` of libRadtran;
+    Names from other codes are also accepted, in upper or lower case: ``w``, ``sigma_t``, ``albedo``, ``mu`` and the
+    matrix ``phase`` by ``i`` and ``j`` of Eradiate; ``ext``, ``ssa``, ``gg``, ``theta`` and ``pmom`` of libRadtran;
     ``AOD_Extinction-Total[440nm]``, ``Asymmetry_Factor-Total[440nm]`` and ``0.000000[440nm]`` of AERONET's inversions.
-    Moments are those of `aerosols.phase_moments`, without a factor of 2 l + 1. Wavelengths in nm say so in ``units``.
+    Moments are defined as in `aerosols.phase_moments`, without a factor of 2 l + 1. Wavelengths in nm need ``units``.
 
     See Also
     --------
-    aerosol_tables : the package's own aerosols in this form.
+    aerosol_tables : built-in aerosols in this form.
 
     Examples
     --------
-    Tables as a Dataset, or the path of their file; an air of them is given its optical thickness:
+    The amount of the aerosol is given as optical thickness:
 
     >>> import fifesim
     >>> tables = fifesim.aerosol_tables("continental")
@@ -110,7 +111,7 @@ def read_aerosol(
 
 def aerosol_tables(aerosol: AerosolMixture) -> xr.Dataset:
     """
-    Tables of an aerosol of the package, in the form that `read_aerosol` takes.
+    Tables of a built-in aerosol, in the form of `read_aerosol`.
 
     Parameters
     ----------

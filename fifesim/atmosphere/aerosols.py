@@ -11,9 +11,9 @@ from fifesim.atmosphere.mixtures import Component, mixture, normalized_log_phase
 from fifesim.base import files
 from fifesim.base.caches import cached
 
-SCALE_HEIGHT = 2.0  # with which aerosol falls off above the ground [km]
+SCALE_HEIGHT = 2.0  # of the aerosol above the ground [km]
 REFERENCE_WAVELENGTH = 0.55  # at which the amount is given [um]
-WAVELENGTH_RANGE = (0.35, 3.75)  # of the package's own tables, and of what is computed [um]
+WAVELENGTH_RANGE = (0.35, 3.75)  # of the built-in tables and of all computations [um]
 
 _MEAN_WITHIN = 0.02  # of the mean of the phase function from 1, for tables between whose angles it bends [1]
 _LEAST_SCATTERING = 1e-12  # share of the extinction, so that its logarithm is finite [1]
@@ -22,7 +22,7 @@ _HIGHEST = 50.0  # of scale height and layer [km]
 # Angles at which a series of moments is tabulated: fine where particles scatter most. [degree]
 _ANGLES = np.concatenate([np.arange(200) * 0.05, np.linspace(10, 180, 681)])
 
-# Those made in this session by their text, which travels with the data in the place of the tables.
+# User-defined aerosols of this session by their text, which is stored with the data instead of the tables.
 _KNOWN = {}
 
 
@@ -34,29 +34,29 @@ class Aerosol:
     Parameters
     ----------
     wavelength : array, shape (wavelength,)
-        Two or more, increasing, 0.55 among or between them. [um]
+        Two or more wavelengths, increasing, with a range that includes 0.55. [um]
     extinction : array, shape (wavelength,) or (component, wavelength)
-        Above 0, in any one unit: the amount is the atmosphere's ``aot``.
+        Extinction above 0, in any unit. The amount is given by ``aot`` of the atmosphere.
     single_scattering_albedo : array, shape as extinction
         From 0 to 1. [1]
     angle : array, shape (angle,)
         Scattering angle, increasing from 0 to 180. [degree]
     phase : array, shape (angle, wavelength) or (component, angle, wavelength)
-        Phase function, above 0. Its mean over the sphere is 1, and is made so where it is within 2 %. [1]
+        Phase function, above 0. Its mean over the sphere must be 1 within 2 %, and is normalized. [1]
     polarization : array, shape as phase, optional
         Degree of linear polarization of natural light scattered once, -F12/F11, from -1 to 1; 0 by default. [1]
     asymmetry : array, shape as extinction, optional
         Mean cosine of the scattering angle; by default from the phase function. [1]
     scale_height : float, optional
-        With which it falls off above the ground. [km]
+        Scale height above the ground. [km]
     layer : pair of float, optional
-        Bottom and top above the ground of an even layer, in the place of ``scale_height``. [km]
+        Bottom and top of a uniform layer above the ground, instead of ``scale_height``. [km]
     name : str, optional
 
     Raises
     ------
     ValueError
-        If an array has another shape or a value that cannot be.
+        If an array has a wrong shape or an invalid value.
 
     Notes
     -----
@@ -133,8 +133,8 @@ def known_aerosol(text):
     """User-defined aerosol of this session by its identifying text."""
     if text not in _KNOWN:
         raise ValueError(
-            f"aerosol {text!r} is one of its maker's own, whose tables have not been read in this session: "
-            f"read them first, with fifesim.read_aerosol({text.partition('#')[0] + '.nc'!r})"
+            f"aerosol {text!r} is user-defined, and its tables have not been read in this session: "
+            f"read them first with fifesim.read_aerosol({text.partition('#')[0] + '.nc'!r})"
         )
     return _KNOWN[text]
 
@@ -220,7 +220,7 @@ def _check(aerosol):
     ranges = {
         "extinction": (by_wavelength, 0, np.inf, "above 0", "give it in any one unit"),
         "single_scattering_albedo": (by_wavelength, 0, 1, "from 0 to 1", "give a fraction, not a percentage"),
-        "asymmetry": (by_wavelength, -1, 1, "from -1 to 1", "leave it out to have that of the phase function"),
+        "asymmetry": (by_wavelength, -1, 1, "from -1 to 1", "leave it out to compute it from the phase function"),
         "phase": (by_angle, 0, np.inf, "above 0", "give it itself, not its logarithm; or more moments"),
         "polarization": (by_angle, -1, 1, "from -1 to 1", "give -F12/F11"),
     }
@@ -298,7 +298,7 @@ def aerosol_optical_thickness(visibility):
     Notes
     -----
     :math:`a` and :math:`b` make the number profile pass through the two tabulated ones, for 5 and 23 km.
-    The column stands on the ground, whatever its altitude.
+    The column starts at the ground for any altitude.
 
     References
     ----------
@@ -423,8 +423,8 @@ def aerosol_phase(aerosol, scattering_cosine, wavelength):
 
     Notes
     -----
-    That of a component is linear in the logarithm of the wavelength, which keeps its mean, and its logarithm
-    is linear in the angle.
+    The phase function of a component is linear in the logarithm of the wavelength, which preserves its mean. Its
+    logarithm is linear in the angle.
 
     References
     ----------
@@ -466,7 +466,7 @@ def aerosol_polarization(aerosol, scattering_cosine, wavelength):
 
     Examples
     --------
-    Straight on and straight back no direction is preferred:
+    Light scattered exactly forward or backward is not polarized:
 
     >>> [float(value) for value in aerosol_polarization("urban", [-1.0, 1.0], 0.55)]
     [0.0, 0.0]

@@ -132,7 +132,7 @@ def inhomogeneous_reflectance(target, environment, terms):
     target : array, shape (..., band, y, x)
         Reflectance factor of the target, :math:`\rho_c`. [1]
     environment : array, broadcastable
-        Mean of the ground around it, :math:`\langle \rho \rangle`. [1]
+        Mean reflectance of the surroundings, :math:`\langle \rho \rangle`. [1]
     terms : TargetTerms
         :math:`\rho_a, T(\theta_s), e^{-\tau / \mu_v}, t_d(\theta_v), S, T_g`. [1]
 
@@ -221,7 +221,7 @@ def apparent_reflectance_of_cell(leaving, around, path, down, up, albedo, gas):
     leaving : float
         Reflectance of the ground that is seen, :math:`\rho`. [1]
     around : float
-        That of the ground which exchanges light with the atmosphere, :math:`\langle \rho \rangle`. [1]
+        Reflectance of the surroundings, which exchange light with the atmosphere, :math:`\langle \rho \rangle`. [1]
     path, down, up, albedo, gas : float
         As in `apparent_reflectance`. [1]
 
@@ -282,7 +282,7 @@ def _by_cell(kernel, cells, terms):
     return out.reshape(shape)[()], refused
 
 
-# Where no light comes through, division by zero is no error but what numpy makes of it.
+# Without transmitted light, division by zero gives infinity as in numpy.
 @njit(nogil=True, cache=True, error_model="numpy")
 def _apparent(leaving, around, terms, out):
     """Fill in the apparent reflectances, and count those to be refused."""
@@ -303,13 +303,13 @@ def _corrected(toa, terms, out):
             out[i, j] = corrected_reflectance_of_cell(toa[i, j], path, down, up, albedo, gas)
 
 
-# Wavelengths at which scattering is computed: those of the aerosol's refractive indices. [um]
+# Wavelengths at which scattering is computed, equal to the wavelengths of the aerosol refractive indices. [um]
 WAVELENGTHS = np.array(
     [0.4, 0.412, 0.443, 0.47, 0.488, 0.515, 0.55, 0.59, 0.633, 0.67, 0.694, 0.76, 0.86]
     + [1.24, 1.536, 1.65, 1.95, 2.25, 3.75]
 )
 
-_TINY = 1e-30  # where there is no aerosol, the logarithm of what it does is still finite
+_TINY = 1e-30  # keeps logarithms finite without aerosol
 
 
 class Scattering(NamedTuple):
@@ -373,7 +373,7 @@ def on_wavelengths(scattering, nodes, wavelength):
     # transmittances.
     through = ["transmittance" in name for name in Scattering._fields]
     depths = [-np.log(each) if is_one else each for each, is_one in zip(scattering, through, strict=True)]
-    # One interpolator for all: to make one takes longer than to use it.
+    # A single interpolator, because creating one takes longer than using it.
     logs = np.log(np.maximum(np.concatenate([np.reshape(each, (-1, len(nodes))) for each in depths]), _TINY))
     rows = np.exp(PchipInterpolator(np.log(nodes), logs, axis=-1)(np.log(wavelength)))
     parts = np.split(rows, np.cumsum([each.size // len(nodes) for each in depths])[:-1])

@@ -14,7 +14,7 @@ from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflec
 from fifesim.base.caches import cached
 from fifesim.base.geometry import scattering_angle_cosine
 
-_MOMENTS = 48  # of the aerosol's scattering matrix: the solver uses the first 33
+_MOMENTS = 48  # of the scattering matrix of the aerosol; the solver uses the first 33
 _COSINES = 500  # of a quadrature fine enough for the forward peak of coarse particles
 
 
@@ -144,7 +144,7 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
     raa : float
         0 has sun and sensor on the same side. [degree]
     each : callable, optional
-        Goes through the runs of 6S, one for each band, such as with a progress bar.
+        Wrapper of the sequence of 6S runs (one per band), for example a progress bar.
 
     Returns
     -------
@@ -156,7 +156,7 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
     ImportError
         If the engine is 6S and not installed.
     ValueError
-        If a zenith angle is out of range, or a band reaches beyond the gas table or the aerosol's own.
+        If a zenith angle is out of range, or a band exceeds the gas table or the aerosol tables.
 
     References
     ----------
@@ -183,7 +183,7 @@ def check_zenith(name, angle):
     if not 0 <= angle <= LARGEST_ZENITH:
         raise ValueError(
             f"{name} must be from 0 to {LARGEST_ZENITH:g} degrees, got {angle:g}: "
-            "the plane-parallel atmosphere does not hold below"
+            "the plane-parallel atmosphere is not valid beyond"
         )
 
 

@@ -44,7 +44,7 @@ def sobolev_conservative_reflectance(tau, phase, mu_s, mu_v):
 
     Notes
     -----
-    Scalar, without polarization. Beside scalar successive orders it is 5.5, 2.1 and 0.9 % low at 0.44, 0.66 and
+    Scalar, without polarization. Compared with scalar successive orders it is 5.5, 2.1 and 0.9 % low at 0.44, 0.66 and
     0.84 um with the sun at 28 degrees and a nadir view; 11, 5 and 2 % with the sun at 60 and the view at 40.
 
     References
@@ -262,7 +262,7 @@ class _Field(NamedTuple):
     rate: np.ndarray  # k
     ratio: np.ndarray  # of H to J: +k / a in the growing term, -k / a in the decaying one
     mean_direct: np.ndarray  # D
-    net_direct: np.ndarray  # the term of H beside D
+    net_direct: np.ndarray  # coefficient of H that corresponds to D
     mu_s: np.ndarray  # moved off the pole k mu_s = 1
 
 
@@ -304,8 +304,8 @@ def five_s_scattering(atmosphere, wavelength, sza, vza, raa):
 
     Notes
     -----
-    Beside 6SV1.1, continental aerosol, visibility 23 km and more, sun within 45 and view within 55 degrees: at a
-    reflectance of 0.3 the rms difference is 1.9, 1.1, 0.8, 0.3, 0.2 and 0.1 % in Landsat TM1 to 5 and 7.
+    Compared with 6SV1.1 for continental aerosol, visibility of at least 23 km, sun within 45 and view within 55
+    degrees, the rms difference at a reflectance of 0.3 is 1.9, 1.1, 0.8, 0.3, 0.2 and 0.1 % in Landsat TM1 to 5 and 7.
 
     References
     ----------

@@ -82,7 +82,7 @@ def column(levels, mixing_ratio):
 
     Examples
     --------
-    The air itself weighs what the pressure says:
+    The mass of the air follows from the pressure:
 
     >>> levels = profile_above("midlatitude-summer", 0.0)
     >>> round(float(column(levels, 1.0).sum() * 9.80665 / 100))
@@ -314,8 +314,7 @@ def absorber_layers(levels, gas):
 
 
 def effective_amounts(levels, gas, strength_temperature, width_temperature):
-    r"""
-    Vertical amounts of a gas as its lines see them, weighted by temperature and pressure.
+    r"""Effective vertical amounts of a gas, weighted by temperature and pressure.
 
     .. math::
 
@@ -346,7 +345,7 @@ def effective_amounts(levels, gas, strength_temperature, width_temperature):
 
     Examples
     --------
-    Without temperature the first is the column:
+    Without temperature dependence, the first amount is the column:
 
     >>> levels = profile_above("midlatitude-summer", 0.0)
     >>> round(float(effective_amounts(levels, "o3", np.zeros((2, 1)), np.zeros((2, 1)))[0][0]), 2)

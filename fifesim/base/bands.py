@@ -37,7 +37,7 @@ class Window(NamedTuple):
 
 
 # The absorption of all pigments, the green peak and the red absorption of chlorophyll, the plateau of leaves in the
-# near infrared, and the window between two absorption bands of water vapour, where that of leaves absorbs too.
+# near infrared, and the window between two absorption bands of water vapour, where leaf water also absorbs.
 BLUE = Window("blue", 0.45, 0.52, 0.48)
 GREEN = Window("green", 0.50, 0.60, 0.56)
 RED = Window("red", 0.60, 0.70, 0.66)

@@ -21,7 +21,7 @@ _DOT_OF_KEY = re.compile(r"[\w\"'-][ \t]*\.(?=[ \t]*[\w\"'-])")
 
 _KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
 
-# The longest that a message repeats of one value, and what a line of it may have.
+# Maximum length of a value in a message, and of a line.
 _SHOWN = 60
 _LINE = 400
 

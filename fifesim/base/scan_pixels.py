@@ -120,7 +120,7 @@ def _area_in_cell(pixel, i, j, cut, other):
     count = _cut(other, count, cut, 1, j, 1.0)
     count = _cut(cut, count, other, 1, j + 1.0, -1.0)
     area = 0.0
-    # From its first corner, which keeps the digits of what lies far from the origin.
+    # Relative to the first corner, to keep precision far from the origin.
     for k in range(2, count):
         down, right = other[k - 1, 0] - other[0, 0], other[k - 1, 1] - other[0, 1]
         area += down * (other[k, 1] - other[0, 1]) - right * (other[k, 0] - other[0, 0])

@@ -24,7 +24,7 @@ CORNERS = {"NAD83": ("EPSG:26914", 704970.0, 4334220.0), "NAD27": ("EPSG:26714",
 
 # Day and month in another order are another season, and a time alone is today's.
 _WRITTEN = re.compile(r"\s*\d{4}-?\d{2}-?\d{2}[T ]\d{2}(:?\d{2}.*)?\s*", re.ASCII)
-_YEARS = 1700, 2200  # what dates in nanoseconds hold
+_YEARS = 1700, 2200  # range of dates in nanoseconds
 
 
 def utc(time):

@@ -1,1 +1,1 @@
-"""The steps of Figure 1 that need several stages."""
+"""Processing steps of Figure 1 that combine several stages."""

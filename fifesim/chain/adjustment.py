@@ -1,4 +1,4 @@
-"""Spectral adjustment: the bands of an image converted to the bands of another instrument, and its digital numbers."""
+"""Spectral adjustment: bands of one instrument estimated from bands of another, and the resulting image."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from fifesim.sensor.response.spatial import Difference, Mixture, SystemSpread
 from fifesim.sensor.response.spectral import band_weights, best_linear, covered_steps, line_between
 
 UNCERTAINTY = 0.0005
-"""Standard error of the reflectance that an adjustment allows for by default [1]."""
+"""Default standard error of the reflectance in an adjustment [1]."""
 
 
 @by_date
@@ -48,46 +48,45 @@ def adjust_bands(
     uncertainty: float = UNCERTAINTY,
 ) -> xr.DataArray:
     """
-    Surface reflectance in the bands of another instrument, by spectra that fit each pixel.
+    Estimate surface reflectance in the bands of another instrument.
 
-    Every band of the other instrument is the sum of all bands of the raster, with the weights that estimate it best
-    over a library of 4800 spectra by PROSPECT, SAIL and soils of the world, whose leaves (green, red, dry and dead),
-    leaf area, ground and sun vary widely.
+    Each target band is a weighted sum of all bands of the raster. The weights are the best linear estimate over a
+    library of 4800 spectra from PROSPECT, SAIL and measured soils, with a wide range of leaves (green, red, dry and
+    dead), leaf area, backgrounds and sun.
 
     Parameters
     ----------
     reflectance : xarray.DataArray
-        Surface reflectance with a dimension ``band``: names of the source's bands, or a coordinate ``wavelength`` [um].
-        [1]
+        Surface reflectance with a dimension ``band``, which has band names of the source or a coordinate ``wavelength``
+        [um]. [1]
     instrument : str or Instrument
         The other instrument.
     bands : str or sequence of str, optional
         Names of its bands; all by default.
     source : str or Instrument, optional
-        Whose bands the raster has; by default that which it carries.
+        Instrument of the raster; by default from its attributes.
     uncertainty : float, optional
-        Standard error of the reflectance, independent from band to band. A larger one, such as 0.01 after an
-        atmospheric correction, relies less on differences between bands. [1]
+        Standard error of the reflectance, independent from band to band. With a larger value, such as 0.01 after an
+        atmospheric correction, the estimate depends less on differences between bands. [1]
 
     Returns
     -------
     reflectance : xarray.DataArray
-        With ``adjustment_error`` along band: the standard error over spectra of the library that did not take part,
-        each leaf left out in turn, with the uncertainty of the input. NaN where any band is. Lazy where the input is.
-        [1]
+        Has a coordinate ``adjustment_error`` along band: the standard error over library spectra that were not used,
+        leaving out one leaf at a time, including `uncertainty`. NaN if any input band is NaN. Lazy if the input is. [1]
 
     Raises
     ------
     ValueError
-        If the raster is no surface reflectance or its instrument is not known, or no band of it lies where one of
-        the other instrument does.
+        If the raster is not surface reflectance, its instrument is unknown, or a target band does not overlap any of
+        its bands.
 
     Notes
     -----
-    The error is that of land in general: for spectra of another code over other soils, the realised error was 0.8 to
-    1.3 times the stated one in each band of ten pairs of instruments; for bare soil or dead grass alone, up to 3.3
-    times. The library lacks snow and water, and the error does not hold for them; grey surfaces change by 2 % at most,
-    by 4 % in OLI1 from ETM+. The directions of sun and view stay those of the raster.
+    The error is valid for land in general. On spectra from another code over other soils, the realised error was 0.8
+    to 1.3 times the stated one in each band of ten pairs of instruments; for bare soil or dead grass alone, up to 3.3
+    times. The error is not valid for snow and water. Grey surfaces change by at most 2 %, 4 % in OLI1 from ETM+.
+    Directions of sun and view do not change.
 
     See Also
     --------
@@ -139,11 +138,9 @@ def as_seen_by(
     recorded: bool | None = None,
 ) -> Image:
     """
-    The image that another instrument would have recorded of a scene.
+    Simulate the image of a scene by another instrument, from surface reflectance.
 
-    The surface reflectance is brought to the bands of the other instrument (`adjust_bands`), then to the top of the
-    atmosphere (`to_toa`), and is regularized onto its pixels, with its noise, and digitised (`sense`). Take these steps
-    by themselves for what else they know.
+    The function applies `adjust_bands`, `to_toa` and `sense` in sequence. Call them separately for further options.
 
     A scene that an instrument recorded is blurred already: only the difference of both blurs is applied, by the ratio
     of the modulation transfers, with a floor. Details that the source did not record stay missing: ``contrast_left`` is
@@ -152,8 +149,8 @@ def as_seen_by(
     Parameters
     ----------
     reflectance : xarray.DataArray, dims (band, y, x)
-        As in `adjust_bands`. Its pixels are the cells that the other instrument sees: let them be smaller than its own.
-        [1]
+        As in `adjust_bands`. Its pixels are the ground cells of the simulation and should be smaller than the pixels of
+        the other instrument. [1]
     instrument : str or Instrument
         The other instrument.
     bands, source, uncertainty : optional
@@ -161,11 +158,11 @@ def as_seen_by(
     atmosphere : Atmosphere, optional
         As in `to_toa`.
     time : str or datetime, optional
-        When the other instrument passes, UTC where it names no time zone: the sun is that over the middle of the scene,
-        the view that of the raster. It lights the atmosphere and the band; the reflectance factor stays that of
-        the raster's own sun.
+        Overpass time of the other instrument, in UTC unless it has a time zone. The sun is computed for the scene
+        centre; the view is taken from the raster. The new sun changes irradiance and atmosphere, but not the
+        reflectance factor.
     geometry : Geometry, optional
-        Of sun and sensor, instead of ``time``; by default that which the raster carries.
+        Directions of sun and sensor, instead of ``time``; by default from the raster.
     onto, noise, seed : optional
         As in `sense`.
     recorded : bool, optional
@@ -175,8 +172,9 @@ def as_seen_by(
     Returns
     -------
     image : xarray.DataArray of unsigned integers, dims (band, y, x), or xarray.DataTree
-        As from `sense`, with ``adjustment_error`` of the surface reflectance along band; for a recorded scene also
-        ``contrast_left``, the contrast at the Nyquist frequency of the pixels relative to an image of the ground.
+        As from `sense`, with coordinates along band: ``adjustment_error`` of the surface reflectance, and for a
+        recorded scene ``contrast_left``, the contrast at the Nyquist frequency of the pixels relative to an image of
+        the ground.
 
     Raises
     ------
@@ -222,7 +220,7 @@ def as_seen_by(
 
 def _with_bands(image, along_band):
     """Add coordinates along band to an image."""
-    # As variables: a DataArray would bring the coordinates of its sun.
+    # Use variables: a DataArray would add its sun coordinates.
     found = {each.name: each.sel(band=image["band"].values).variable for each in along_band}
     return image.assign_coords(found)
 
@@ -235,17 +233,15 @@ _TOO_SMOOTH = 0.9
 
 
 def _source(array, given):
-    """Instrument of a raster's bands, as given or carried."""
+    """Instrument of the bands of a raster, as given or from its attributes."""
     description = carried_instrument(array) if given is None else find_instrument(given)
     if description is None:
-        raise ValueError(
-            "the raster does not say which instrument's bands it has: give it as source=, such as source='MSI'"
-        )
+        raise ValueError("the instrument of the raster is unknown: give source=, such as source='MSI'")
     return description
 
 
 def _is_recorded(given, by, source):
-    """Whether the source recorded a raster: as given, else as the raster says."""
+    """Whether the source recorded a raster: as given, else from its attributes."""
     if given is not None:
         return given
     if by not in (None, source.name):
@@ -316,30 +312,31 @@ def _variance_shares(sources, targets, uncertainty):
 
 def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands: Names | None = None) -> xr.Dataset:
     """
-    Bands of one instrument as straight lines of those of another: target = slope * source + offset.
+    Linear relations between bands of two instruments: target = slope * source + offset.
 
     Parameters
     ----------
     source, target : str or Instrument
     bands : str or sequence of str, optional
-        Names of the target's bands; by default those where the source has a band.
+        Names of target bands; by default all that overlap a source band.
 
     Returns
     -------
     lines : xarray.Dataset, dims (band)
-        For each band of the target: ``source_band``, that whose mean wavelength is nearest; ``slope`` and ``offset`` by
-        least squares over the package's library of spectra; ``error``, the standard deviation about the line, and
-        ``difference``, the root mean square of the difference without it; ``published_slope``, ``published_offset`` and
-        ``reference`` of ``data/spectral_adjustment.csv``, NaN and empty where nobody's were found. [1]
+        For each target band: ``source_band``, the source band with the nearest mean wavelength; ``slope`` and
+        ``offset`` by least squares over the library of spectra; ``error``, the standard deviation about the line;
+        ``difference``, the root mean square difference of the bands without adjustment; and ``published_slope``,
+        ``published_offset`` and ``reference`` from ``data/spectral_adjustment.csv``, NaN or empty if none is known. [1]
 
     Raises
     ------
     ValueError
-        If no band of the source lies where one of the target does.
+        If a requested target band does not overlap any source band.
 
     Notes
     -----
-    One line for all land is what tables hold. `adjust_bands` uses all bands, and is several times as good.
+    Published tables give one line for all land surfaces. `adjust_bands` uses all bands; its errors are several times
+    smaller.
 
     See Also
     --------
@@ -369,7 +366,7 @@ def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands
 
 
 def _source_bands(array, source):
-    """Bands of a raster, from the given or carried instrument."""
+    """Bands of a raster, from the given instrument or its attributes."""
     description = _source(array, source)
     if "band" not in array.dims:
         raise ValueError(f"the raster needs a dimension band, got {array.dims}: keep all of its bands")
@@ -377,11 +374,11 @@ def _source_bands(array, source):
 
 
 def _geometry(array, time, geometry):
-    """Directions of sun and sensor: as given, or the sun at a time over the middle of a scene with its view."""
+    """Directions of sun and sensor as given, or from the time, the scene centre and the view of the scene."""
     if time is None:
         return geometry
     if geometry is not None:
-        raise ValueError("time and geometry both say where the sun is: give one of them")
+        raise ValueError("time and geometry both determine the sun: give one of them")
     sun = directions.sun_over(grids.geobox(array), time)
     own = directions.uniform_geometry(directions.geometry_of(array) or sun, "as_seen_by with a time")
     return replace(sun, vza=own.vza, vaa=own.vaa)
@@ -392,19 +389,18 @@ def _responses(bands):
 
 
 def _beside(sources, band):
-    """Whether any band of the source overlaps a band, both within half of their peak response."""
+    """Whether any source band overlaps a band, both at half of their peak response."""
     low, high = half_peak(band.response)
     return any(limits[0] <= high and low <= limits[1] for limits in (half_peak(each.response) for each in sources))
 
 
 def _check_neighbours(sources, bands, instrument):
-    """Raise ValueError for bands that no band of the source overlaps."""
+    """Raise ValueError for bands that do not overlap a source band."""
     alone = [band.name for band in bands if not _beside(sources, band)]
     if alone:
         others = [band.name for band in bands if band.name not in alone]
         raise ValueError(
-            f"no band of the source lies where {', '.join(alone)} of {instrument.name} responds: pick bands, "
-            f"bands={others or '[...]'}"
+            f"no source band overlaps {', '.join(alone)} of {instrument.name}: select bands, bands={others or '[...]'}"
         )
 
 
@@ -417,7 +413,7 @@ def _weights(responses):
         if each.coverage < MIN_COVERAGE:
             low, high = band.limits
             raise ValueError(
-                f"band {band.name}, {low:g} to {high:g} um, reaches out of the library of spectra, "
+                f"band {band.name}, {low:g} to {high:g} um, exceeds the spectral library, "
                 f"{wavelength[0]:g} to {wavelength[-1]:g} um: leave it out"
             )
     return np.stack([each.weights for each in found])
@@ -431,7 +427,7 @@ def _estimate(sources, targets, uncertainty):
 
 
 def _published(pairs):
-    """Published lines of (source, band, target, band), as columns."""
+    """Published lines by (source, band, target, band)."""
     keys = ["source", "source_band", "target", "target_band"]
     table = files.table("spectral_adjustment.csv").set_index(keys)
     rows = table.reindex(pd.MultiIndex.from_tuples(pairs, names=keys))

@@ -1,4 +1,4 @@
-"""Comparison of one scene through many instruments, and of the engines of the atmosphere."""
+"""Comparison of instruments over one scene, and of radiative transfer engines."""
 
 from __future__ import annotations
 
@@ -40,31 +40,30 @@ def compare(
     bands: Mapping[str, Names] | None = None,
 ) -> xr.DataTree:
     """
-    Images of one scene by many instruments, each on its own grid.
+    Simulate images of one scene by several instruments, each on its own grid.
 
     Parameters
     ----------
     lai : xarray.DataArray, dims (y, x), or xarray.Dataset
-        Leaf area index, or a landscape that has it as ``lai``; in chunks, the images are lazy, and one pass over the
-        scene makes them all. [m2 m-2]
+        Leaf area index, or a landscape with a variable ``lai``. If it is chunked, the images are lazy and share one
+        pass over the scene. [m2 m-2]
     instruments : sequence of str or Instrument
     setup : Setup, optional
-        Ground, air and sampling that they share; its instrument and bands do not count. Spectra of leaf and background,
-        as by default, fit every instrument.
+        Common ground, atmosphere and sampling; its instrument and bands are ignored. Give leaf and background as
+        spectra, as in the default, because optics by band fit one instrument only.
     bands : mapping of str to sequence of str, optional
-        Bands by the name of an instrument; by default its red and its near infrared band.
+        Band names by instrument; by default the red and the near infrared band.
 
     Returns
     -------
     images : xarray.DataTree
-        A node for each instrument by its name, with ``dn`` (or ``toa_radiance``), dims (band, y, x); below it, of bands
-        of several resolutions, a node for each, such as ``/MSI/10m``.
+        One node per instrument, with ``dn`` (or ``toa_radiance``), dims (band, y, x). If the bands have several
+        resolutions, it has one child per resolution, such as ``/MSI/10m``.
 
     Raises
     ------
     ValueError
-        If an instrument is named twice, ``bands`` names one that is not asked for, or a step of the chain refuses its
-        input.
+        If an instrument is repeated, ``bands`` names an instrument that is not compared, or an input is invalid.
 
     See Also
     --------
@@ -83,7 +82,7 @@ def compare(
     descriptions = [find_instrument(each) for each in ([instruments] if isinstance(instruments, str) else instruments)]
     names = [description.name for description in descriptions]
     if not names or len(set(names)) < len(names):
-        raise ValueError(f"instruments must be at least one, each once, got {', '.join(names) or 'none'}")
+        raise ValueError(f"instruments must be one or more different names, got {', '.join(names) or 'none'}")
     bands = {find_instrument(name).name if name not in names else name: each for name, each in (bands or {}).items()}
     if set(bands) - set(names):
         raise ValueError(f"bands are given for {', '.join(set(bands) - set(names))}, which is not compared")
@@ -99,26 +98,26 @@ def compare(
 
 def comparison_table(images: xr.DataTree, truth: xr.DataArray | None = None) -> pd.DataFrame:
     """
-    What each of some images of one scene shows, a row for each instrument; computes.
+    Table of image statistics by instrument; computes.
 
     Parameters
     ----------
     images : xarray.DataTree
         From `compare`.
     truth : xarray.DataArray, dims (y, x), optional
-        On cells, such as leaf area index; its means over the pixels of each image are compared with the NDVI.
+        Raster of cells, such as leaf area index. Its means over the pixels of each image are regressed on NDVI.
 
     Returns
     -------
     table : pandas.DataFrame
-        By instrument: ``pixel`` [m], ``rows``, ``columns``, ``bands``, ``ndvi_mean``, ``ndvi_sd``, and with a truth
-        ``slope``, ``intercept`` and ``r2`` of it on the NDVI, with the ``n`` pixels that both have. NaN where the bands
-        make no NDVI.
+        One row per instrument: ``pixel`` [m], ``rows``, ``columns``, ``bands``, ``ndvi_mean`` and ``ndvi_sd``. With
+        `truth` also ``slope``, ``intercept``, ``r2`` and the number of pixels ``n`` of its regression on NDVI. NaN
+        without a red and a near infrared band.
 
     Raises
     ------
     ValueError
-        If the tree holds something else, or the truth does not lie on its ground.
+        If `images` has other contents, or `truth` does not cover the images.
 
     See Also
     --------
@@ -140,7 +139,7 @@ def comparison_table(images: xr.DataTree, truth: xr.DataArray | None = None) -> 
         rows[name] = row | {"bands": ", ".join(map(str, image["band"].values))}
         if not shows_ndvi(image):
             continue
-        # Once, for the mean, the deviation and the regression.
+        # Compute once for mean, deviation and regression.
         shown = computed(ndvi(image))[0]
         row = {"ndvi_mean": float(shown.mean()), "ndvi_sd": float(shown.std(ddof=1))}
         if truth is not None:
@@ -159,7 +158,7 @@ def recorded_images(images):
         variables = [each for each in ("dn", "toa_radiance") if each in node.data_vars]
         if not variables:
             holds = ", ".join(map(str, node.data_vars)) or "nothing"
-            raise ValueError(f"{name} holds no dn and no toa_radiance, but {holds}: give that of compare")
+            raise ValueError(f"{name} has no dn or toa_radiance, but {holds}: give the result of compare")
         found[name] = node[variables[0]]
     return found
 
@@ -169,7 +168,7 @@ def shows_ndvi(image):
     return all(nearest_band(image["wavelength"].values, window) is not None for window in (RED, NEAR_INFRARED))
 
 
-TYPICAL_LAI = 2.0  # of the surface that stands for all [m2 m-2]
+TYPICAL_LAI = 2.0  # of a representative surface [m2 m-2]
 
 _TERMS = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo")
 _LONG_NAMES = {name: LONG_NAMES[name] for name in _TERMS}
@@ -180,27 +179,28 @@ def compare_engines(
     setup: Setup | None = None, *, reflectance: Numbers | None = None, engines: Names = ("5S", "successive-orders")
 ) -> xr.Dataset:
     """
-    What the atmosphere of a setup does by several engines.
+    Compare the atmospheric terms of several radiative transfer engines.
 
     Parameters
     ----------
     setup : Setup, optional
-        Its air, directions, instrument, bands, leaves and background count; by default the paper's.
+        Atmosphere, directions, instrument, bands, leaves and background; by default as in the paper.
     reflectance : number or sequence of float, shape (band,), optional
-        Of an even surface; by default that of the setup's canopy of leaf area 2. [1]
+        Reflectance of a uniform surface; by default the canopy of the setup with a leaf area index of 2. [1]
     engines : sequence of str, optional
-        Of those of `Atmosphere`.
+        Names of engines, as in `Atmosphere`.
 
     Returns
     -------
     terms : xarray.Dataset, dims (engine, band)
-        Path reflectance, transmittances, spherical albedo, and ``toa_reflectance`` of the surface; ``ndvi`` of it by
-        engine where there are a red and a near infrared band. [1]
+        Path reflectance, transmittances, spherical albedo, and ``toa_reflectance`` of the surface; also its ``ndvi`` if
+        there are a red and a near infrared band. [1]
 
     Raises
     ------
     ValueError
-        If an engine is unknown, sun or view vary or are out of its range, or the reflectance is not one for each band.
+        If an engine is unknown, sun or view vary or are out of range, or the number of reflectances differs from the
+        number of bands.
 
     See Also
     --------
@@ -240,7 +240,7 @@ def compare_engines(
 
 def engine_error(setup=None):
     """Relative error of the apparent reflectance by the engine of a setup against successive orders, by band. [1]"""
-    # For the canopy of the setup with a leaf area of 2, at the mean wavelength of each band, which is quick.
+    # For speed, at the mean wavelength of each band.
     setup, air, bands, geometry = _case(setup)
     surface = _surface(setup, air, None, len(bands))
     wavelength = np.array([band.response.center for band in bands])
@@ -275,7 +275,7 @@ def _case(setup):
 def _surface(setup, air, reflectance, n_bands):
     """Reflectance of the surface in each band, shape (band,). [1]"""
     if reflectance is None:
-        # One cell, under the same light for all engines.
+        # A single cell, with the same illumination for all engines.
         cell = fife_site(30, window=((0, 1), (0, 1)))
         lai = grids.place(xr.DataArray([[TYPICAL_LAI]], dims=("y", "x"), attrs=made_on_site(cell)), cell)
         level = replace(setup, atmosphere=replace(air, engine="5S"), dem=None, horizon=None)
@@ -283,7 +283,7 @@ def _surface(setup, air, reflectance, n_bands):
     surface = np.asarray(reflectance, float)
     if surface.shape not in ((), (n_bands,)) or not np.all((surface >= 0) & (surface <= 1)):
         raise ValueError(
-            f"reflectance must be one number from 0 to 1, or {n_bands}, one for each band, got "
-            f"{described(reflectance)}: leave it out to have that of a canopy"
+            f"reflectance must be a number from 0 to 1, or {n_bands} numbers, one per band, got "
+            f"{described(reflectance)}: leave it out to use a canopy"
         )
     return np.broadcast_to(surface, n_bands)

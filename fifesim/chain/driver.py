@@ -32,7 +32,7 @@ from fifesim.sensor.response import calibration
 
 @dataclass(frozen=True, eq=False)
 class Driver:
-    """Steps of a setup as functions of arrays over (band, y, x) or (y, x); shared tables are computed once."""
+    """Steps of a setup on arrays over (band, y, x) or (y, x). Shared tables are computed once."""
 
     setup: Setup
 
@@ -58,7 +58,7 @@ class Driver:
 
     @cached_property
     def compression(self):
-        """Counts of square-root scales, shape (band,); 0 where a scale is linear."""
+        """Number of counts of square-root scales, shape (band,); 0 for linear scales."""
         return np.array([band.compressed_count(self.scale[2]) for band in self.bands])
 
     @property
@@ -93,7 +93,7 @@ class Driver:
 
     def image(self, toa, cells, setup=None):
         """Digital numbers, or radiance without ``quantise``, of reflectance on a grid of cells."""
-        # A shared driver takes pixels and seed from another setup.
+        # Pixels and seed are arguments because the driver may be shared by several setups.
         own, cells = setup or self.setup, as_carried(cells)
         pixels, shifts = self.pixels(cells, own)
         means = np.empty((len(self.bands), *pixels.shape))
@@ -114,7 +114,7 @@ class Driver:
         return calibration.reflectance_to_radiance(reflectance, *self._sun)
 
     def with_noise(self, radiance, pixels, setup):
-        """Radiance with the noise that a setup draws for the pixels of a grid."""
+        """Radiance with noise for the pixels of a grid."""
         plain, first = xr.DataArray(radiance, dims=("band", "y", "x")), grids.lattice_position(pixels)
         return noisy(plain, self.instrument, self.bands, setup.noise, setup.seed, first, setup.noise_models).data
 
@@ -164,7 +164,7 @@ class Driver:
 
     @cached_property
     def _scales(self):
-        """Gain and offset, and the compression if a band has one: linear scales take shorter formulas."""
+        """Gain and offset, and the compression if any band has one; linear scales use shorter formulas."""
         scales = [*self.scale[:2], self.compression] if self.compression.any() else self.scale[:2]
         return [_along_first(each, 3) for each in scales]
 
@@ -182,7 +182,7 @@ class Driver:
 
 
 def varying_parts(setup):
-    """Names of the parts of a setup that vary over a scene or couple its cells, a list of str."""
+    """Names of the parts of a setup that plain arrays do not support: they vary by cell or couple cells."""
     found = {
         "relief": setup.dem is not None,
         "adjacency": setup.adjacency,
@@ -207,7 +207,7 @@ def cell_block_means(values, cells, size, min_valid):
 
 def shared_operators(spreads, cells, pixels, shifts=(0.0, 0.0)):
     """Operators from cells to pixels, cached for scenes that share them."""
-    # A CRS takes longer to compare than an operator to make, and does not matter to it.
+    # Comparing CRSs takes longer than building an operator, which does not depend on the CRS.
     return _kept_operators(spreads, *(GeoBox(each.shape, each.affine, None) for each in (cells, pixels)), shifts)
 
 

@@ -1,4 +1,4 @@
-"""Landscapes in the chain: the canopy of each class and cell, seen through the air, and true means."""
+"""Landscapes: canopies of all classes and cells, apparent reflectance in one pass, FPAR, and block means."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ from fifesim.ground.landscape.classes import CoverClass
 from fifesim.ground.landscape.labels import classes_of
 
 _TALLGRASS = {"background": "soil and litter", "brown_leaf": "dead leaves", "leaf_optics": "green leaves"}
-"""Optics that are those of FIFE's tallgrass by default."""
+"""Optics with FIFE's tallgrass as default."""
 
 _CURES = {
-    "background": "give background={'soil_dry': 1.0} or your own ([ground.background_spectra] of a scenario)",
+    "background": "give background={'soil_dry': 1.0} or other spectra ([ground.background_spectra] of a scenario)",
     "brown_leaf": "give brown_leaf=fifesim.Leaf(...) ([ground.brown_leaf])",
     "leaf_optics": "give leaf_optics=fifesim.Leaf(...) ([ground.leaf])",
 }
@@ -56,7 +56,7 @@ def stands_of(classes, canopy, cells=MappingProxyType({})):
 
 
 def warn_of_tallgrass(scene, classes, canopy, cells=MappingProxyType({})):
-    """Warn if the default optics, of the tallgrass of FIFE, are used for a scene elsewhere."""
+    """Warn if the default optics of FIFE's tallgrass are used for a scene at another site."""
     bare = {kind.code for kind in classes if isinstance(kind.lai, Number) and kind.lai == 0}
     taken = set()
     for code, stand in stands_of(classes, canopy, cells).items():
@@ -65,7 +65,7 @@ def warn_of_tallgrass(scene, classes, canopy, cells=MappingProxyType({})):
         taken |= {name for name, is_needed in needed.items() if is_needed and getattr(stand, name) is None}
     if taken:
         warn(
-            f"nothing says what grows on {scene}: FIFE's tallgrass is taken for "
+            f"the vegetation of {scene} is unknown: using FIFE's tallgrass for "
             f"{', '.join(_TALLGRASS[name] for name in sorted(taken))}; "
             f"{'; '.join(_CURES[name] for name in sorted(taken))}"
         )
@@ -73,7 +73,7 @@ def warn_of_tallgrass(scene, classes, canopy, cells=MappingProxyType({})):
 
 def seen_through_air(reflectance):
     """Function that computes the top-of-atmosphere reflectance of a lazy surface reflectance in one pass, or None."""
-    # None where cells differ in more than leaf area and background. The bits are those of the two separate steps.
+    # None if cells differ in more than leaf area and background. Results are identical to the two separate steps.
     canopy = origin_of(reflectance)
     if not isinstance(canopy, EvenCanopy):
         return None
@@ -91,13 +91,13 @@ def seen_reflectance(lai, *, background, scene, terms):
     cells, table = np.ascontiguousarray(lai, float), surface_table(background, scene)
     out = np.empty((table.coefficients.shape[1], cells.size))
     if _seen(cells.reshape(-1), table, np.array(list(terms.values())), out):
-        # The functions themselves say what is wrong.
+        # These functions raise a specific error.
         ground = scene_reflectance(check_map(lai), np.array(background), scene)
         return apparent_reflectance(ground, **{name: np.array(each)[:, None, None] for name, each in terms.items()})
     return out.reshape(-1, *cells.shape)
 
 
-# Where no light comes through, division by zero is no error but what numpy makes of it.
+# Without transmitted light, division by zero gives infinity as in numpy.
 @njit(nogil=True, cache=True, error_model="numpy")
 def _seen(lai, table, terms, out):
     """Fill in the apparent reflectance; return whether any leaf area or reflectance is invalid."""
@@ -135,7 +135,7 @@ def land_of(scene):
         return Land(scene)
     if "lai" not in scene.data_vars:
         raise ValueError(
-            f"a landscape has a variable lai, this Dataset has {', '.join(map(str, scene.data_vars)) or 'none'}: "
+            f"a landscape needs a variable lai, this Dataset has {', '.join(map(str, scene.data_vars)) or 'none'}: "
             "make it with fifesim.landscape(grid, ...), or rename one with .rename(LAI='lai')"
         )
     cells = {name: scene[name] for name in NUMERIC_PROPERTIES if name in scene.data_vars}
@@ -151,7 +151,7 @@ def canopies_of(land, responses, canopy, exact=False):
     known, found, leaf_optics = {}, {}, partial(optics_labels.leaf_optics, exact=exact)
 
     def once(name, make, given):
-        # Stands share optics. The argument is kept too, so that no other object takes its identity.
+        # Stands share optics. Keep the argument as well, so that its id is not reused.
         if (name, id(given)) not in known:
             known[name, id(given)] = given, make(responses, given, land.lai)
         return known[name, id(given)][1]
@@ -180,11 +180,9 @@ def _check_used(land, canopy):
         if isinstance(value, str | int | float) and value == default:
             continue
         if name in land.cells:
-            raise ValueError(f"{name} is given, and the landscape has a variable {name}: leave out one of the two")
+            raise ValueError(f"{name} is given and also a variable of the landscape: remove one of them")
         if land.classes and all(name in each.canopy.given for each in land.classes):
-            raise ValueError(
-                f"{name} is given, and all classes of the landscape have their own: leave it out, or out of the classes"
-            )
+            raise ValueError(f"{name} is given and also defined by all classes of the landscape: remove one of them")
 
 
 @by_date
@@ -198,22 +196,22 @@ def fpar(
     leaves: Literal["all", "green"] = "all",
 ) -> xr.DataArray:
     """
-    Fraction of photosynthetically active radiation that a canopy absorbs, or its green leaves.
+    Fraction of photosynthetically active radiation absorbed by a canopy, or by its green leaves.
 
     Parameters
     ----------
     lai : xarray.DataArray, dims (y, x), or xarray.Dataset
-        Leaf area index, or a landscape that has it as ``lai``. [m2 m-2]
+        Leaf area index, or a landscape with a variable ``lai``. [m2 m-2]
     canopy : Canopy, optional
-        Its leaf angles, crown cover, and dead leaves; properties that the landscape has are not given here.
+        Leaf angles, crown cover and dead leaves. Leave out properties that are variables of the landscape.
     geometry : fifesim.base.geometry.Geometry, optional
-        The sun's; by default that which the array carries, else at its time and place.
+        Direction of the sun; by default from the coordinates of the array, else from its time and place.
     time : str or datetime, optional
-        In the place of ``geometry``.
+        Time for the position of the sun, instead of ``geometry``.
     fpar_inf : float, optional
-        Of an infinitely thick canopy. [1]
+        FPAR of an infinitely thick canopy. [1]
     leaves : {"all", "green"}, optional
-        Which leaves absorb it: all of them, dead ones too, or those alone that can use it.
+        Include dead leaves ("all") or only photosynthetic ones ("green").
 
     Returns
     -------
@@ -223,12 +221,11 @@ def fpar(
     Raises
     ------
     ValueError
-        If LAI is negative, or a share outside 0 to 1.
+        If LAI is negative, or a fraction is outside 0 to 1.
 
     Notes
     -----
-    Both kinds of leaf absorb alike here, as in Eq. 6. SAIL's own shares, of each wavelength, are in
-    `ground.canopy.layers`.
+    Green and dead leaves absorb equally here, as in Eq. 6. Spectral absorption by SAIL is in `ground.canopy.layers`.
 
     References
     ----------
@@ -255,7 +252,7 @@ def fpar(
     stands = stands_of(land.classes, canopy, land.cells)
     if land.cover is None:
         return absorbed(stands[None])
-    # Classes whose canopies absorb alike are computed once.
+    # Classes with equal absorption are computed once.
     kernels: dict = {}
     known: list = []
     for code, stand in stands.items():
@@ -272,32 +269,32 @@ def aggregate(
     array: Annotated[Raster, MASKS_TOO], pixel: Metres = 30.0, *, min_valid: float = 0.98, lsf: Spread | None = None
 ) -> Raster:
     """
-    Means over square blocks of ground: the truth that a pixel is compared with.
+    Means over square blocks of ground, the truth for comparison with pixels.
 
     Parameters
     ----------
     array : xarray.DataArray, dims (..., y, x), or xarray.Dataset
-        Of a landscape, ``brown`` is that of the leaf area of a block, and the codes of ``cover`` are counted.
+        In a landscape, ``brown`` is weighted by leaf area, and the codes of ``cover`` are counted.
     pixel : float, optional
-        Size of the blocks, any multiple of the cell or not. [m]
+        Size of the blocks; it need not be a multiple of the cell size. [m]
     min_valid : float, optional
-        Share of its area that a block needs on valid cells; below it is NaN. [1]
+        Minimum fraction of the block area on valid cells; below it the result is NaN. [1]
     lsf : line spread function, optional
-        As `fifesim.base.footprints` has it, to weight the cells about each block's middle; all within the block count
-        the same by default.
+        Weights of the cells around the block centre, from `fifesim.base.footprints`; by default uniform within the
+        block.
 
     Returns
     -------
     means : xarray.DataArray, dims (..., y, x), or xarray.Dataset
-        On the grid of whole blocks from the upper left corner. Of a landscape, ``class_share`` over (class, y, x) is in
-        the place of ``cover``.
+        On a grid of whole blocks from the upper left corner. In a landscape, ``class_share`` over (class, y, x)
+        replaces ``cover``.
 
     Raises
     ------
     ValueError
         If the array has no grid, or no block fits.
     TypeError
-        If the size is no number.
+        If the size is not a number.
 
     See Also
     --------

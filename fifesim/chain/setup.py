@@ -1,4 +1,4 @@
-"""Description of all steps between the leaf area of a scene and its digital numbers."""
+"""Description of all steps from leaf area to digital numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fifesim.sensor import labels as sensor
 from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.response.noise import NoiseModels
 
-# Fields of a setup that `surface_reflectance` and `sense` take under the same names.
+# Fields that are also arguments of `surface_reflectance` and `sense`.
 _GROUND = ("canopy", "bands", "dem", "horizon", "upwelling", "atmosphere")
 _SENSOR = ("onto", "interval", "offset", "noise", "seed", "noise_models", "quantise", "min_valid")
 
@@ -27,17 +27,17 @@ _SENSOR = ("onto", "interval", "offset", "noise", "seed", "noise_models", "quant
 @dataclass(frozen=True, eq=False)
 class Setup:
     """
-    Ground, air and instrument of a simulation.
+    Ground, atmosphere and instrument of a simulation.
 
     Parameters
     ----------
     instrument : str or Instrument, optional
     bands : sequence of str, optional
-        Names of its bands; all by default.
+        Band names; all by default.
     atmosphere : Atmosphere, optional
         By default midlatitude summer, continental aerosol, 45 km visibility.
     geometry : Geometry or xarray.Dataset, optional
-        Of sun and sensor; by default that of the leaf area, else the paper's.
+        Directions of sun and sensor; by default from the leaf area raster, else as in the paper.
     canopy : Canopy, optional
         As in `fifesim.surface_reflectance`.
     dem, horizon, upwelling : optional
@@ -45,7 +45,7 @@ class Setup:
     adjacency, surroundings : optional
         As in `fifesim.to_toa`.
     onto, interval, offset, min_valid : optional
-        As in `fifesim.sense`: where pixels lie, and what they need.
+        Position of pixels and minimum valid fraction, as in `fifesim.sense`.
     noise, noise_models, seed, quantise : optional
         As in `fifesim.sense`.
 
@@ -92,7 +92,7 @@ class Setup:
 
 
 def _is_default(setup, name):
-    """Whether a field has its default value; a raster never has."""
+    """Whether a field has its default value; always False for rasters."""
     value, default = getattr(setup, name), Setup.__dataclass_fields__[name].default
     return value is default or (isinstance(value, (str, int, float, tuple)) and value == default)
 
@@ -106,12 +106,12 @@ def _brief(value):
 
 
 def reflectance_of(setup, lai):
-    """Surface reflectance of leaf area in the bands of a setup, dims (band, y, x), lazy where an input is. [1]"""
+    """Surface reflectance of leaf area in the bands of a setup, dims (band, y, x), lazy if an input is. [1]"""
     return steps.surface_reflectance(lai, setup.instrument, geometry=setup.geometry, **_of(setup, _GROUND))
 
 
 def image_of(setup, reflectance):
-    """Image of a surface reflectance by the instrument of a setup, dims (band, y, x), lazy where an input is."""
+    """Image of a surface reflectance by the instrument of a setup, dims (band, y, x), lazy if an input is."""
     toa = steps.to_toa(reflectance, instrument=setup.instrument, **_of(setup, ("adjacency", "surroundings")))
     return sensor.sense(toa, setup.instrument, **_of(setup, _SENSOR))
 

@@ -34,9 +34,9 @@ _RANGES = {
 _NAMES = (*_RANGES, "background", *_LEAF)
 """Names of the quantities that may differ from canopy to canopy."""
 
-_BLOCK = 2**12  # canopies at a time, so that intermediate results stay in the cache of the processor
-_STEP = 1e-30  # imaginary part that stands for a derivative; small enough to leave the real part as it is
-_SPACING = 2.0**-10  # distance of the nodes of differences over the state of the soil
+_BLOCK = 2**12  # canopies per batch, so that intermediate results fit into the processor cache
+_STEP = 1e-30  # imaginary step for derivatives; too small to change the real part
+_SPACING = 2.0**-10  # node spacing of finite differences over the soil properties
 
 
 def canopy_spectra(
@@ -55,12 +55,12 @@ def canopy_spectra(
     Parameters
     ----------
     canopies : mapping of str to float or array, shape (n,), or xarray.Dataset of one dimension
-        Quantities that differ from canopy to canopy: ``lai`` [m2 m-2]; the contents of green leaves, ``leaf_structure``
+        Quantities that differ between canopies: ``lai`` [m2 m-2]; the contents of green leaves, ``leaf_structure``
         to ``leaf_dry_matter``, in the units of `Leaf`; the numbers of `Canopy`, such as ``brown`` or ``soil`` [1];
         ``background``, of shape (n,) or (n, band) [1]; ``sza``, ``vza`` and ``raa`` [degree]; ``diffuse_fraction``, of
         shape (n,) or (n, band) [1]. NaN gives NaN.
     instrument : str or Instrument, optional
-        Its bands are simulated.
+        Instrument whose bands are simulated.
     bands : sequence of str, optional
         Names of its bands; all by default.
     canopy : Canopy, optional
@@ -68,29 +68,29 @@ def canopy_spectra(
     geometry : Geometry, optional
         Directions of sun and sensor, unless ``canopies`` has ``sza``; without ``vza`` the view is nadir.
     atmosphere : Atmosphere, optional
-        Decides the share of skylight, if all canopies have one sun. By default there is sunlight alone, or the
+        Determines the diffuse fraction if all canopies have the same sun. By default there is only direct light, or the
         ``diffuse_fraction`` of ``canopies``.
     derivatives : sequence of str, optional
-        Names of quantities by which the reflectance is differentiated, also those that are equal in all canopies.
+        Names of quantities with respect to which the reflectance is differentiated, including those equal in all
+        canopies.
 
     Returns
     -------
     spectra : xarray.Dataset, dims (canopy, band), or those of ``canopies``
-        ``reflectance`` [1] and, if asked for, ``derivative``, dims (quantity, canopy, band): change of the reflectance
-        per unit of each quantity; ``background`` and ``diffuse_fraction`` change in the same band.
+        ``reflectance`` [1] and, if requested, ``derivative``, dims (quantity, canopy, band): change of the reflectance
+        per unit of each quantity. ``background`` and ``diffuse_fraction`` are varied in the same band.
 
     Raises
     ------
     ValueError
-        If a name is unknown, a value is out of its range, or the position of the sun is not known.
+        If a name is unknown, a value is out of its range, or the position of the sun is unknown.
 
     Notes
     -----
-    SAIL and PROSPECT-D are evaluated for every canopy. Derivatives are those of the same code for complex numbers whose
-    imaginary part is infinitesimal, exact to rounding; the effect of ``soil`` and ``moisture`` on the background is
-    differentiated by five points. Leaf angles are classes: as a function of a zenith angle the reflectance has a weak
-    kink where a class begins to show both sides of its leaves, and crowns have one where sun and view have the same
-    zenith angle; the derivative there is that of one side.
+    SAIL and PROSPECT-D are evaluated for every canopy. Derivatives use the complex-step method and are exact to
+    rounding. The effect of ``soil`` and ``moisture`` on the background is differentiated with a five-point formula. As
+    a function of zenith angle, the reflectance has weak kinks where both leaf sides of an angle class become visible.
+    Crowns have a kink where sun and view zenith angles are equal. The derivative at a kink is one-sided.
 
     References
     ----------
@@ -129,7 +129,7 @@ def canopy_spectra(
     out = np.empty((1 + len(derivatives), count, len(responses)))
     for start in range(0, count, _BLOCK):
         part = {name: each[start : start + _BLOCK] for name, each in values.items()}
-        # Complex NaN, unlike real NaN, is an invalid value to numpy.
+        # numpy warns of complex NaN as an invalid value, unlike real NaN.
         with np.errstate(invalid="ignore"):
             out[0, start : start + _BLOCK] = model.reflectance(part).T
             for number, name in enumerate(derivatives, start=1):
@@ -147,11 +147,11 @@ def canopy_spectra(
 
 
 class _Model:
-    """Reflectance of canopies of some common properties in some bands."""
+    """Reflectance of canopies with common properties in some bands."""
 
     def __init__(self, bands, canopy, by_contents):
         if any(map(is_raster, vars(canopy).values())):
-            raise ValueError("canopy must have no rasters: give what differs in canopies=, such as {'brown': [0, 0.3]}")
+            raise ValueError("canopy must not have rasters: give what varies in canopies=, such as {'brown': [0, 0.3]}")
         self.bands, self.canopy = bands, canopy
         self.leaf_angles = leaf_angle_classes(canopy.leaf_angles)
         self.leaf = canopy.leaf_optics or Leaf()
@@ -170,7 +170,7 @@ class _Model:
         values = {"lai": None, "sza": at.sza, "vza": at.vza, "raa": at.raa, "diffuse_fraction": 0.0}
         values |= {name: getattr(self.canopy, name) for name in NUMERIC_PROPERTIES}
         if "lai" not in given:
-            raise ValueError(f"canopies have no leaf area index: give 'lai' beside {', '.join(given) or 'nothing'}")
+            raise ValueError(f"canopies have no leaf area index: add 'lai' to {', '.join(given) or 'them'}")
         if atmosphere is not None:
             if np.size(given.get("sza", at.sza)) > 1 or "diffuse_fraction" in given:
                 raise ValueError(
@@ -193,7 +193,7 @@ class _Model:
         """Derivative of the reflectance factor by one quantity, shape (band, n)."""
         if name in ("soil", "moisture"):
             ground, (low, high) = self._ground(values), _RANGES[name]
-            # Five points about each state of the soil, moved into its range.
+            # Five points around each soil state, shifted into the valid range.
             middle = np.clip(values[name], low + 2 * _SPACING, high - 2 * _SPACING)
             at = (values[name] - middle) / _SPACING
             slope = sum(
@@ -214,7 +214,7 @@ class _Model:
             if np.any(values["moisture"] != 0):
                 ground = moistened(ground, values["moisture"], water_films(self.bands))
             return ground.T
-        # The imaginary part of a dry background grows with the change of the wet one.
+        # Propagate the imaginary part of the dry background to the wet one.
         real, step = ground.real, _SPACING
         middle = np.clip(real, 2 * step, 1 - 2 * step)
         at = (real - middle) / step
@@ -255,7 +255,7 @@ def _values(canopies, n_bands):
     if isinstance(canopies, xr.Dataset):
         dims = [each for each in canopies.dims if each != "band"]
         if len(dims) != 1:
-            raise ValueError(f"canopies must have one dimension, and band at most, got {tuple(canopies.dims)}")
+            raise ValueError(f"canopies must have one dimension, optionally with band, got {tuple(canopies.dims)}")
         dim, coords = dims[0], {name: each for name, each in canopies.coords.items() if each.dims == (dims[0],)}
         canopies = {name: each.transpose(dim, ...).values for name, each in canopies.data_vars.items()}
     values = {}
@@ -268,7 +268,7 @@ def _values(canopies, n_bands):
     sizes = {name: len(each) for name, each in values.items() if len(each) != 1}
     if len(set(sizes.values())) > 1:
         got = ", ".join(f"{name} {size}" for name, size in sizes.items())
-        raise ValueError(f"canopies must have equal numbers of values, or one, got {got}")
+        raise ValueError(f"canopies must have equal numbers of values, or a single value, got {got}")
     return dim, values, coords
 
 
@@ -287,7 +287,7 @@ def _check(values):
 
 
 def _weights_of_slope(at):
-    """Weights of the values at -2 to 2 in the slope at a position of the polynomial through them."""
+    """Weights of values at -2 to 2 in the slope of their interpolating polynomial at a position."""
     return (
         (2 * at**3 - 3 * at**2 - at + 1) / 12,
         -(4 * at**3 - 3 * at**2 - 8 * at + 4) / 6,

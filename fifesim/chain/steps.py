@@ -1,4 +1,4 @@
-"""Steps of Figure 1 that need more than one stage: each passes on what a stage needs of another."""
+"""Steps of Figure 1 that need quantities from more than one stage."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ from fifesim.sensor.instrument_labels import (
     warn_of_others,
 )
 
-# Half width of the triangular response that stands for a band known by its wavelength alone: the step of the gas
-# tables. [um]
+# Half width of the triangular response of a band known only by its wavelength, equal to the step of the gas tables.
+# [um]
 _NARROW = 0.0025
 
 
@@ -51,8 +51,8 @@ _default_atmosphere = cached(1, "default atmosphere")(Atmosphere)
 
 
 def air_of(atmosphere, array, assume=False):
-    """Atmosphere: as given, else as carried by an array, else midlatitude summer with continental aerosol."""
-    # The default is a warning for rasters that are not made by fifesim on the FIFE site.
+    """Atmosphere as given; by default from the array, else midlatitude summer with continental aerosol."""
+    # Warns of the default unless fifesim made the raster on the FIFE site.
     if atmosphere is not None and not isinstance(atmosphere, Atmosphere):
         raise TypeError(f"atmosphere must be a fifesim.Atmosphere, got {described(atmosphere)}: see fifesim.Atmosphere")
     carried = array.attrs.get("atmosphere")
@@ -65,25 +65,25 @@ def air_of(atmosphere, array, assume=False):
         if atmosphere is not None and atmosphere != carried:
             raise ValueError(
                 f"the reflectance was made for another atmosphere ({carried.text}) than the one given "
-                f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...); or, to correct with the wrong "
-                "air on purpose, to_surface(..., assume=True)"
+                f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...); or, to correct with a wrong "
+                "atmosphere on purpose, use to_surface(..., assume=True)"
             )
     if atmosphere is None and carried is None and not is_fife(array):
         warn(
-            f"nothing says what air lies over {array.name or 'the raster'}: {_default_atmosphere().text} is taken; "
-            "give atmosphere=fifesim.Atmosphere(...), with the altitude of its ground in km"
+            f"the atmosphere over {array.name or 'the raster'} is unknown: using {_default_atmosphere().text}; "
+            "give atmosphere=fifesim.Atmosphere(...), with the ground elevation in km"
         )
     return atmosphere or carried or _default_atmosphere()
 
 
 def air_bands_and_geometry(array, atmosphere, geometry, instrument, time=None, *, assume=False):
-    """Atmosphere, spectral responses and geometry: as given, else as carried by the array."""
+    """Atmosphere, spectral responses and geometry as given; by default from the array."""
     geometry = directions.given_geometry(geometry, array, time)
     return air_of(atmosphere, array, assume), _responses(array, instrument), geometry
 
 
 def as_bands_of(raster, instrument, name):
-    """Reflectance as the chain takes it, with bands named after the bands of an instrument, dims ([band], y, x)."""
+    """Reflectance with bands named after an instrument, dims ([band], y, x)."""
     array = incoming(raster, name)
     description = carried_instrument(array) if instrument is None else find_instrument(instrument)
     if description is None or "band" not in array.coords:
@@ -99,20 +99,19 @@ def as_bands_of(raster, instrument, name):
 
 
 def _responses(array, instrument):
-    """Spectral responses of the given instrument, or of the carried one if its wavelengths agree."""
+    """Spectral responses of the given instrument, or of the instrument of the raster if the wavelengths agree."""
     description = carried_instrument(array) if instrument is None else find_instrument(instrument)
     if description is not None:
         bands = matching_bands(array, description)
         centres = [band.wavelength for band in bands]
         if instrument is None and "wavelength" in array.coords and not np.allclose(array["wavelength"], centres, 1e-6):
             raise ValueError(
-                f"the raster says that it was made for {description.name} and has other wavelengths than its bands: "
-                "give instrument="
+                f"the raster names {description.name} as its instrument, but its wavelengths differ: give instrument="
             )
         return tuple(band.response for band in bands)
     if "wavelength" not in array.coords:
         raise ValueError(
-            "the raster has neither an instrument nor a wavelength: give instrument=, or assign a coordinate "
+            "the raster has no instrument and no wavelength: give instrument=, or assign a coordinate "
             "'wavelength' [um] along band"
         )
     centres = np.atleast_1d(array["wavelength"].values).astype(float)
@@ -122,7 +121,7 @@ def _responses(array, instrument):
 @by_date
 def ndvi(image: RasterOrDataset) -> xr.DataArray:
     """
-    Normalized difference vegetation index, from planetary reflectance as in the paper (Results).
+    Normalized difference vegetation index of planetary reflectance, as in the paper (Results).
 
     Parameters
     ----------
@@ -132,7 +131,7 @@ def ndvi(image: RasterOrDataset) -> xr.DataArray:
     Returns
     -------
     ndvi : xarray.DataArray, dims (y, x)
-        NaN where there are no data. [1]
+        NaN for no data. [1]
 
     Raises
     ------
@@ -171,21 +170,21 @@ def index(
     Parameters
     ----------
     image : xarray.DataArray, dims (band, y, x)
-        Reflectance, of the ground or planetary, with a coordinate ``wavelength`` [um] along band. Digital numbers and
-        radiance are brought to planetary reflectance first.
+        Surface or planetary reflectance with a coordinate ``wavelength`` [um] along band. Digital numbers and radiance
+        are first converted to planetary reflectance.
     name : {"NDVI", "EVI", "EVI2", "SAVI", "MSAVI", "NDWI", "NDMI", "NIRv"}
-        As in the catalogue of spyndex: NDWI shows open water (green and near infrared), NDMI the water of leaves (near
-        and shortwave infrared). EVI is meant for reflectance of the ground: take it after `to_surface`.
+        Defined as in spyndex. NDWI indicates open water (green and near infrared), NDMI leaf water (near and shortwave
+        infrared). EVI is defined for surface reflectance: use it after `to_surface`.
 
     Returns
     -------
     index : xarray.DataArray, dims (y, x)
-        NaN where there are no data. [1]
+        NaN for no data. [1]
 
     Raises
     ------
     ValueError
-        If there is no such index, the image lacks a band of it, or its calibration.
+        If the index is unknown, or the image lacks a band or its calibration.
 
     References
     ----------
@@ -247,16 +246,16 @@ def kt(
     reflectance : xarray.DataArray, dims (band, y, x)
         Reflectance of level ground, from `surface_reflectance` without a dem. [1]
     dem : xarray.DataArray, dims (y, x)
-        As in `surface_reflectance`. [m]
+        Elevation, as in `surface_reflectance`. [m]
     horizon : xarray.DataArray, dims (direction, y, x), optional
-        As in `surface_reflectance`. [degree]
+        Horizon, as in `surface_reflectance`. [degree]
     atmosphere, geometry, time, instrument : optional
         As in `to_toa`.
 
     Returns
     -------
     kt : xarray.DataArray, dims (band, y, x)
-        Lazy where an input is. [1]
+        Lazy if an input is. [1]
 
     Raises
     ------
@@ -295,7 +294,7 @@ def kt_and_reflectance(level, dem, horizon=None, upwelling=True):
 
 
 def sunlight(dem, horizon, atmosphere, bands, geometry, purpose):
-    """Sunlight on an elevation model, or ValueError naming the purpose if sun or sensor have several directions."""
+    """Sunlight on an elevation model. Sun and sensor must have one direction; `purpose` is for the error message."""
     geometry = directions.uniform_geometry(geometry, purpose)
     terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
     dem = beside_altitude(dem, atmosphere.altitude)
@@ -323,48 +322,48 @@ def surface_reflectance(
     Parameters
     ----------
     lai : xarray.DataArray, dims (y, x), or xarray.Dataset
-        Leaf area index, or a landscape with a variable ``lai``, from `landscape`. Its other variables have precedence
-        over the canopies of its classes, and these over ``canopy``. [m2 m-2]
+        Leaf area index, or a landscape with a variable ``lai``, from `landscape`. Its other variables take precedence
+        over the canopies of its classes, which take precedence over ``canopy``. [m2 m-2]
     instrument : str or Instrument, optional
-        Whose bands are simulated; by default TM for a scene on the FIFE site.
+        Instrument whose bands are simulated; by default TM for a scene on the FIFE site.
     canopy : Canopy, optional
-        Leaves, their arrangement, and the ground below them; by default green tallgrass of the FIFE site.
+        Leaves, canopy structure and background; by default green tallgrass of the FIFE site.
     bands : sequence of str, optional
-        Names of its bands; all by default.
+        Band names; all by default.
     dem : xarray.DataArray, dims (y, x), optional
-        Elevation on the cells of ``lai``, or on more of them, whose horizons then count; without it the ground is
-        level. The reflectance of level ground is multiplied by Kt (Eq. 4) and the view's cosine (Eq. 5). [m]
+        Elevation on the cells of ``lai``, or on a larger area, which then contributes to horizons. The reflectance of
+        level ground is multiplied by Kt (Eq. 4) and the cosine of the view angle (Eq. 5). By default the ground is
+        level. [m]
     horizon : xarray.DataArray, dims (direction, y, x), optional
-        Horizon of an elevation model that extends further than ``dem``, from `horizon`. [degree]
+        Horizon of a larger elevation model, from `horizon`. [degree]
     upwelling : bool, optional
-        Whether with the view's cosine on slopes, Eq. 5.
+        Whether to apply the cosine of the view angle on slopes, Eq. 5.
     atmosphere : Atmosphere, optional
-        Decides the share of skylight; by default midlatitude summer, continental aerosol, 45 km visibility, 0.4 km
-        above the sea, with a warning for a map that fifesim did not make. The result carries it.
+        Determines the diffuse fraction; saved with the result. The default is midlatitude summer, continental aerosol,
+        45 km visibility and 0.4 km altitude, with a warning for rasters from other sources.
     geometry : Geometry, optional
-        Directions of sun and sensor; by default those of ``lai``, else the sun at its time and place. A scene made on
-        the FIFE site has the paper's sun.
+        Directions of sun and sensor; by default from the coordinates of ``lai``, else from its time and place. A scene
+        on the FIFE site has the sun of the paper.
     time : str or datetime, optional
-        In the place of ``geometry``: when the sun stood over the middle of the grid, below a nadir view.
+        Time for the position of the sun at the grid centre, with a nadir view; instead of ``geometry``.
     exact : bool, optional
-        Evaluate SAIL at every cell instead of interpolating a table that is within 1e-6 of it, and all leaves.
+        Evaluate leaf optics and SAIL at every cell, instead of interpolating a table that is accurate to 1e-6.
 
     Returns
     -------
     reflectance : xarray.DataArray, dims (band, y, x)
-        Lazy where ``lai`` is. [1]
+        Lazy if ``lai`` is. [1]
 
     Raises
     ------
     ValueError
-        If an argument is out of its range; on lazy data, a negative LAI when it computes. If the dem is not in metres,
-        does not cover ``lai``, or lies on other cells. If the instrument or the position of the sun is unknown.
+        If an argument is out of range (a negative LAI in lazy data raises when computed); if the dem is not in metres,
+        does not cover ``lai``, or has other cells; if the instrument or the position of the sun is unknown.
 
     Warns
     -----
     UserWarning
-        If the atmosphere, or leaves or background of the canopy, are not given for a scene from elsewhere than the FIFE
-        site.
+        If the atmosphere, leaves or background are not given for a scene outside the FIFE site.
 
     References
     ----------
@@ -387,7 +386,7 @@ def surface_reflectance(
     array([0.089, 0.229])
     """
     if dem is None and horizon is not None:
-        raise ValueError("a horizon stands around a dem: give dem= too")
+        raise ValueError("a horizon needs an elevation: give dem= too")
     land = landscapes.land_of(lai)
     lai = north_up(land.lai)
     description = given_instrument(instrument, lai)
@@ -430,42 +429,42 @@ def to_toa(
     Parameters
     ----------
     reflectance : xarray.DataArray, dims (band, y, x), or xarray.Dataset of bands
-        Surface reflectance factor, with band names of an instrument or a coordinate ``wavelength`` [um] along band;
-        whole numbers say their scale by ``scale_factor``. [1]
+        Surface reflectance factor, with band names of an instrument or a coordinate ``wavelength`` [um] along band.
+        Integers need an attribute ``scale_factor``. [1]
     atmosphere : Atmosphere, optional
-        By default that which the array carries, else midlatitude summer, continental aerosol, 45 km visibility, 0.4 km
-        above the sea, with a warning for a raster that fifesim did not make.
+        By default from the array. If it has none: midlatitude summer, continental aerosol, 45 km visibility and 0.4 km
+        altitude, with a warning for rasters from other sources.
     geometry : Geometry, optional
-        Its angles are numbers or rasters; by default that which the array carries, else of the sun at its time and
-        place.
+        Directions of sun and sensor as numbers or rasters; by default from the coordinates of the array, else from its
+        time and place.
     time : str or datetime, optional
-        In the place of ``geometry``: when the sun stood over the middle of the grid, below a nadir view.
+        Time for the position of the sun at the grid centre, with a nadir view; instead of ``geometry``.
     instrument : str or Instrument, optional
-        Whose spectral response the bands have; by default that which the array carries. Without one, each band is as
-        narrow as the gas tables, 2.5 nm.
+        Instrument with the spectral response of the bands; by default from the array. If it is unknown, each band has
+        the resolution of the gas tables, 2.5 nm.
     elevation : xarray.DataArray, dims (y, x), optional
-        Elevation of the ground, which replaces the altitude of the atmosphere where relief matters. [m]
+        Ground elevation by cell, instead of the altitude of the atmosphere. [m]
     adjacency : bool, optional
-        Whether light that the surroundings reflect is scattered into the view of a cell.
+        Whether to include light reflected by the surroundings and scattered into the line of sight.
     surroundings : number, sequence or xarray.DataArray, optional
-        Reflectance around the scene, for adjacency: one number, one for each band, or a raster on a larger grid; by
-        default the scene's mean. [1]
+        Reflectance around the scene for `adjacency`: a number, one number per band, or a raster on a larger grid; by
+        default the scene mean. [1]
 
     Returns
     -------
     reflectance : xarray.DataArray, dims (band, y, x)
-        Lazy where the input is. [1]
+        Lazy if the input is. [1]
 
     Raises
     ------
     ValueError
-        If the array was made for another atmosphere, units, bands or angles are not usable, nothing says where the sun
-        stands, or values cannot be a reflectance.
+        If the array was made for another atmosphere, units, bands or angles are invalid, the position of the sun is
+        unknown, or values are outside the range of reflectance.
 
     Notes
     -----
-    Without ``elevation`` all of the scene lies at the altitude of the atmosphere: 100 m of relief is 1 % of the
-    molecules, 0.001 of reflectance in the blue and less elsewhere.
+    Without ``elevation`` the whole scene is at the altitude of the atmosphere. A height difference of 100 m changes the
+    molecular optical depth by 1 %, and the reflectance by 0.001 in the blue and less at longer wavelengths.
 
     References
     ----------
@@ -509,17 +508,17 @@ def to_surface(
     surroundings: Surroundings | None = None,
 ) -> xr.DataArray:
     """
-    Surface reflectance from that at the top of the atmosphere; the inverse of `to_toa`.
+    Surface reflectance from reflectance at the top of the atmosphere; the inverse of `to_toa`.
 
     Parameters
     ----------
     reflectance : xarray.DataArray, dims (band, y, x), or xarray.Dataset of bands
         Reflectance at the top of the atmosphere; radiance and digital numbers are converted first.
     atmosphere : Atmosphere, optional
-        As in `to_toa`. If it differs from the atmosphere of the array, an error, except with ``assume``.
+        As in `to_toa`. It must equal the atmosphere of the array unless `assume` is True.
     assume : bool, optional
-        Correct with the given atmosphere even if the image was simulated with a different one, to study the effect of
-        a wrong aerosol load. The result carries the given atmosphere.
+        Correct with the given atmosphere even if the image was simulated with a different one, to study the effect of a
+        wrong aerosol load. The given atmosphere is saved with the result.
     geometry, time, instrument, elevation, adjacency, surroundings : optional
         As in `to_toa`.
 

@@ -1,1 +1,1 @@
-"""Experiments: a question, its runs and its answer."""
+"""Experiments: reproduction of the paper, scatter budgets, the interactive page, and verification."""

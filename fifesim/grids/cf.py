@@ -21,13 +21,13 @@ class Quantity:
     long_name : str
     comment : str, optional
     label : str, optional
-        Short words for axes, colour bars and tables; by default the long name.
+        Short label for axes, colour bars and tables; by default the long name.
     shown_units : str, optional
-        Units in pictures, where they say more than ``units``.
+        Units in pictures, if different from ``units``.
     lowest, highest : float, optional
-        Physical range in ``units``; None where a side has no bound.
+        Physical range in ``units``; None if unbounded.
     colours : str, optional
-        Colour map: a name of matplotlib, or "land" for elevation. "gray" is for light, which is shown as an image.
+        Colour map: a name of matplotlib, or "land" for elevation. "gray" is for images.
     middle : float, optional
         Value about which the colours diverge.
     ends : (float or None, float or None), optional
@@ -108,16 +108,18 @@ QUANTITIES = {
         "standard deviation of NDVI by noise", label="noise of NDVI", lowest=0),
     "dn": Quantity("1", "", "digital number", "0 is no data; radiance = gain * dn + offset", lowest=0, colours="gray"),
     "ndvi": Quantity("1", "normalized_difference_vegetation_index", "normalized difference vegetation index",
-        label="NDVI", lowest=-1, highest=1, colours="YlGn", ends=(0, 1)),
-    "evi": Quantity("1", "", "enhanced vegetation index", label="EVI", colours="YlGn", ends=(0, 1)),
-    "evi2": Quantity("1", "", "enhanced vegetation index of two bands", label="EVI2", colours="YlGn", ends=(0, 1)),
-    "savi": Quantity("1", "", "soil-adjusted vegetation index", "L = 0.5", label="SAVI", colours="YlGn", ends=(0, 1)),
-    "msavi": Quantity("1", "", "modified soil-adjusted vegetation index", label="MSAVI", colours="YlGn", ends=(0, 1)),
+        label="NDVI", lowest=-1, highest=1, colours="viridis", ends=(0, 1)),
+    "evi": Quantity("1", "", "enhanced vegetation index", label="EVI", colours="viridis", ends=(0, 1)),
+    "evi2": Quantity("1", "", "enhanced vegetation index of two bands", label="EVI2", colours="viridis", ends=(0, 1)),
+    "savi": Quantity("1", "", "soil-adjusted vegetation index", "L = 0.5",
+        label="SAVI", colours="viridis", ends=(0, 1)),
+    "msavi": Quantity("1", "", "modified soil-adjusted vegetation index",
+        label="MSAVI", colours="viridis", ends=(0, 1)),
     "ndwi": Quantity("1", "", "normalized difference water index", "green and near infrared, McFeeters (1996)",
         label="NDWI", lowest=-1, highest=1, colours="YlGnBu"),
     "ndmi": Quantity("1", "", "normalized difference moisture index", "near and shortwave infrared, Gao's water index",
         label="NDMI", lowest=-1, highest=1, colours="YlGnBu"),
-    "nirv": Quantity("1", "", "near infrared reflectance of vegetation", label="NIRv", colours="YlGn", ends=(0, 1)),
+    "nirv": Quantity("1", "", "near infrared reflectance of vegetation", label="NIRv", colours="viridis", ends=(0, 1)),
     "ndvi_bias": Quantity("1", "", "mean NDVI less NDVI of the mean reflectance",
         label="NDVI bias", colours="RdBu_r", middle=0),
     "fpar_bias": Quantity("1", "", "mean FPAR less FPAR of the mean leaf area index",
@@ -150,7 +152,7 @@ _LONG_NAMES = {quantity.standard_name: quantity.long_name for quantity in QUANTI
 TIME_ATTRIBUTES = {"standard_name": "time", "long_name": "time, UTC"}
 """Attributes of a coordinate of times; units are the dates' own."""
 
-# Attributes that a result keeps from its inputs; all others are replaced.
+# Attributes that are copied from inputs to results; others are replaced.
 PROVENANCE = (
     "site", "rng_seed", "arp", "lai_distribution", "method", "leaf_angles", "background", "soil", "moisture",
     "atmosphere", "instrument", "instrument_description", "recorded_by", "composite",
@@ -163,7 +165,7 @@ _SAME_UNITS = dict.fromkeys(("", "m2 m-2", "dimensionless", "unitless", "reflect
 )
 
 
-# Words of names and descriptions that stand for one quantity.
+# Words in names and descriptions that identify a quantity.
 _WORDS = {name: name for name in ("lai", "ndvi", "evi", "evi2", "savi", "msavi", "ndwi", "ndmi", "nirv", "fpar", "dem")}
 _WORDS |= {"fapar": "fpar", "elevation": "dem", "altitude": "dem", "reflectance": "surface_reflectance"}
 _WORDS |= {"radiance": "toa_radiance"} | dict.fromkeys(("quality", "qa", "qc", "flag", "flags", "mask"), "quality")
@@ -188,13 +190,13 @@ def label(array, name, *, history, source=None, **provenance):
     """Name an array and replace its attributes; provenance and history of `source` are kept."""
     attrs = attributes(name)
     before = source.attrs if source is not None else {}
-    # A description belongs to the instrument that it comes with.
+    # An instrument description must belong to the instrument of the array.
     other = {"instrument_description"} if "instrument" in provenance else set()
     attrs |= {key: before[key] for key in PROVENANCE if key in before and key not in other} | provenance
     cited = [*before.get("references", "").split("; "), *provenance.get("references", "").split("; ")]
     attrs |= {"references": "; ".join(dict.fromkeys(filter(None, cited)))} if any(cited) else {}
     attrs["history"] = "\n".join(filter(None, [before.get("history", ""), history]))
-    # A renamed array shares its attributes with the one it came from, a copy does not.
+    # Copy, because a renamed array shares its attributes with the original.
     array = array.copy(deep=False)
     array.name, array.attrs = name, attrs
     return array
@@ -213,7 +215,7 @@ def check_quantity(array, *names):
         raise ValueError(
             f"{array.name or 'the array'} is {_LONG_NAMES[stated]} by its standard_name, where "
             f"{QUANTITIES[names[0]].long_name} is needed: take {_STEPS.get((stated, names[0]), 'the step between')}, "
-            "or drop .attrs['standard_name'] if it is mistaken"
+            "or remove .attrs['standard_name'] if it is wrong"
         )
 
 

@@ -1,4 +1,4 @@
-"""Kernels of numpy arrays on dask arrays: by cell, by place, in two passes, or from windows of other arrays."""
+"""Application of numpy kernels to dask arrays: by cell, by position, in two passes, or from windows."""
 
 import sys
 from concurrent.futures import Future
@@ -33,7 +33,7 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
 
     lazy = any(getattr(array, "chunks", None) is not None for array in arrays)
     apply = partial(_blockwise, call, along_band, bands, dtype) if lazy else call
-    # Variables have no coordinates to align, which takes longer than the kernel on small rasters.
+    # Use variables, because aligning coordinates takes longer than the kernel on small rasters.
     variables = [getattr(array, "variable", array) for array in arrays]
     out = xr.apply_ufunc(apply, *variables, dask="allowed", keep_attrs=True, **core)
     dims = [name for name in ("band", "y", "x") if name in out.dims]
@@ -43,7 +43,7 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
 
 
 def _shared_coordinates(arrays, dims):
-    """Coordinates of aligned arrays along some dimensions, and their indexes; those that differ are left out."""
+    """Coordinates of aligned arrays along some dimensions, and their indexes; those that differ are dropped."""
     variables, indexes, differing = {}, {}, set()
     for array in arrays:
         if not isinstance(array, xr.DataArray):
@@ -67,7 +67,7 @@ def _blockwise(call, along_band, bands, dtype, *data):
     arguments, last = [], {loops: bands} if bands is not None else {}
     for each, along in zip(data, along_band, strict=True):
         if along and isinstance(each, da.Array):
-            # A file opened lazily has one band a chunk, and the kernel wants all.
+            # A lazily opened file has one band per chunk, but the kernel needs all bands.
             each = each.rechunk({-1: -1})
         axes = (*range(loops - each.ndim + along, loops), *(loops,) * along)
         whole = isinstance(each, np.ndarray) and each.ndim == along
@@ -97,7 +97,7 @@ def margin_reads(array, rows, columns=None, offset=(0, 0), shape=None):
     """Reads of cells with a margin around them, NaN outside of the array."""
     columns = rows if columns is None else columns
     if (rows or columns) and array.dtype.kind != "f":
-        # Missing is NaN, which integers do not have.
+        # Integers have no NaN for missing values.
         array = array.astype(float)
     if shape is None:
         shape = array.shape[-2] - offset[0], array.shape[-1] - offset[1]
@@ -128,13 +128,13 @@ def along_first(array):
 
 
 def _entry(chunks, k):
-    # Along an axis that a result lacks, dask hands over a list of chunks.
+    # Along an axis missing in the result, dask passes a list of chunks.
     (chunk,) = chunks
     return chunk[k]
 
 
 def in_blocks(kernel, reads, shape, size, dtype=float):
-    """Array made in fixed blocks for any chunks, lazy where an input is; in memory, one block after the other."""
+    """Array made in fixed blocks for any chunks, lazy if an input is; in memory, one block at a time."""
     sizes = tuple(tuple(np.diff([*range(0, length, size), length]).tolist()) for length in shape[-2:])
     if any(isinstance(each.array, da.Array) for each in reads):
         return windows(kernel, reads, shape, sizes, dtype)
@@ -158,7 +158,7 @@ def other_coordinates(array):
 
 
 def with_other_cells(array, data):
-    """A raster of other cells with the dimensions, the name and the attributes of one, without coordinates by cell."""
+    """Raster of new cells with dimensions, name and attributes of another, without coordinates by cell."""
     kept = {name: each for name, each in array.coords.variables.items() if not {"y", "x"} & set(each.dims)}
     indexes = {name: index for name, index in array.xindexes.items() if name in kept}
     return grids.raster_of(xr.Variable(array.dims, data, array.attrs), kept, indexes, array.name)
@@ -193,11 +193,11 @@ def aligned(arrays):
     for (one, own), (other, others) in combinations(placed, 2):
         if not grids.same_grid(own, others):
             raise ValueError(
-                f"{one.name!r} and {other.name!r} lie on different grids, {grids.in_words(own)} and "
-                f"{grids.in_words(others)}: bring one onto the other's first"
+                f"{one.name!r} and {other.name!r} have different grids, {grids.in_words(own)} and "
+                f"{grids.in_words(others)}: resample one to the grid of the other"
             )
         _check_scalars(one, other)
-    # xarray aligns to the bit, and coordinates from elsewhere differ by rounding.
+    # xarray requires identical coordinates, but coordinates from other sources differ by rounding.
     place = {axis: rasters[0].coords[axis].variable for axis in ("y", "x")}
     return [array.assign_coords(place) if any(array is each for each in rasters[1:]) else array for array in arrays]
 
@@ -229,7 +229,7 @@ def windows_by_band(kernels, reads, bands, shape, chunks=None):
 
 
 def second_pass(array, first):
-    """Copy of a lazy raster that is computed after a first pass over it, instead of being held in memory meanwhile."""
+    """Copy of a lazy raster that is recomputed in a second pass, instead of being held in memory."""
     if array.chunks is None:
         return array
     return array.copy(data=bind(array.data, first, seed=first.name))
@@ -263,15 +263,14 @@ def layers_of(raster, names, what):
     return [raster.isel(band=known.index(name)) for name in names]
 
 
-# Number of arrays that are kept, and their largest size, 32 MB in all: a property of the ground that is sampled may be
-# made of samples itself.
+# Number and maximum size of cached arrays, 32 MB in total. A sampled ground property may depend on other samples.
 _KEPT, _FEW = 8, 2**19
 
 
 def apart(array):
     """Lazy array in one chunk whose values come from one task, separate from the tasks of other arrays."""
-    # Otherwise blocks of a raster that is sampled as a whole would wait in memory for the last one, where they are used
-    # elsewhere too. (Copies of a graph by dask lack tasks where an array was rechunked.)
+    # Otherwise the blocks of a sampled raster that are also used elsewhere would all stay in memory. (Copies of a graph
+    # by dask lack tasks of rechunked arrays.)
     return all_apart([array])[0]
 
 
@@ -283,7 +282,7 @@ def all_apart(arrays):
 
 
 class _Sealed:
-    """Arrays that dask passes unchanged; it would inspect the fields of a dataclass."""
+    """Arrays that dask passes unchanged, unlike a dataclass, whose fields it inspects."""
 
     def __init__(self, arrays, name):
         self.arrays, self.name = arrays, name
@@ -317,7 +316,7 @@ def _computed(sealed):
 
 
 def _made(sealed):
-    # The thread that runs this is one of the scheduler's: another scheduler in it would wait for itself.
+    # This thread belongs to a scheduler; another scheduler in it would deadlock.
     return dask.compute(*sealed.arrays, scheduler="synchronous")
 
 

@@ -27,8 +27,8 @@ def check_codes(codes, table):
         most = values[np.argsort(-counts, kind="stable")][:8]
         named = ", ".join(f"{value:g}" for value in sorted(most.tolist())) + (", ..." if values.size > 8 else "")
         raise ValueError(
-            f"the map of cover has codes without a class: {named}, in {wrong.sum()} of {codes.size} cells. There are "
-            f"{_listed(table)}: give each a CoverClass(..., code=), or mask it with .where"
+            f"the cover map has codes without a class: {named}, in {wrong.sum()} of {codes.size} cells. Classes are "
+            f"{_listed(table)}: add a CoverClass(..., code=) for each, or mask them with .where"
         )
     return codes.astype(np.int16)
 
@@ -91,13 +91,13 @@ def _sorted(codes, numbers, classes):
     return order, ends[:-1].copy()
 
 
-# Cells that are evaluated at once, 2 MB of each raster: what is made between stays in a processor's cache.
+# Cells per batch, 2 MB of each raster, so that intermediate results stay in the processor cache.
 _AT_ONCE = 2**18
 
 
 def by_class(kernels, cover, *scene, bands=None):
     """Raster with a separate kernel for each class of cover, dims ([band], y, x), lazy where an input is."""
-    # One task for a chunk; the same bits as for each class alone.
+    # One task per chunk; results are identical to separate evaluation of each class.
     found, parts = {}, []
     distinct = list({id(each): each for each in kernels.values()}.values())
     groups = [next(i for i, one in enumerate(distinct) if one is each) for each in kernels.values()]
@@ -137,7 +137,7 @@ def _of_classes(table, parts, banded, bands, first, cover, *blocks):
         for cells, part in zip(cells_by_class(numbers, range(len(parts))), parts, strict=True):
             if cells.size:
                 found = _evaluated(part, [(b[cells] if varies else b, varies) for b, varies in within], first)
-                # Band by band: numpy puts cells of several rows at once back at half the speed.
+                # Band by band, because numpy scatters several rows at once at half the speed.
                 for band, of_band in zip(values, found if bands else [found], strict=True):
                     band[cells] = of_band
     return out.reshape(((bands,) if bands else ()) + shape)

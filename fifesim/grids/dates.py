@@ -34,7 +34,7 @@ def by_date(step: Callable[P, R]) -> Callable[P, R]:
                 "the raster's dimension time has no coordinate: type .assign_coords(time=['2022-06-03T17:10', ...])"
             )
         if options.get("time") is not None:
-            raise ValueError("the raster has dates of its own: leave time= out, or select one date with .isel(time=0)")
+            raise ValueError("the raster has a dimension time: leave time= out, or select one date with .isel(time=0)")
         dates = []
         for number in range(raster.sizes["time"]):
             others = [_at(each, number, raster) for each in args]
@@ -56,7 +56,7 @@ def joined(dates):
     raster = xr.concat(bare, dim="time", join="override", combine_attrs="override").transpose("time", ...)
     for name in ("time", *(name for name in first.coords if name not in (*first.dims, "time"))):
         known, *others = variables = [date.coords[name].variable for date in dates]
-        # Coordinates by cell are taken to differ, because a comparison would compute them.
+        # Coordinates by cell are assumed to differ, because comparing would compute them.
         differs = {"y", "x"} <= set(known.dims) or not all(known.identical(other) for other in others)
         along_time = xr.Variable.concat(variables, dim="time") if differs or name == "time" else known
         raster = raster.assign_coords({name: along_time})
@@ -69,9 +69,9 @@ def epoch(raster):
     if time is None or time.ndim:
         return 0
     if time.dtype.kind != "M":
-        # Dates of another calendar, and what else tells images apart.
+        # Dates of other calendars and other labels.
         return int.from_bytes(blake2b(str(time.item()).encode(), digest_size=7).digest(), "big") + 1
-    # In nanoseconds the year 1 is out of reach.
+    # The year 1 is out of range in nanoseconds.
     return int((time.values.astype("M8[s]") - np.datetime64("0001-01-01", "s")).astype(int))
 
 
@@ -112,6 +112,8 @@ def _at(other, number, raster):
         return other.replace(**changed) if hasattr(other, "replace") else replace(other, **changed)
     if isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
         if not np.array_equal(other["time"].values, raster["time"].values):
-            raise ValueError(f"the times of {getattr(other, 'name', None) or 'a Dataset'} are not those of the raster")
+            raise ValueError(
+                f"the times of {getattr(other, 'name', None) or 'a Dataset'} differ from the times of the raster"
+            )
         return other.isel(time=number)
     return other

@@ -16,7 +16,7 @@ from fifesim.grids.sites import is_fife
 
 _GEOMETRY = (*ANGLES, "earth_sun_distance")
 
-# Ignored change of convergence: 0.3 % of the illumination of slopes of 5 degrees with the sun at 65. [degree]
+# Tolerated change of convergence, 0.3 % of the illumination of slopes of 5 degrees with the sun at 65. [degree]
 _STEADY = 1.0
 
 # Angles of sun and sensor: the same everywhere, or by cell.
@@ -62,7 +62,7 @@ def given_geometry(given, array, time=None):
     geometry = known_geometry(given, array, time)
     if geometry is None:
         raise ValueError(
-            f"nothing says where the sun stands over {array.name or 'the raster'}, which has no sza and no time: type "
+            f"the position of the sun over {array.name or 'the raster'} is unknown, as it has no sza and no time: give "
             "time='2022-06-03T17:10Z', or geometry=fifesim.Geometry(sza, saa) or fifesim.sun_position(time, latitude, "
             "longitude)"
         )
@@ -71,10 +71,10 @@ def given_geometry(given, array, time=None):
 
 def known_geometry(given, array, time=None):
     """Directions of sun and sensor as far as known, else None."""
-    # As given, else from the coordinates of the array, else by its time; the paper's for a scene made on the FIFE site
-    # without a time.
+    # In this order: as given, from the coordinates of the array, from its time, or the sun of the paper for a scene
+    # made on the FIFE site.
     if given is not None and time is not None:
-        raise ValueError("geometry and time both say where the sun stands: give one of them")
+        raise ValueError("geometry and time both determine the sun: give one of them")
     if given is not None:
         return checked_geometry(given)
     carried = geometry_of(array)
@@ -83,11 +83,11 @@ def known_geometry(given, array, time=None):
     if time is None and "time" in array.coords and array.coords["time"].ndim == 0:
         time = array.coords["time"].values
     if time is not None:
-        # numpy takes dates without a time of day for midnight.
+        # numpy reads dates without a time as midnight.
         if not isinstance(time, str) and utc(time)[0] == utc(time)[0].normalize():
             warn(
-                f"time of {array.name or 'the raster'} is midnight in UTC, {utc(time)[0]:%Y-%m-%d}: where it is a date "
-                "alone, give the time of day, time='2022-06-03T17:10Z'"
+                f"time of {array.name or 'the raster'} is midnight in UTC, {utc(time)[0]:%Y-%m-%d}: if it is a date "
+                "only, give the time of day, time='2022-06-03T17:10Z'"
             )
         return sun_over(grids.geobox(array), time)
     return fife_geometry() if is_fife(array) else None
@@ -118,7 +118,7 @@ def checked_geometry(given):
     values = {name: given[name] for name in _GEOMETRY if name in given.variables}
     if "saa" not in values:
         raise ValueError(
-            "the sun has a zenith angle sza and no azimuth saa: add saa, in degrees clockwise from north, such as "
+            "the sun has a zenith angle sza but no azimuth saa: add saa, in degrees clockwise from north, such as "
             ".assign_coords(saa=150.0)"
         )
     numbers = {name: float(value) for name, value in values.items() if np.ndim(value) == 0}
@@ -158,8 +158,8 @@ def from_grid_north(geometry, grid):
     off = np.abs((projection.convergence_at(grid.crs.to_wkt(), *corners) - turn + 180) % 360 - 180).max()
     if off > _STEADY:
         warn(
-            f"grid north turns by up to {off:.1f} degrees from the middle of the scene to its corners; light on slopes "
-            "takes one direction of the sun: cut the scene into parts, or use a CRS for its place, such as its UTM zone"
+            f"grid north rotates by up to {off:.1f} degrees between centre and corners of the scene; light on slopes "
+            "uses one direction of the sun: split the scene, or use a local CRS such as its UTM zone"
         )
     return replace(geometry, saa=geometry.saa - turn, vaa=geometry.vaa - turn)
 

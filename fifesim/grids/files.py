@@ -1,4 +1,4 @@
-"""GeoTIFF files that a GIS opens in the right place, and that are read back unchanged."""
+"""GeoTIFF files with metadata for GIS, which are read back unchanged."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from fifesim.grids.tags import (
 
 
 def physical(array, storage):
-    """Values of a file of another program in their unit, NaN for no data; digital numbers of radiance stay."""
+    """Values of a file from another program in physical units, NaN for no data; digital numbers are kept."""
     scales, offsets, nodata = storage["scales"], storage["offsets"], storage["nodata"]
     missing = xr.zeros_like(array, dtype=bool) if nodata is None else array == nodata
     if scales is None:
@@ -91,7 +91,7 @@ def _wavelengths(source, file_name):
         ) from None
 
 
-# By the names that rasterio has for GDAL's; the near infrared has one since GDAL 3.10.
+# Names in rasterio; GDAL has one for the near infrared since 3.10.
 _COLOURS = {
     ColorInterp.red: RED,
     ColorInterp.green: GREEN,
@@ -99,7 +99,7 @@ _COLOURS = {
     getattr(ColorInterp, "nir", ColorInterp.undefined): NEAR_INFRARED,
 }
 
-# Tags as the metadata of Landsat spells them. The sun's elevation is counted from the horizon.
+# Tags as in Landsat metadata. SUN_ELEVATION is the angle above the horizon.
 _TAGS = {"saa": "SUN_AZIMUTH", "vza": "VIEW_ZENITH", "vaa": "VIEW_AZIMUTH", "earth_sun_distance": "EARTH_SUN_DISTANCE"}
 
 
@@ -132,14 +132,14 @@ def tags_of(array):
 # GDAL's own block size for cloud-optimised files.
 _BLOCK = 512
 
-# Blocks of single bands are written together where they are no more than that. [byte]
+# Blocks of several bands are written together up to this size. [byte]
 _AT_ONCE = 16 * 2**20
 
 _TILED = {"driver": "GTiff", "tiled": True, "blockxsize": _BLOCK, "blockysize": _BLOCK, "bigtiff": "if_safer"}
-# Of numbers that vary from cell to cell zlib finds little: its least effort takes three fifths of the time, for 2 %
-# more bytes of floats and 5 % of digital numbers.
+# Noisy data compress little. The lowest level of zlib takes 60 % of the time, and files are 2 % (floats) or 5 %
+# (digital numbers) larger.
 _COG = {"driver": "COG", "compress": "deflate", "level": 1, "predictor": "yes", "overview_resampling": "average"}
-# Without it GDAL leaves behind what the whole file has in IMAGERY.
+# Without this, GDAL drops the IMAGERY metadata of the file.
 _COG |= {"copy_src_mdd": "yes"}
 
 
@@ -149,7 +149,7 @@ def to_geotiff(
     """
     Write a raster as a cloud-optimised GeoTIFF.
 
-    The file appears under its name only when it is whole. Lazy data are computed and written chunk by chunk.
+    The file is moved into place when it is complete. Lazy data are computed and written chunk by chunk.
 
     Parameters
     ----------
@@ -157,9 +157,9 @@ def to_geotiff(
         The variables of a dataset become bands.
     path : str or path
     overwrite : bool, optional
-        Replace a file of that name.
+        Replace an existing file.
     tags : mapping of str to str, optional
-        Further tags of the file, which `open_image` leaves there.
+        Additional tags of the file, which `open_image` ignores.
 
     Returns
     -------
@@ -168,20 +168,20 @@ def to_geotiff(
     Raises
     ------
     ValueError
-        If the raster has no projected grid or other dimensions.
+        If the raster has no projected grid, or other dimensions.
     FileExistsError
-        If there is such a file, and ``overwrite`` is not given.
+        If the file exists and ``overwrite`` is False.
     OSError
         If the file cannot be written.
 
     Notes
     -----
-    Bands have names, units, scale and offset, and ``CENTRAL_WAVELENGTH_UM`` in the ``IMAGERY`` domain where there is a
-    wavelength; attributes and the sun are tags, the latter also as Landsat's metadata spell them (``SUN_ELEVATION``), a
-    coordinate ``time`` is ``TIFFTAG_DATETIME`` and ``ACQUISITIONDATETIME``. Red, green, blue and near infrared are
-    what the wavelengths say, not the order of the bands. Angles that vary over the cells are not written, which is a
-    warning. Dates of cells, as of a composite, become a band in days since 1970-01-01. The tag ``FIFESIM`` has the
-    values of up to 64 cells per band, with which `open_image` compares the file.
+    Bands have names, units, scale and offset, and ``CENTRAL_WAVELENGTH_UM`` in the ``IMAGERY`` domain if the wavelength
+    is known. Attributes and sun angles are written as tags, also in Landsat's spelling (``SUN_ELEVATION``); a
+    coordinate ``time`` as ``TIFFTAG_DATETIME`` and ``ACQUISITIONDATETIME``. Colour interpretation follows the
+    wavelengths, not the band order. Angles that vary by cell are not written, with a warning. Dates by cell, for
+    example of a composite, become a band in days since 1970-01-01. The tag ``FIFESIM`` has values of up to 64 cells per
+    band, which `open_image` uses to verify the file.
 
     Examples
     --------
@@ -200,9 +200,7 @@ def to_geotiff(
         )
     array = _stacked(raster) if isinstance(raster, xr.Dataset) else raster
     if "line" in array.dims:
-        raise ValueError(
-            "a GeoTIFF holds a map, and this is by line and sample: put it onto one with .grid_swath(grid)"
-        )
+        raise ValueError("a GeoTIFF needs a map, got dimensions line and sample: map the scan with .grid_swath(grid)")
     if not set(array.dims) <= {"band", "y", "x"}:
         raise ValueError(f"a GeoTIFF holds dimensions (band, y, x), got {array.dims}: select or rename")
     array = array if "band" in array.dims else array.expand_dims("band")
@@ -216,8 +214,8 @@ def to_geotiff(
     _check_room(cells, path)
     if varying:
         warn(
-            f"{path.name} leaves out {', '.join(varying)}, which vary over the cells, and another geometry would be "
-            "taken for them: give geometry= when you read it, or write a netCDF with .to_netcdf()"
+            f"{path.name} lacks {', '.join(varying)}, which vary by cell, so another geometry would be "
+            "used after reading it: give geometry= when you read it, or write a netCDF with .to_netcdf()"
         )
     with _whole(path) as (streamed, finished), ErrorsOfGdal(f"cannot write {path}"):
         _stream(array, cells, layers, grid, streamed, raster, tags or {})
@@ -228,32 +226,32 @@ def to_geotiff(
 
 def open_image(path: FilePath, chunks: Chunks | None = None, *, allow_remote: bool = False) -> xr.DataArray:
     """
-    Open a GeoTIFF with its bands, wavelengths, sun and calibration.
+    Open a GeoTIFF image with its bands, wavelengths, sun angles and calibration.
 
     Parameters
     ----------
     path : str or path
-        Written by `to_geotiff`; of other files, what GDAL knows of the bands is read.
+        File written by `to_geotiff`, or another file, whose band metadata are read by GDAL.
     chunks : mapping or int, optional
-        Makes the result lazy.
+        Chunks of a lazy result; in memory by default.
     allow_remote : bool, optional
-        Take addresses, and formats that lead to other files: only for what you trust.
+        Also open remote files and formats that refer to other files. Use this only for trusted files.
 
     Returns
     -------
     raster : xarray.DataArray, dims ([band], y, x)
-        As it was written, with the bands that the file has, in its order: each keeps its name and calibration. Digital
-        numbers are not masked: 0 is no data. For other files, values in their physical unit, NaN where there are no
-        data; digital numbers only where the file says that they scale to radiance.
+        The raster as it was written. If bands were removed or reordered, each keeps its name and calibration. Digital
+        numbers are not masked; 0 is no data. For other files, values in physical units with NaN for no data, or digital
+        numbers if the file has a scale to radiance.
 
     Raises
     ------
     ValueError
-        If the file cannot be read as a raster, is of a format that is not opened, has no north-up grid in metres, or
-        takes more memory than there is; if another program changed its values, or it is not certain which band is
-        which. Values of a lazy result are checked when they are computed.
+        If the file is not a raster, has an unsupported format, has no north-up grid in metres, or does not fit into
+        memory; if another program changed its values, or the bands cannot be identified. Values of a lazy result are
+        checked when they are computed.
     OSError
-        If its cells cannot be read.
+        If the cells cannot be read.
 
     Examples
     --------
@@ -341,14 +339,14 @@ def _whole(path):
         streamed, finished = Path(folder) / "streamed.tif", Path(folder) / "finished.tif"
         yield streamed, finished
         os.replace(finished, path)
-        # Statistics that GDAL or a GIS kept of the replaced file would be taken for those of the new one.
+        # Remove statistics of the replaced file, which GDAL or a GIS would use for the new file.
         path.with_name(f"{path.name}.aux.xml").unlink(missing_ok=True)
 
 
 def _stream(array, cells, layers, grid, path, described, further):
     """Write a tiled GeoTIFF block by block, with all metadata of an array."""
     rows, columns, crs = grid.shape.y, grid.shape.x, rasterio.crs.CRS.from_wkt(grid.crs.to_wkt())
-    # Three bytes a pixel would be red, green and blue without `photometric`.
+    # Without `photometric`, three 8-bit bands would be interpreted as red, green and blue.
     with rasterio.open(
         path, "w", dtype=cells.dtype.name, count=cells.sizes["band"], height=rows, width=columns, crs=crs,
         transform=grid.affine, photometric="minisblack", nodata=no_data_of(array), **_TILED,
@@ -359,7 +357,7 @@ def _stream(array, cells, layers, grid, path, described, further):
         if not isinstance(cells.data, da.Array):
             sink.write(cells.values)
     if isinstance(cells.data, da.Array):
-        # The file is opened for each block, which takes longer than to write a small one.
+        # The file is opened for each block, which takes longer than writing a small block.
         largest = cells.dtype.itemsize * max(cells.chunks[-2]) * max(cells.chunks[-1])
         together = cells.sizes["band"] * largest <= _AT_ONCE
         data = cells.data.rechunk({0: -1}) if together else cells.data
@@ -407,7 +405,7 @@ def _describe(sink, array, kept):
         if "wavelength" in tags:
             sink.update_tags(number, ns="IMAGERY", CENTRAL_WAVELENGTH_UM=tags["wavelength"])
     sink.units = band_units(names, array.coords, array.attrs) + [DAYS] * len(further)
-    # A GIS has no scale of square roots.
+    # GIS software does not support square-root scales.
     if "gain" in array.coords and "compression" not in array.coords:
         one, none = [1.0] * len(further), [0.0] * len(further)
         sink.scales, sink.offsets = array["gain"].values.tolist() + one, array["offset"].values.tolist() + none

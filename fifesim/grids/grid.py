@@ -26,7 +26,7 @@ _OTHERS = (("latitude", "longitude"), ("lat", "lon"), ("northing", "easting"), (
 
 
 def north_up(array):
-    """Raster with rows from north to south; a scan stays as it is."""
+    """Raster with rows from north to south; a scan is unchanged."""
     if is_scan(array):
         return array
     check_axes(array)
@@ -49,8 +49,7 @@ def check_axes(array):
         return
     if is_scan(array):
         raise ValueError(
-            f"a raster has dimensions y and x, got {array.dims} of a scan: put it onto a map with "
-            ".fifesim.grid_swath(grid)"
+            f"a raster needs dimensions y and x, got {array.dims} of a scan: map it with .fifesim.grid_swath(grid)"
         )
     for down, across in _OTHERS:
         if {down, across} <= set(array.dims):
@@ -61,7 +60,7 @@ def check_axes(array):
     raise ValueError(f"a raster has dimensions y and x, got {array.dims}: rename or select with .rename, .isel")
 
 
-# A coordinate may be off by this share of a cell: a northing in single precision is, for cells of 30 m.
+# Tolerance of coordinates as a fraction of a cell, sufficient for single-precision northings with cells of 30 m. [1]
 _TOLERANCE = 1 / 60
 # Limit for smaller cells, where the coordinates are in single precision.
 _TOLERANCE_SINGLE = 1 / 10
@@ -83,7 +82,7 @@ def along_axis(array, name, edge, cell):
         return edge, cell
     given = array.coords[name].values
     if array.sizes[name] == 1:
-        # The GeoTransform of a part is that of the whole raster: its cell size holds, its corner does not.
+        # A subset keeps the GeoTransform of the whole raster, with correct cell size but wrong corner.
         return float(given[0] - cell / 2), cell
     centres = given.astype(float)
     even, cell = np.linspace(centres[0], centres[-1], centres.size, retstep=True)
@@ -116,7 +115,7 @@ def reference_of(grid):
     return _made(grid).copy()
 
 
-# Every step of a chain asks for that of its grid, and it takes a millisecond to make.
+# Cached, because every step of a chain needs it, and making it takes a millisecond.
 @cached(64, "CRS coordinates of grids")
 def _made(grid):
     return xr_coords(grid)["spatial_ref"]
@@ -137,7 +136,7 @@ def on_lattice(grid):
     return GeoBox(grid.shape, Affine(a.a, a.b, west, a.d, a.e, north), crs)
 
 
-# The steps of a scene ask for the same.
+# All steps of a scene use the same grid.
 @cached(64, "grids as rasters carry them")
 def as_carried(grid):
     """Grid as `geobox` finds it on an array after `place`, whose origin differs in the last digits."""
@@ -173,9 +172,9 @@ def grid_at(crs: CRSLike, west: float, north: float, width: float, height: float
     west, north : float
         Upper left corner. [m]
     width, height : float
-        Size; as many whole cells as fit. [m]
+        Size, rounded down to whole cells. [m]
     cell : float or (float, float)
-        Size of a cell, or down and across. [m]
+        Cell size, or sizes down and across. [m]
 
     Returns
     -------
@@ -184,7 +183,7 @@ def grid_at(crs: CRSLike, west: float, north: float, width: float, height: float
     Raises
     ------
     ValueError
-        If there is no such CRS, it is not projected or not in metres, or the size holds no cell.
+        If the CRS is unknown, not projected or not in metres, or the size is smaller than a cell.
 
     Warns
     -----
@@ -201,15 +200,15 @@ def grid_at(crs: CRSLike, west: float, north: float, width: float, height: float
     down, across = np.broadcast_to(np.asarray(cell, float), 2).tolist()
     size, of = f"a grid of width = {width:g}, height = {height:g} m holds", f"of {down:g} x {across:g} m"
     if not (min(down, across) > 0 and width >= across and height >= down):
-        raise ValueError(f"{size} no cell {of}: type a width and height of a cell or more, or a smaller cell")
+        raise ValueError(f"{size} no cell {of}: use a larger width and height, or a smaller cell")
     if not max(width / across, height / down) < _LONGEST:
-        raise ValueError(f"{size} over {_LONGEST} cells {of} along a side: type a smaller size, or a larger cell")
+        raise ValueError(f"{size} over {_LONGEST} cells {of} along a side: use a smaller size, or a larger cell")
     projection.warn_of_degrees(west, north)
     shape = int(height / down + 1e-6), int(width / across + 1e-6)
     return _checked(shape, (across, 0.0, west, 0.0, -down, north), projection.horizontal(crs))
 
 
-# A scenario asks for its grid at every step.
+# Cached, because every step checks its grid.
 @cached(64, "checked grids")
 def _checked(shape, transform, crs):
     return check_grid(GeoBox(shape, Affine(*transform), crs))
@@ -244,7 +243,7 @@ def geobox(array):
         return placed
     check_axes(array)
     if 0 in array.shape:
-        raise ValueError(f"the raster has no cells, shape {array.shape}: look at how it was selected")
+        raise ValueError(f"the raster has no cells, shape {array.shape}: check how it was selected")
     if not ("spatial_ref" in array.coords and array.coords["spatial_ref"].attrs) and array.odc.crs is None:
         raise ValueError(
             "the raster has no CRS: open its file with decode_coords='all', or import rioxarray and give it one with "
@@ -283,7 +282,7 @@ def place(array, grid, coordinates=None):
 
 def with_coordinates(array, coordinates):
     """Raster with additional or replaced coordinates."""
-    # `assign_coords` aligns all coordinates, which takes ten times as long.
+    # `assign_coords` would align all coordinates, which takes ten times as long.
     out = _with(array, coordinates, {})
     out.encoding = dict(array.encoding)
     return out
@@ -307,7 +306,7 @@ def raster_of(variable, coordinates, indexes, name=None):
     return raster
 
 
-# Every step of a chain asks for those of its grid.
+# Cached, because every step of a chain needs them.
 @cached(64, "coordinates of grids")
 def _whole(grid):
     found = xr.Coordinates(coordinates(grid))
@@ -369,7 +368,7 @@ def aligned_grid(grid, pixel):
     shape = int(height / down + 1e-6), int(width / across + 1e-6)
     if not (down > 0 and across > 0 and min(shape) > 0):
         raise ValueError(f"no pixel of {down:g} x {across:g} m fits into a scene of {height:g} x {width:g} m")
-    # Pixels that are so much smaller than a cell have their size in km.
+    # Much smaller pixels are probably given in km.
     if min(-a.e / down, a.a / across) > 50:
         raise ValueError(f"pixels must be at least 1/50 of a cell of {a.a:g} m, got {across:g} m: give metres, not km")
     return GeoBox(shape, Affine(across, 0.0, a.c, 0.0, -down, a.f), grid.crs)
@@ -388,8 +387,7 @@ def lattice_offset(one, other):
     rows, columns = (b.f - a.f) / a.e, (b.c - a.c) / a.a
     if one.crs != other.crs or not same_cell or max(abs(rows - round(rows)), abs(columns - round(columns))) > 1e-3:
         raise ValueError(
-            f"the rasters lie on different lattices, {in_words(one)} and {in_words(other)}: "
-            "bring one onto the other first"
+            f"the rasters have different lattices, {in_words(one)} and {in_words(other)}: resample one to the other"
         )
     return round(rows), round(columns)
 

@@ -41,10 +41,10 @@ Image: TypeAlias = xr.DataArray | Any
 
 
 NO_DATA_ATTRIBUTES = ("_FillValue", "missing_value", "nodata")
-"""Attributes that say which value stands for no data."""
+"""Attributes with the value for no data."""
 
 STORAGE = ("scale_factor", "add_offset", *NO_DATA_ATTRIBUTES)
-"""Attributes that say how values are stored."""
+"""Attributes of the storage of values."""
 
 
 def scale_and_offset(raster):
@@ -76,8 +76,8 @@ def unpacked(raster):
     scaled = (scale, offset) != (1.0, 0.0)
     if scaled and raster.dtype.kind == "f":
         raise ValueError(
-            f"{raster.name or 'the raster'} holds fractions and says scale_factor {scale:g}, add_offset {offset:g}: "
-            "where they were applied, drop them from .attrs; where not, open the file with mask_and_scale=True"
+            f"{raster.name or 'the raster'} has fractions but also scale_factor {scale:g}, add_offset {offset:g}: "
+            "if they were applied, remove them from .attrs; otherwise open the file with mask_and_scale=True"
         )
     if not scaled and not marks:
         return raster
@@ -119,7 +119,7 @@ def incoming(raster, name):
         if array.chunks is None and array.dims[-2:] in (("y", "x"), ("line", "sample")):
             check_scale(array.values)
             return array
-        # A lazy raster with an origin is as fifesim made it.
+        # A lazy raster with an origin is unchanged since fifesim made it.
         return array if origin_of(array) is not None else chunks.pointwise(check_scale, array, dtype=array.dtype)
     return _physical(array, name)
 
@@ -141,7 +141,7 @@ def micrometres(wavelength):
     values = np.asarray(wavelength.values, float) / PER_MICROMETRE[unit.lower()]
     if values.size and not np.max(values) <= LONGEST:
         raise ValueError(
-            f"wavelength reaches {np.max(values):g} um: where these are nanometres, say so by "
+            f"wavelength reaches {np.max(values):g} um: if these are nanometres, set "
             "raster.wavelength.attrs['units'] = 'nm'"
         )
     return values
@@ -158,8 +158,8 @@ def check_reflectance(values):
         )
     if values.size and np.mean(values > 1) > 0.5:
         warn(
-            "most values of a block are reflectances above 1, as no ground has: where they are percent, divide them by "
-            "100, and where they are scaled, multiply them by their scale"
+            "most values of a block are reflectances above 1, which is implausible: if they are percent, divide by "
+            "100; if they are scaled, multiply them by their scale"
         )
     return values
 
@@ -230,8 +230,8 @@ def _physical(array, name):
         )
     if array.dtype.kind in "iu" and not has_no_data(array):
         warn(
-            f"{array.name or 'the raster'} says no value for cells without data: where there are any, such as 0, add "
-            ".assign_attrs(_FillValue=0), else they count as reflectance"
+            f"{array.name or 'the raster'} has no value for no data: if there is one, such as 0, add "
+            ".assign_attrs(_FillValue=0), otherwise it is used as reflectance"
         )
     plain = unpacked(array)
     out = chunks.pointwise(check_reflectance, plain, dtype=np.float32 if plain.dtype == np.float32 else float)

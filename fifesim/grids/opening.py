@@ -30,7 +30,7 @@ from fifesim.grids.projection import lies_in_words
 # [byte]
 _LARGEST = 64_000_000
 
-# Elements of a plain mosaic. Warped and processed ones, raw bytes and functions in Python name files in many others.
+# Elements of a plain mosaic. Other elements (warping, processing, raw bytes, Python functions) can refer to any file.
 _ELEMENTS = """
     VRTDataset SRS GeoTransform GCPList GCP Metadata MDI BlockXSize BlockYSize VRTRasterBand Description UnitType Offset
     Scale CategoryNames Category ColorInterp ColorTable Entry NoDataValue HideNoDataValue Histograms HistItem HistMin
@@ -117,7 +117,7 @@ _PATH = 150
 # Mosaics of mosaics.
 _DEEPEST = 8
 
-_CURE = "where you trust it, allow_remote=True (fifesim simulate: --allow-remote) opens whatever GDAL opens"
+_CURE = "for trusted files, allow_remote=True (fifesim simulate: --allow-remote) opens all GDAL formats"
 
 _REMOTE = ContextVar("fifesim_remote_rasters", default=False)
 
@@ -125,7 +125,7 @@ _REMOTE = ContextVar("fifesim_remote_rasters", default=False)
 @contextmanager
 def remote_allowed():
     """Context in which rasters may have addresses and any format of GDAL."""
-    # It applies when a file is checked, in the thread that checks; lazy reads keep that decision.
+    # It applies to the check of a file in the current thread; later lazy reads keep the decision.
     token = _REMOTE.set(True)
     try:
         yield
@@ -207,7 +207,7 @@ def _formats(path, around=()):
         return FORMATS
     if re.match(r"[\w+.-]{2,}:", path) or path.lstrip().startswith("<"):
         shown_path = in_a_line(path, _PATH)
-        raise ValueError(f"{shown_path} is an address or a description, no file, and is not opened: {_CURE}")
+        raise ValueError(f"{shown_path} is an address or a description instead of a file, and is not opened: {_CURE}")
     _check_regular(path, path)
     for beside in filter(os.path.exists, (f"{path}.msk", f"{path}.ovr")):
         _check_regular(beside, beside)
@@ -231,7 +231,7 @@ def archive_of(path):
     """Archive on disk that holds a virtual file of GDAL, None if there is none, as for ``/vsimem/``."""
     parts = path.rpartition(re.findall(r"/vsi\w*", path)[-1])[2].removeprefix("/").removeprefix("{").split("/")
     for length in range(1, len(parts) + 1):
-        # GDAL takes braces around an archive of any suffix.
+        # GDAL accepts braces around an archive with any suffix.
         part = "/".join(parts[:length]).removesuffix("}")
         if part and os.path.exists(part) and not os.path.isdir(part):
             return part
@@ -289,7 +289,7 @@ def _read_block(file, state, dtype, block_info=None):
         return source.read(list(range(first + 1, last + 1)), window=window).astype(dtype, copy=False)
 
 
-# Coordinates beyond are none of the Earth's in any unit. [m or degree]
+# Larger coordinates are not on the Earth in any unit. [m or degree]
 _FARTHEST = 1e9
 
 

@@ -16,7 +16,7 @@ from fifesim.base.messages import warn
 
 _OWN = threading.local()
 
-# More coordinate reference systems than anybody works in at once.
+# Maximum number of cached transformers.
 _MOST = 32
 
 
@@ -45,11 +45,11 @@ def _kept(key, make):
     return found
 
 
-# By how much a metre of a grid may differ from one on the ground. [1]
+# Maximum scale error of a projection. [1]
 _SCALE_BOUND = 0.035
-# Beyond that there is a warning: the edges of the zones of UTM and of most national grids are within. [1]
+# Scale error that causes a warning; UTM zones and most national grids are within. [1]
 _SCALE_WARNED = 0.01
-# A place that comes back this far from where it was lies where the projection does not reach. [m]
+# Tolerance of a forward and backward projection; larger errors are outside the valid area. [m]
 _RETURNS = 1.0
 
 
@@ -105,7 +105,7 @@ def _pipeline(*steps):
 def _north_first(crs):
     """Whether a CRS gives northing or latitude before easting or longitude."""
     first, second = pyproj.CRS.from_user_input(crs).axis_info[:2]
-    # From a pole both axes lead north, or both south: only their names tell.
+    # In polar CRSs both axes point north or both south, so use their names.
     return first.name.startswith("North") if first.direction == second.direction else first.direction == "north"
 
 
@@ -135,16 +135,18 @@ def check_metres(crs, bounds):
         raise ValueError(f"the CRS must be in metres, {name} is in {crs.axis_info[0].unit_name}: reproject")
     ways = {axis.direction for axis in crs.axis_info}
     if ways not in ({"east", "north"}, {"north"}, {"south"}):
-        raise ValueError(f"the axes of the CRS must lead east and north, those of {name} lead {' and '.join(ways)}")
+        raise ValueError(
+            f"the axes of the CRS must point east and north, the axes of {name} point {' and '.join(ways)}"
+        )
     west, south, east, north = bounds
-    # A CRS takes longer to compare than its text.
+    # Comparing texts is faster than comparing CRSs.
     text, found = crs.to_wkt(), []
     for x, y in (((west + east) / 2, (south + north) / 2), (west, north), (east, north), (west, south), (east, south)):
         scale, longitude, latitude = _scale(text, x, y)
         if scale is None:
             raise ValueError(
-                f"west = {west:.10g}, north = {north:.10g}: the grid lies outside of the area of {name}{_reach(crs)}; "
-                "type its corner and size in metres of the CRS"
+                f"west = {west:.10g}, north = {north:.10g}: the grid is outside the area of {name}{_reach(crs)}; "
+                "give its corner and size in metres of the CRS"
             )
         if abs(scale - 1) > _SCALE_BOUND:
             raise ValueError(
@@ -235,12 +237,12 @@ def warn_of_degrees(west, north):
     """Warn if a corner in metres looks like longitude and latitude."""
     if 0 < abs(west) <= 180 and 0 < abs(north) <= 90:
         warn(
-            f"west={west:g} and north={north:g} are taken as metres and look like degrees: if they are, convert them "
+            f"west={west:g} and north={north:g} are used as metres but look like degrees: if they are, convert them "
             "with pyproj.Transformer.from_crs(4326, crs, always_xy=True).transform(longitude, latitude)"
         )
 
 
-# Every step of a chain asks for the middle of its grid, and the WKT of a CRS alone takes longer than a small scene.
+# Cached, because every step needs the centre of its grid, and the WKT of a CRS takes longer than a small scene.
 @cached(256, "longitude and latitude of the middle of grids")
 def middle(grid):
     """Longitude, from Greenwich, and latitude of the middle of a grid, in any datum. [degree]"""

@@ -37,7 +37,7 @@ def sums_by_row(kernel, *arrays, count, **parameters):
     """Sums over rows by a kernel, shape (rows, count); computes."""
     height, width = arrays[0].shape
     row = np.arange(height)
-    # The result has a column, and each of its rows reads a whole one.
+    # Each row of the single-column result reads a complete row.
     reads = [Reads(array.data, (row, row + 1), ([0], [width])) for array in arrays]
 
     def sums(rows, columns, *blocks):
@@ -63,10 +63,10 @@ def sums_by_block(kernel, array, shape, size, margin=(0, 0)):
         return np.maximum(first - reach, 0), np.minimum(first + size + reach, length)
 
     rows, columns = edges(height, down), edges(width, across)
-    # A result whose every cell is a block.
+    # Each cell of the result represents a block.
     shape = (*shape, len(rows[0]), len(columns[0]))
     (found,) = computed(in_blocks(sums, [Reads(array, rows, columns)], shape, 1))
-    # One after the other: numpy's own sum goes by the layout in memory.
+    # In a fixed order, because the order in numpy's sum depends on the memory layout.
     return reduce(np.add, np.moveaxis(found.reshape(*shape[:-2], -1), -1, 0))
 
 
@@ -79,7 +79,7 @@ _IN_TURN = 2**24
 
 def combined(array, dim, weights):
     """Weighted sums along a dimension, which becomes "band", lazy in the same chunks; zero weights skip NaN."""
-    # Sums run along the chunks of the dimension one after the other, so that a task holds one chunk and one sum.
+    # Chunks along the dimension are added in sequence, so that a task holds one chunk and one sum.
     weights = np.asarray(weights, float)
     first = array.transpose(dim, ...)
     dtype = np.result_type(array.dtype, np.float32)
@@ -114,7 +114,7 @@ def _chain(data, weights, edges, numbers):
     """Sums of one group, chunk after chunk: each chunk is read by one task and can be released."""
     if 8 * np.prod([max(sizes) for sizes in data.chunks[1:]]) < _IN_TURN:
         return _links(data, weights, edges, numbers)
-    # Large chunks are read in turn: an idle thread would read on, and all of a cube would wait to be added.
+    # Large chunks are read in turn; otherwise idle threads would load the whole cube.
     parts = np.empty(data.numblocks[1:], object)
     for place in np.ndindex(*parts.shape):
         parts[place] = _links(data.blocks[(slice(None), *place)], weights, edges, numbers, in_turn=True)
@@ -201,7 +201,7 @@ def resample(rows, columns, array, grid, *, min_valid=0.98):
     array = array if array.dims[-2:] == ("y", "x") else array.transpose(..., "y", "x")
     sizes, seams = None, ((), ())
     if array.chunks is not None:
-        # A pixel is made with the chunk of its last cell: what it needs of earlier ones is cut off when these are made.
+        # A pixel is computed with the chunk of its last cell; parts of earlier chunks are kept for it.
         lasts = [axis.start + np.maximum(axis.count, 1) - 1 for axis in (rows, columns)]
         sizes = tuple(chunks.runs(last, each) for last, each in zip(lasts, array.chunks[-2:], strict=True))
         # From the first pixel on that begins in a chunk, all up to the next chunk lie in it.

@@ -17,7 +17,7 @@ from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
 
 _NAME = "FIFE"
-_FAR = 1.0  # from the site a scene is another place [degree]
+_FAR = 1.0  # maximum distance from the site [degree]
 
 # First and last-plus-one row, and column.
 CellWindow: TypeAlias = Annotated[tuple[tuple[int, int], tuple[int, int]], UNCHECKED]
@@ -36,20 +36,20 @@ def fife_site(
     cell : float
         Cell size. [m]
     window : ((int, int), (int, int)), optional
-        First and last-plus-one row, and column, of a part of the site. [cell]
+        Part of the site as (start, stop) of rows and of columns. [cell]
     datum : {"NAD83", "NAD27"}, optional
-        NAD83 has its corner at 704970 E 4334220 N, on the 30 m lattice of today's elevation models;
-        NAD27 is FIFE's own, with its corner at 705000 E 4334000 N, about 9 m from there.
+        NAD83 has the corner 704970 E 4334220 N, on the 30 m lattice of current elevation models. NAD27 is the datum of
+        FIFE, with the corner 705000 E 4334000 N, about 9 m away.
 
     Returns
     -------
     grid : odc.geo.geobox.GeoBox
-        As many whole cells as fit.
+        Grid of whole cells.
 
     Raises
     ------
     ValueError
-        If cell, window or datum make no grid.
+        If cell, window or datum is invalid.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def is_fife(array):
     """Whether a raster originates from a scene made on the FIFE site."""
     if array.attrs.get("site") != _NAME or not {"y", "x"} <= set(array.dims):
         return False
-    # Arithmetic spreads attributes, so that the place counts too.
+    # Attributes survive arithmetic, so the position is also checked.
     longitude, latitude = projection.middle(grids.geobox(array))
     return max(abs(longitude - times.LONGITUDE), abs(latitude - times.LATITUDE)) < _FAR
 
@@ -114,12 +114,12 @@ def sun_position(
     time: Times, latitude: Numbers, longitude: Numbers, altitude: Numbers = 0.0
 ) -> geometry.Geometry | xr.Dataset:
     """
-    Sun at a time and place, or at many.
+    Position of the sun for one or several times and places.
 
     Parameters
     ----------
     time : str, datetime, or sequence of them
-        Taken as UTC where it names no time zone.
+        Time, in UTC unless it has a time zone.
     latitude, longitude : float, or sequence of float
         One place, or one for each time. [degree north, degree east]
     altitude : float, or sequence of float, optional
@@ -128,13 +128,13 @@ def sun_position(
     Returns
     -------
     sun : Geometry, or xarray.Dataset, dims (time,)
-        Of one time the geometry with a nadir view. Of a sequence ``sza``, ``saa`` and ``earth_sun_distance`` along
-        ``time``; a zenith beyond 90 is a sun below the horizon. [degree, degree, astronomical unit]
+        For one time, a Geometry with a nadir view. For a sequence, ``sza``, ``saa`` and ``earth_sun_distance`` along
+        ``time``; the sun is below the horizon if the zenith angle exceeds 90. [degree, degree, astronomical unit]
 
     Raises
     ------
     ValueError
-        If it is no time, there is not one place for each, or the sun of a single time is below the horizon.
+        If a time is invalid, the numbers of times and places differ, or the sun of a single time is below the horizon.
 
     References
     ----------

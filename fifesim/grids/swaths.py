@@ -22,7 +22,7 @@ METHODS = ("nearest", "mean")
 # Rows and columns of a map that are made at once. [cell]
 _BLOCK = 512
 
-# Where the pixels lie, which on a map its own coordinates say.
+# Coordinates of pixel positions, which a map does not need.
 _PLACES = ("x", "y", "latitude", "longitude", "spatial_ref", "sweep", "deleted", *DIMS)
 
 
@@ -42,7 +42,7 @@ def grid_swath(
     image: xr.DataArray, grid: GeoBox, method: Literal["nearest", "mean"] = "nearest", *, min_valid: float = 0.5
 ) -> xr.DataArray:
     """
-    Image of a scan put onto a map.
+    Map an image of a scan to a grid.
 
     Parameters
     ----------
@@ -51,24 +51,23 @@ def grid_swath(
         that differ in a coordinate ``sweep`` do not share edges, and pixels that a coordinate ``deleted`` marks are
         left out.
     grid : odc.geo.geobox.GeoBox
-        In any projected CRS in metres, such as from `fifesim.grid_at`.
+        Grid in any projected CRS in metres, for example from `fifesim.grid_at`.
     method : {"nearest", "mean"}, optional
-        The pixel whose centre is nearest to that of the cell, if it reaches so far; or the mean of the pixels on the
-        cell, each by the area that it covers. Digital numbers take the nearest.
+        Nearest pixel that covers the cell centre, or area-weighted mean of the pixels on the cell. Digital numbers need
+        "nearest".
     min_valid : float, optional
-        Share of a cell that valid pixels must cover for a mean. [1]
+        Minimum fraction of a cell covered by valid pixels for a mean. [1]
 
     Returns
     -------
     image : xarray.DataArray, dims ([band], y, x)
-        Lazy where the image is. NaN where no pixel lies, 0 in digital numbers. View and sun of each pixel are those of
-        the nearest.
+        Lazy if the image is. NaN (0 for digital numbers) without pixels. Angles of sun and view are taken from the
+        nearest pixel.
 
     Raises
     ------
     ValueError
-        If the image is not of a scan, its pixels do not say where they lie, there is one line or sample only, or none
-        lies on the grid.
+        If the image is not a scan, has no pixel positions, has only one line or sample, or does not overlap the grid.
 
     See Also
     --------
@@ -147,7 +146,7 @@ def _places(image, grid):
         names, crs = ("longitude", "latitude"), "EPSG:4326"
     else:
         raise ValueError(
-            "the image does not say where its pixels lie: assign coordinates latitude and longitude over (line, sample)"
+            "the pixel positions are unknown: assign coordinates latitude and longitude over (line, sample)"
         )
     across, up = (np.asarray(image[name].transpose(*DIMS), float) for name in names)
     target = grid.crs.to_wkt()

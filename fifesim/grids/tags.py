@@ -109,7 +109,7 @@ def changed_cell(cells, block, corner, marks):
     written = cells.values[first : first + block.shape[0]][:, here[0]][:, :, here[1]]
     found = block[at].astype(float)
     tolerance = 2 * np.finfo(block.dtype).eps * np.abs(written) if block.dtype.kind == "f" else 0.0
-    # A comparison with NaN, which stands for no data, is false.
+    # Comparisons with NaN (no data) are false.
     changed = ~(np.isnan(found) | np.isin(found, marks)) & ~(np.abs(found - written) <= tolerance)
     if not changed.any():
         return None
@@ -198,7 +198,7 @@ def _dates(days, dtype):
 
 TAG = "FIFESIM"
 
-# A longer tag was not written here. [character]
+# Longer tags were not written by fifesim. [character]
 _LONGEST = 1_000_000
 
 # Longest text among coordinates. [character]

@@ -30,19 +30,19 @@ from fifesim.grids.projection import lies_in_words
 # Cells are made in fixed tiles of this size, so that the warper's rounding is the same under any chunking.
 _TILE = 512
 
-# The warper takes positions as linear along a row, up to an eighth of a file's cell. Over so few cells that leaves
-# millimetres for cells of 10 m, a centimetre for 30 m.
+# The warper approximates positions as linear along a row, within an eighth of a file cell. For so few cells the error
+# is millimetres for cells of 10 m, and a centimetre for 30 m.
 _STRIP = 32
 
 # rasterio passes the coordinate operation to the transformer, which applies it, and to the warper, which logs since
 # GDAL 3.11 that it has no such option.
 logging.getLogger("rasterio._env").addFilter(lambda record: "option COORDINATE_OPERATION" not in record.getMessage())
 
-# rasterio silences a warning of its own around each call, in a way that is not safe among threads.
+# rasterio suppresses its own warning around each call in a way that is not thread-safe.
 _ONE_AT_A_TIME = Lock()
 
-# Where a cell holds more cells of the file than so many along an axis, a tile is made by blocks, each of which reads at
-# most so many of them along an axis: 100 MB with the warper's own. Of one cell that holds more, so many are the limit.
+# Maximum file cells along an axis that are read at once: 100 MB, including memory of the warper. Tiles that need more
+# are made in blocks.
 _MUCH_FINER = 6
 _LONGEST = 2048
 _MOST_CELLS = 2**26
@@ -51,19 +51,19 @@ _MOST_CELLS = 2**26
 _SOURCE_MARGIN = 4
 
 
-# The most frequent class of a cell is that of the most of its samples, at most so many along a side.
+# Maximum samples along the side of a cell for its most frequent class.
 _MOST_SAMPLES = 64
 
 
 def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False, check=None):
     """One band of a raster file on a grid, dims (y, x), NaN for no data."""
-    # Interpolated bilinearly to cells no larger than its own, averaged to larger ones; a file with the cells of the
-    # grid is read as it is.
+    # Bilinear interpolation to cells up to the size of the file cells, averages for larger cells; a file on the same
+    # grid is read directly.
     grids.check_grid(grid)
     file = raster_file(path, allow_remote)
     with sound_raster(file) as (source, crs):
         pipeline, back = _operations(source, crs, grid, file.name)
-    # A file that has changed is another file to the cache.
+    # A changed file is a different file for the cache.
     make_tile = partial(_warp_tile, file, file.state, grid, pipeline, back, classes, check)
     row, column = grids.lattice_position(grid)
 
@@ -140,7 +140,7 @@ class _TileReads(NamedTuple):
         found = [window for window in found if window is not None]
         if not found:
             return slice(0, 0), slice(0, 0)
-        # The window of a block is not wholly that of its tile, by the curvature between their outlines.
+        # The window of a block may exceed the window of its tile because of map curvature.
         (top, bottom), (left, right) = rasterio.windows.union(*found).toranges()
         (height, width), around = self.source.shape, _SOURCE_MARGIN
         rows = slice(max(int(top) - around, 0), min(int(bottom) + around, height))
@@ -215,7 +215,7 @@ def _tile(source, crs, name, grid, pipeline, back, classes, check, tile_row, til
     options = {"src_crs": crs, "dst_crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt())}
     options |= {"src_nodata": np.nan, "dst_nodata": np.nan, "resampling": Resampling.nearest if classes else larger}
     options |= {"COORDINATE_OPERATION": pipeline} if pipeline else {}
-    # Of the tile, not of the grid, so that it is the same in every window.
+    # Based on the tile, not the grid, so that it is the same in every window.
     cells = _cells_per_cell(source, crs, _part(grid, top, left, _TILE), back)
     size, samples = _block_size(cells), _samples(cells) if classes and finer else 1
     for down, across in product(range(0, _TILE, size), repeat=2):

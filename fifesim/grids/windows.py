@@ -1,5 +1,5 @@
 """
-Lazy arrays of which each block is one task, told its place, that gathers windows of other arrays.
+Lazy arrays with one task per block, which knows its position and gathers windows of other arrays.
 
 Canopy and atmosphere in one pass save 7 % of the processor time from leaf area to image with two bands, and 17 % with
 six, compared with one dask task for each (19 million cells in chunks of 1008, the median and the minimum of 9 runs).
@@ -19,7 +19,7 @@ from dask.highlevelgraph import HighLevelGraph, MaterializedLayer
 
 from fifesim.grids import grid as grids
 
-# Edge of the chunks of an array in memory that is used with lazy ones. [cell]
+# Chunk size of in-memory arrays that are combined with lazy arrays. [cell]
 _CHUNK = 1024
 
 
@@ -34,8 +34,8 @@ class _Plan(NamedTuple):
 
 def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=float, seams=((), ())):
     """Lazy array whose blocks a kernel makes from windows of other lazy arrays, all in one layer of the graph."""
-    # A small part of a chunk is cut out first, and a block made of the whole chunk waits for these cuts, so that the
-    # chunk need not wait in memory for its neighbours.
+    # Small parts of a chunk are copied before the complete chunk is used, so that the chunk need not stay in memory for
+    # its neighbours.
     arrays = [_lazy(array) for array in arrays]
     name, shared = f"windows-{token}", f"windows-kernel-{token}"
     graph, rims, wholes = {shared: kernel}, defaultdict(list), {}
@@ -69,7 +69,7 @@ def lazy_together(*arrays):
 
 def held(array):
     """Lazy array whose blocks dask computes separately, not fused with later steps."""
-    # dask.compute of a Dataset would take an array and another made of it block by block for one, and miss tasks.
+    # dask.compute of a Dataset could confuse an array with another derived block by block, and miss tasks.
     if not isinstance(array, da.Array):
         return array
     name = f"held-{array.name}"
@@ -223,7 +223,7 @@ _ORIGINS = {}
 
 
 def made_of(raster, origin):
-    """The same lazy raster, whose origin is known as long as its values stay as they are."""
+    """The same lazy raster with a known origin, which is lost when values change."""
     key = _identity(raster)
     _ORIGINS[key] = origin
     # Arrays of dask before 2025 have no weak references.
@@ -232,7 +232,7 @@ def made_of(raster, origin):
 
 
 def origin_of(raster):
-    """Origin of a raster as `made_of` was told, or None."""
+    """Origin of a raster given to `made_of`, or None."""
     return None if raster.chunks is None else _ORIGINS.get(_identity(raster))
 
 
@@ -245,7 +245,7 @@ _TILED_CHUNK = 1008
 
 _TILES_PER_CHUNK = 2
 
-# Rows of a part of a tile: with the columns of a chunk 2 MB in double precision, which a processor's cache keeps.
+# Rows per part of a tile: with the columns of a chunk 2 MB in double precision, which fits into the processor cache.
 _ROWS = 252
 
 
@@ -255,7 +255,7 @@ def tiles(kernel, grid, chunks=None, *, tile, dtype=float):
         return grids.place(xr.DataArray(kernel(0, 0, tuple(grid.shape)), dims=("y", "x")), grid)
     normal = chunk_sizes(grid, chunks, tile=tile)
     lazy = xr.DataArray(array_by_place(kernel, normal, token=tokenize(kernel, normal), dtype=dtype), dims=("y", "x"))
-    # xarray would take over dask's name.
+    # Without a name, xarray would use dask's name.
     return grids.place(lazy.rename(None), grid)
 
 

@@ -12,10 +12,10 @@ from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument, instrument_names
 
 LAND = ListedColormap(colormaps["gist_earth"](np.linspace(0.3, 0.95, 256)), name="land")
-"""Colour map of elevation: that of matplotlib without the blue of its seas."""
+"""Colour map of elevation: matplotlib's terrain colours without blue."""
 
 NO_DATA = "#d9d9d9"
-"""Colour of what has no data."""
+"""Colour of missing data."""
 
 LINE, BAND = "#b2182b", "#f4a582"
 """Colours of a regression line and of its prediction interval."""
@@ -68,7 +68,7 @@ def dark_and_bright(values):
 
 
 def stretched(values, low, high):
-    """Shares from dark to bright at which values are shown, a medium one if all are the same. [1]"""
+    """Brightness of values between dark and bright; 0.5 if all values are equal. [1]"""
     span = high - low
     return np.clip((values - low) / span, 0, 1) if span > 0 else np.where(np.isnan(values), np.nan, 0.5)
 

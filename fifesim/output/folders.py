@@ -1,4 +1,4 @@
-"""Folders of results: locks, refusal of folders in use, whole files only, and provenance."""
+"""Folders of results: locks, checks for folders in use, atomic writing, and provenance."""
 
 import importlib.metadata
 import os
@@ -46,7 +46,7 @@ def check_folder(folder, overwrite, resume=False, names=None):
     if (folder / UNFINISHED).is_dir():
         with _held(folder) as hidden:
             if finished:
-                # The remains of a run that was killed after its last file was in place.
+                # Remains of a run that was killed after moving its last file.
                 _empty(hidden)
     if not finished:
         _check_contents(folder, overwrite, resume)
@@ -59,8 +59,8 @@ def _check_contents(folder, overwrite, resume):
     begun = (folder / UNFINISHED / BEGUN).is_file()
     if begun and not resume:
         raise ValueError(
-            f"the output folder {str(folder)!r} holds a run that is not finished: go on with it by --resume, "
-            "begin again with --overwrite, or name another with -o"
+            f"the output folder {str(folder)!r} has an unfinished run: continue it with --resume, "
+            "start again with --overwrite, or use another folder with -o"
         )
     if not begun and {path.name for path in folder.iterdir()} - {UNFINISHED}:
         held = "has nothing to resume and is not empty" if resume else "is not empty"
@@ -92,7 +92,7 @@ def results(folder, names, *, overwrite=False, resume=False, worth_keeping=None,
             _empty(hidden)
     finally:
         if not existed:
-            # Fails if somebody else has written files into it in the meantime.
+            # Fails if other files were written into it in the meantime.
             with suppress(OSError):
                 folder.rmdir()
 
@@ -105,7 +105,7 @@ def errors_with_their_file(folder):
     except OSError as error:
         name = f" ({error.filename})" if error.filename and str(error.filename) not in str(error.strerror) else ""
         message = f"{error.strerror}{name}" if error.strerror else str(error)
-        hint = f"; what is finished is kept, go on with --resume -o {folder}"
+        hint = f"; finished blocks are kept, continue with --resume -o {folder}"
         raise OSError(f"{message}{hint if (folder / UNFINISHED).exists() else ''}") from error
 
 
@@ -122,7 +122,7 @@ def _held(folder):
     except (Timeout, FileNotFoundError):
         by = holder.read_text(encoding="utf-8") if holder.is_file() else "another run"
         raise ValueError(
-            f"the output folder {str(folder)!r} is in use by {by}: wait until that ends, or name another with -o"
+            f"the output folder {str(folder)!r} is in use by {by}: wait until it ends, or use another folder with -o"
         ) from None
     with taken:
         began = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
@@ -146,7 +146,7 @@ def _remove_unless_plain(path):
 
 def _empty(hidden):
     """Remove everything in a hidden folder except the lock and the name of its holder."""
-    # Without the mark of a run that has begun, nothing tries to go on with the remains.
+    # Without the mark of a started run, the remains are not resumed.
     (hidden / BEGUN).unlink(missing_ok=True)
     for path in hidden.iterdir():
         if path.name not in (_LOCK, _HOLDER):
@@ -160,7 +160,7 @@ def _move_into_place(hidden, folder, names, stale):
     replaced = hidden / _REPLACED
     shutil.rmtree(replaced, ignore_errors=True)
     replaced.mkdir()
-    # GDAL and GIS keep statistics of a raster in a file beside it, which do not hold for the new raster.
+    # GDAL and GIS keep statistics of a raster in a separate file, which is not valid for the new raster.
     earlier = [each for name in reversed([*stale, *names]) for each in (name, f"{name}.aux.xml")]
     moves = [(folder / name, replaced / name) for name in earlier if os.path.lexists(folder / name)]
     moves += [(hidden / name, folder / name) for name in names]

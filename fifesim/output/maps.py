@@ -28,7 +28,7 @@ from fifesim.output import colours
 from fifesim.output.colours import LAND, colours_of, dark_and_bright, percentile_limits, stops_of, stretched
 from fifesim.sensor.labels import to_reflectance
 
-# Limits of a stretch are taken from so many pixels along a side at most. [pixel]
+# Maximum pixels along a side for computing the limits of a stretch. [pixel]
 _SAMPLE = 1000
 
 Composite: TypeAlias = Annotated[
@@ -44,28 +44,28 @@ def rgb(
     stretch: tuple[float, float] | None = None,
 ) -> xr.DataArray:
     """
-    Colours of an image, which ``.plot.imshow()`` shows.
+    Colour composite of an image, for ``.plot.imshow()``.
 
     Parameters
     ----------
     image : xarray.DataArray, dims (band, y, x)
         Digital numbers, radiance or reflectance.
     composite : {"false colour", "natural colour"} or (str, str, str), optional
-        Near infrared, red and green as red, green and blue; red, green and blue; or three bands by name. An image
-        without green shows its red twice.
+        False colour shows near infrared, red and green as red, green and blue (red twice if there is no green band).
+        Natural colour shows red, green and blue. Alternatively, the names of three bands.
     stretch : (float, float), optional
-        Percentiles of a band that become dark and bright; they are computed, from a million pixels at most. By default
-        somewhat beyond the first and the last, so that colours are those of a picture and not of a map. [%]
+        Percentiles of a band shown as dark and bright, computed from up to a million pixels. The default range is
+        slightly wider than the 1st to 99th percentile, which gives moderate colours. [%]
 
     Returns
     -------
     colours : xarray.DataArray of float32, dims (y, x, rgb)
-        From 0 to 1, NaN where a band has no data; lazy where the image is. [1]
+        From 0 to 1; NaN if any band has no data; lazy if the image is. [1]
 
     Raises
     ------
     ValueError
-        If a band is missing, or the percentiles are none.
+        If a band is missing, or the percentiles are invalid.
 
     Examples
     --------
@@ -154,16 +154,16 @@ def _percentiles(stretch):
     return low, high
 
 
-# Pictures with fewer pixels along the longer side keep their values and their edges. [pixel]
+# Smaller pictures are stored without loss, so that pixel edges stay sharp. [pixel]
 _FEW = 200
 
-# Of lossy pictures: noise of pixels stays, at a third of the bytes.
+# Quality of lossy pictures, which preserves pixel noise at a third of the size.
 _QUALITY = 78
 
-# Of lossless ones: from 4 up zlib takes longer, and noise of pixels takes more bytes.
+# Compression of lossless pictures; higher levels are slower without being smaller for noisy pixels.
 _LEVEL = 2
 
-# Decimals of a number beside a colour bar are fewer.
+# Maximum decimals of numbers on a colour bar.
 _MOST_DIGITS = 12
 
 
@@ -286,7 +286,7 @@ def _scale(width):
 
 def _bar(palette, low, high):
     ticks = [each for each in MaxNLocator(4).tick_values(low, high) if low <= each <= high and high > low]
-    # As few as the steps need: that from .25 to .5 has two.
+    # As few decimals as the steps need: two for a step from 0.25 to 0.5.
     step = min(np.diff(ticks), default=1.0) * 10.0 ** np.arange(_MOST_DIGITS)
     digits = int(np.argmax(np.abs(step - step.round()) < 1e-6 * step))
     texts = (f"{each:.{digits}f}".replace("-", "−") for each in ticks)
@@ -303,14 +303,14 @@ _TEMPLATE = Path(__file__).with_name("style.qml.j2")
 
 def write_style(path: FilePath, *, overwrite: bool = False) -> Path:
     """
-    Write a style beside a GeoTIFF, so that QGIS shows it in fitting colours when it is opened.
+    Write a QGIS style next to a GeoTIFF, which QGIS applies when it opens the file.
 
     Parameters
     ----------
     path : str or path
-        Of a file with names or wavelengths of its bands, as `to_geotiff` writes it.
+        GeoTIFF with names or wavelengths of its bands, as written by `to_geotiff`.
     overwrite : bool, optional
-        Replace a style that is there.
+        Replace an existing style.
 
     Returns
     -------
@@ -322,14 +322,14 @@ def write_style(path: FilePath, *, overwrite: bool = False) -> Path:
     ValueError
         If the file cannot be read as a raster.
     FileExistsError
-        If there is a style, and ``overwrite`` is not given.
+        If the style exists and ``overwrite`` is False.
 
     Notes
     -----
-    Near infrared, red and green become red, green and blue, red twice where there is no green; else red, green and
-    blue, stretched as in `fifesim.rgb`. A first band that is named after a quantity with a colour map, such as ``lai``,
-    ``ndvi`` or ``dem``, gets a ramp, and any other is grey. Both run from the first to the 99th percentile, in the unit
-    that scale and offset lead to, as QGIS counts; LAI, FPAR, slope and most vegetation indices begin at 0.
+    Images are shown in false colour if possible, else in natural colour, stretched as in `fifesim.rgb`. Otherwise the
+    first band is shown with the colour map of its quantity, such as ``lai``, ``ndvi`` or ``dem``, or in grey. The
+    colours range from the 1st to the 99th percentile in physical units; for LAI, FPAR, slope and most vegetation
+    indices they start at 0.
 
     Examples
     --------

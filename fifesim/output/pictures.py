@@ -1,4 +1,4 @@
-"""Pictures for interactive work: a raster, a regression, one scene seen by many instruments."""
+"""Figures for interactive work: a raster, a regression, and a comparison of instruments."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from fifesim.grids.reductions import computed
 from fifesim.output import colours
 from fifesim.output.maps import Composite, check_composite, composite_bands, rgb, thinned, valid
 
-# Pixels that are drawn along the longer side at most.
+# Maximum pixels along the longer side of a picture.
 _SIZE = 1500
 
 # Width of a figure. [inch]
 _WIDTH = 6.4
 
-# Above this a map has its axes in kilometres. [m]
+# Larger maps have axes in kilometres. [m]
 _KILOMETRES = 3000.0
 
 
@@ -44,20 +44,20 @@ def plot(
     size: int = _SIZE,
 ) -> Axes:
     """
-    Draw a raster as a map: an image in colours, one band or quantity by its colour map.
+    Plot a raster as a map: an image as a colour composite, a band or quantity with its colour map.
 
     Parameters
     ----------
     raster : xarray.DataArray, dims ([band], y, x) or ([band], line, sample)
-        A large one is thinned, so that it is not loaded whole.
+        Raster to plot. Large rasters are subsampled before loading.
     band : str, optional
-        The band to draw; by default three of them as colours, or the only one.
+        Band to plot; by default a colour composite, or the only band.
     composite, stretch : optional
-        As in `fifesim.output.maps.rgb`; of one band or quantity the percentiles are 1 and 99 by default.
+        As in `fifesim.output.maps.rgb`; for a single band or quantity, the default percentiles are 1 and 99.
     cmap : str or matplotlib.colors.Colormap, optional
-        By default that of the quantity.
+        Colour map; by default from the quantity.
     limits : (float, float), optional
-        Values of the first and of the last colour; by default the percentiles of ``stretch``.
+        Values of the first and the last colour; by default the percentiles of ``stretch``.
     axes : matplotlib.axes.Axes, optional
         A new figure by default.
     size : int, optional
@@ -123,17 +123,17 @@ def plot_fit(
     axes: Axes | None = None,
 ) -> Axes:
     """
-    Draw a regression: its line and prediction interval, over the pixels where they are given.
+    Plot a regression line with its prediction interval, and optionally the pixels.
 
     Parameters
     ----------
     fit : fifesim.analysis.regression.Regression
     y, x : xarray.DataArray, dims (y, x), optional
-        What was given to `fifesim.regress`; large ones are thinned before they are computed.
+        Rasters given to `fifesim.regress`. Large rasters are subsampled before they are computed.
     pair : {"coordinates", "index"}, optional
         As in `fifesim.regress`.
     level : float, optional
-        Of the prediction interval. [1]
+        Level of the prediction interval. [1]
     axes : matplotlib.axes.Axes, optional
         A new figure by default.
 
@@ -183,7 +183,7 @@ def plot_fit(
     title = title.replace("-", "−")
     axes.set(xlabel=labels[1], ylabel=labels[0])
     axes.set_title(title, fontsize="medium")
-    # Above what the line and its interval reach, whichever way they go; below 0 only where pixels are.
+    # The range includes the line and its interval; below 0 only if pixels are.
     low, high = axes.get_ylim()
     low = low if y is None or ordinate[both].min() < 0 else max(low, 0)
     axes.set_ylim(low, high + 0.22 * (high - low))
@@ -193,14 +193,14 @@ def plot_fit(
 
 def plot_comparison(images: xr.DataTree, *, limits: tuple[float, float] | None = None) -> Figure:
     """
-    Draw one scene through many instruments: their NDVI side by side, in the same colours.
+    Plot the NDVI of a scene from several instruments side by side, on one colour scale.
 
     Parameters
     ----------
     images : xarray.DataTree
         From `fifesim.compare`.
     limits : (float, float), optional
-        NDVI of the first and of the last colour.
+        NDVI of the first and the last colour.
 
     Returns
     -------
@@ -213,7 +213,7 @@ def plot_comparison(images: xr.DataTree, *, limits: tuple[float, float] | None =
 
     Notes
     -----
-    Large images are thinned; mean and deviation are of the pixels drawn.
+    Large images are subsampled; mean and standard deviation refer to the plotted pixels.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Progress of a run: a bar on a terminal or in a notebook, lines of JSON for batch systems, else a line a minute."""
+"""Progress of a run: a bar on a terminal or in a notebook, JSON lines for batch systems, else a line per minute."""
 
 import json
 import sys
@@ -16,7 +16,7 @@ from fifesim.base.messages import LOG, is_quiet
 
 _LABEL = progress.TextColumn("{task.description}")
 
-# Between two lines of JSON, and between two in words where no terminal shows a bar. [s]
+# Interval between JSON lines, and between text lines without a terminal. [s]
 _PAUSE, _LONG_PAUSE = 1.0, 60.0
 
 
@@ -45,12 +45,12 @@ class CellProgress:
     Parameters
     ----------
     cells : int
-        In all.
+        Total number of cells.
     done : int, optional
         Cells done in an earlier run.
     as_json : bool, optional
-        One line of JSON a second at most, on standard output, instead of a bar on a terminal, or a line a minute on
-        standard error where that is none.
+        Print up to one JSON line per second on standard output, instead of a bar on a terminal or a line per minute on
+        standard error.
     """
 
     # Work and its counted units; decimals of the rate in JSON, and the text of a line with its scale.

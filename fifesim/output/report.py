@@ -12,15 +12,16 @@ from PIL import Image
 from fifesim.analysis.regression_labels import matched, regress
 from fifesim.base import files
 from fifesim.chain.comparison import TYPICAL_LAI, engine_error
-from fifesim.grids import cf
+from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
 from fifesim.output.colours import axis_label, capital, draw_line, finite, percentile_limits
 from fifesim.output.folders import versions
 from fifesim.output.maps import encoded, false_colour_names, image_map, relief_map, rendered, stretch_of, value_map
 from fifesim.scenario.ensemble import realise
-from fifesim.scenario.scenario import grid_keys, summary
+from fifesim.scenario.scenario import grid_keys, is_on_site, summary, time_in_words
 from fifesim.scenario.simulation import setup_of
 from fifesim.sensor.description.listing import blur_in_words, noise_in_words, sensor_in_words
+from fifesim.sensor.description.spatial_response import knows_blur
 from fifesim.sensor.labels import to_reflectance
 
 # Colours of the palette of a picture.
@@ -36,7 +37,7 @@ def page_html(template, **values):
 def png(figure, dpi):
     """Bytes of a PNG file of a figure, reproducible, with a palette."""
     figure.set_dpi(dpi)
-    # Unlike savefig, this lays the figure out and draws it once.
+    # Unlike savefig, this computes the layout and draws only once.
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     drawn, buffer = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]), io.BytesIO()
@@ -55,7 +56,7 @@ def fixed(value, digits=2, sign=False):
 
 
 def plus_minus(value, digits=1):
-    """Text of a standard error to follow its number."""
+    """Text of a standard error, to be placed after its number."""
     return f" ± {value:.{digits}f}" if np.isfinite(value) else ""
 
 
@@ -73,22 +74,22 @@ _PAPERS_INSTRUMENT = "TM"
 
 
 def pairing_rows(scenario, fits):
-    """R2 in Table 2 of Friedl et al. (1995) for the ground of a run, and why it is lower, as two rows or none."""
+    """Published R2 for the ground of a run, and the reason for the difference, as two rows or none."""
     paper, own = _paper_r2(scenario), scenario.sensor
     if paper is None or "lai" not in fits or own.interval != "product" or own.description.name != _PAPERS_INSTRUMENT:
         return []
     interval = own.description.ground_intervals(own.description.select(own.bands)[0])[0]
     why = (
-        f"{paper:.2f}, and {fits['lai'].r2:.2f} here, where pixels lie on the blocks of ground that they are compared "
-        f"with. There, as fifesim reads Table 1, they lie {interval:.3f} m apart, and drift from blocks of "
-        f"{own.size:g} m"
+        f"{paper:.2f}, and {fits['lai'].r2:.2f} here, where pixels coincide with the blocks of ground that they are "
+        f"compared with. In the paper, if Table 1 is read literally, they are {interval:.3f} m apart and drift from "
+        f"blocks of {own.size:g} m"
     )
-    typed = f'type interval = "native" in [sensor] and width = height = {_EDGE:g} in [grid], or fifesim reproduce'
+    typed = f'use interval = "native" in [sensor] and width = height = {_EDGE:g} in [grid], or fifesim reproduce'
     found = _papers_pairing(scenario)
     if found is not None:
         cells, r2 = found
-        typed = f"R² {r2:.2f} over {cells} x {cells} cells of this ground, level: {typed}"
-    return [("R² in Table 2 of Friedl et al. (1995), LAI", why), ("With pixels paired so", typed)]
+        typed = f"R² {r2:.2f} for {cells} x {cells} cells of this ground on level terrain: {typed}"
+    return [("R² of LAI in Table 2 of Friedl et al. (1995)", why), ("With drifting pixels", typed)]
 
 
 def _paper_r2(scenario):
@@ -131,10 +132,10 @@ def fit_figure(image, truth, name, fit):
     draw_line(axis, fit, (x[both].min(), x[both].max()))
     sign = "+" if fit.slope >= 0 else "−"
     index = cf.QUANTITIES["ndvi"].label
-    title = f"{fit.intercept:.3f} {sign} {abs(fit.slope):.3f} {index},  R² = {fit.r2:.3f},  n = {fit.n}"
+    title = f"{fit.intercept:.3f} {sign} {abs(fit.slope):.3f} {index},  n = {fit.n}"
     axis.set(xlabel=f"{index} at the top of the atmosphere", ylabel=f"True {axis_label(name)}")
     axis.set_title(title.replace("-", "−"), fontsize=10)
-    # Above all that is drawn, whichever way the line goes; not below the least that the quantity can be.
+    # The range includes everything drawn, and excludes values below the physical minimum.
     low, high = axis.get_ylim()
     lowest = cf.QUANTITIES[name].lowest
     low = low if lowest is None else max(low, lowest)
@@ -150,7 +151,7 @@ def _density(axis, beside, x, y):
     shown = np.log10(np.where(count > 0, count, np.nan)).T
     extent = [across[0], across[-1], up[0], up[-1]]
     most = max(float(np.nanmax(shown)), 0.5)
-    # Even one pixel is to be seen: the lightest colour is a grey.
+    # The lightest colour is grey, so that a single pixel is visible.
     style = {"cmap": "Greys", "vmin": -0.35 * most, "vmax": most, "aspect": "auto", "origin": "lower"}
     drawn = axis.imshow(shown, extent=extent, interpolation="nearest", **style)
     bar = axis.figure.colorbar(drawn, cax=beside, boundaries=np.linspace(0, most, 64))
@@ -198,11 +199,11 @@ def reflectance_change(dn, level, band):
 
 
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
-# Resolution of figures, which pages show at half of it or less. [dots per inch]
+# Resolution of figures, twice the displayed resolution. [dots per inch]
 _DPI = 200
-# Rows or columns beyond which maps skip pixels of an image. [pixel]
+# Maximum rows or columns of maps; larger images are subsampled. [pixel]
 _MOST = 600
-# Difference of 5S from successive orders beyond which the report advises another engine. [1]
+# Error of 5S beyond which the report suggests another engine. [1]
 _ENGINE_BOUND = 0.02
 
 
@@ -215,14 +216,17 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
     figures = {name: png(fit_figure(shown, means, name, fit), _DPI) for name, fit in fits.items()}
     html = page_html(
         _TEMPLATE,
-        title=title(scenario),
+        title=headline(scenario),
+        ground=ground_in_words(scenario),
         provenance=scenario.provenance(),
-        finding=finding(truth, fits, reasons),
+        finding=finding(fits, reasons),
+        results=main_results(truth, shown, means, fits),
+        inputs=inputs_in_words(scenario, image),
+        cautions=cautions(scenario),
+        one_stand=scenario.landscape.is_one(),
         pairing=pairing(scenario, image, truth),
-        summary=_summary(scenario, image, truth, fits, reasons)
-        + pairing_rows(scenario, fits)
-        + _ground(terrain)
-        + engine_rows(scenario),
+        published=pairing_rows(scenario, fits),
+        summary=_summary(scenario, image, truth, reasons) + _ground(terrain) + engine_rows(scenario),
         seen={"whole": whole, "close": close, "colours": false_colour_names(image["dn"])},
         maps=_maps(shown, means, fits),
         terrain=[] if terrain is None else _terrain_maps(image, terrain, level),
@@ -235,35 +239,100 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
     return encoded(whole.pixels, lossless=True), html
 
 
-def finding(truth, fits, reasons):
-    """Result of a run in one or two sentences."""
-    if not fits:
-        why = "; ".join(dict.fromkeys(reasons.values()))
-        return f"No line was fitted: {why}" if why else "The bands make no NDVI, so that no line was fitted."
-    shares = [f"{100 * fit.r2:.1f} % of the variance of true {_label(name)}" for name, fit in fits.items()]
-    text = f"A straight line on the NDVI of this image explains {' and '.join(shares)}."
-    name, fit = next(iter(fits.items()))
-    mean = float(truth[name].mean())
-    share = f", {100 * fit.residual_deviation / mean:.0f} % of the mean" if mean > 0 else ""
-    return f"{text} What it misses of {_label(name)} has a standard deviation of {fit.residual_deviation:.3f}{share}."
+def headline(scenario):
+    """Title of a page: instrument, place, date, and the synthetic parts."""
+    time = scenario.geometry.time
+    when = "" if time is None else f", {time_in_words(time)}"
+    synthetic = summary(scenario)
+    text = f"Simulated {scenario.sensor.description.title} image, {_place(scenario)}{when}"
+    return f"{text} ({synthetic})" if synthetic else text
+
+
+def _place(scenario):
+    """Name or position of the centre of a scene."""
+    if is_on_site(scenario):
+        return "FIFE site"
+    longitude, latitude = projection.middle(scenario.geobox())
+    sides = "N" if latitude >= 0 else "S", "E" if longitude >= 0 else "W"
+    return f"{abs(latitude):.2f}° {sides[0]}, {abs(longitude):.2f}° {sides[1]}"
+
+
+def finding(fits, reasons):
+    """Reason for missing regressions; empty if there are some."""
+    if fits:
+        return ""
+    why = "; ".join(dict.fromkeys(reasons.values()))
+    return f"No line was fitted: {why}" if why else "No line was fitted, because the bands have no NDVI."
+
+
+def main_results(truth, shown, means, fits):
+    """Main results, each as value, name and explanation."""
+    found = []
+    for name, fit in fits.items():
+        mean = float(truth[name].mean())
+        share = f", {100 * fit.residual_deviation / mean:.0f} % of the mean" if mean > 0 else ""
+        text = f"standard deviation of true {_label(name)} about a line on NDVI{share}; R² = {fit.r2:.3f}"
+        found.append((f"± {fit.residual_deviation:.3f}", _label(name), text))
+    if "lai" in fits:
+        low, high = np.nanpercentile(_line_error(shown, means, fits["lai"]), [5, 95])
+        text = "difference of LAI from the line and true LAI, 5th to 95th percentile of the pixels (map below)"
+        found.append((f"{fixed(low, 2, True)} to {fixed(high, 2, True)}", "LAI error", text))
+    return found
+
+
+def _line_error(shown, means, fit):
+    """LAI from a line on NDVI minus true LAI, dims (y, x). [m2 m-2]"""
+    values, ndvi = matched(means["lai"], shown["ndvi"], "index")
+    error = means["lai"].isel(y=slice(values.sizes["y"]), x=slice(values.sizes["x"]))
+    return error.copy(data=fit.predict(ndvi.values) - values.values)
+
+
+def inputs_in_words(scenario, image):
+    """Main inputs in one line: scene, pixels, sun, view and atmosphere."""
+    grid, air, dn = scenario.grid, scenario.model_atmosphere(), image["dn"]
+    aerosol = f"visibility {air.visibility:g} km" if air.visibility is not None else f"aerosol thickness {air.aot:g}"
+    view = f"view zenith {scenario.geometry.vza:g}°" if scenario.geometry.vza else "nadir view"
+    return (
+        f"{grid.width / 1000:g} km x {grid.height / 1000:g} km in cells of {grid.cell:.3g} m, pixels of "
+        f"{scenario.sensor.pixel:g} m; sun zenith {float(dn['sza']):.1f}°, {view}; {air.profile} atmosphere, "
+        f"{air.aerosol} aerosol, {aerosol}, {air.engine}."
+    )
+
+
+def cautions(scenario):
+    """Limitations of a run, each as a sentence."""
+    own, found = scenario.sensor, []
+    for _, text in engine_rows(scenario):
+        if "beyond" in text:
+            found.append(f"Error of 5S compared with successive orders: {text}.")
+    if not any(own.offset):
+        error = own.description.geolocation
+        size = f"; the product has a geolocation error of {error:g} m" if error else ""
+        found.append(f"Pixels are assumed to be perfectly registered{size}.")
+    if not own.noise:
+        found.append("No detector noise is simulated.")
+    unknown = [band.name for band in own.description.select(own.bands) if not knows_blur(own.description, band)]
+    if unknown:
+        found.append(f"Only the detector response of {', '.join(unknown)} is known, so the image is too sharp.")
+    return found
 
 
 def pairing(scenario, image, truth):
-    """Sentence about the ground with which each pixel is compared."""
+    """Text on the ground with which each pixel is compared."""
     block, cell = grids.cell_size(grids.geobox(truth["lai"]))[1], grids.cell_size(scenario.geobox())[1]
     pairs = ((image[axis].values, truth[axis].values) for axis in ("y", "x"))
     apart = [np.abs(np.subtract(*(each[: min(map(len, pair))] for each in pair))).max() for pair in pairs]
     text = (
-        "Each point pairs a pixel of the image with the block of ground in the same row and column of the truth: the "
+        "Each point is a pixel of the image and the block of ground in the same row and column of the truth: the "
         f"mean of {block / cell:.3g} x {block / cell:.3g} cells of {cell:.3g} m, a square of {block:g} m. "
     )
     if max(apart) < 1e-3 * block:
         text += "Pixels and blocks have the same centres"
     else:
-        text += f"Centres lie up to {np.hypot(*apart):.1f} m apart"
+        text += f"Their centres are up to {np.hypot(*apart):.1f} m apart"
     if any(scenario.sensor.offset):
         down, right = scenario.sensor.offset
-        text += f", and the pixels see ground {down:g} pixels further south and {right:g} further east than they say"
+        text += f", and the footprints are {down:g} pixels further south and {right:g} further east"
     return text + "."
 
 
@@ -299,10 +368,8 @@ def _maps(shown, means, fits):
         return [*maps, value_map(means["fpar"], f"True {_label('fpar')}")]
     maps.append(value_map(shown["ndvi"], f"{_label('ndvi')} of the image"))
     if "lai" in fits:
-        values, ndvi = matched(means["lai"], shown["ndvi"], "index")
-        error = means["lai"].isel(y=slice(values.sizes["y"]), x=slice(values.sizes["x"]))
-        error = error.copy(data=fits["lai"].predict(ndvi.values) - values.values)
-        maps.append(value_map(error, f"{_label('lai')} by the line, less the true one", "RdBu", middle=0.0))
+        error = _line_error(shown, means, fits["lai"])
+        maps.append(value_map(error, f"{_label('lai')} from the line minus true {_label('lai')}", "RdBu_r", middle=0.0))
     return maps
 
 
@@ -315,7 +382,7 @@ def _terrain_maps(image, terrain, level):
         relief_map(terrain["dem"], f"{capital(axis_label('dem'))}, lit from the north-west"),
         value_map(terrain["slope"], f"{capital(axis_label('slope'))}, mean of the cells"),
         value_map(terrain["kt"].sel(band=band), f"{_label('kt')} in {band}, mean of the cells"),
-        value_map(change, f"What terrain did to the reflectance in {band}", "RdBu_r", middle=0.0),
+        value_map(change, f"Effect of terrain on reflectance in {band}", "RdBu_r", middle=0.0),
     ]
 
 
@@ -327,15 +394,20 @@ def engine_rows(scenario):
     text = ", ".join(f"{band} {100 * each:+.1f} %" for band, each in error.items())
     outside = ", ".join(band for band, each in error.items() if abs(each) > _ENGINE_BOUND)
     advice = f'beyond 2 % in {outside}: engine = "successive-orders" is closer' if outside else "within 2 %"
-    return [(f"5S less successive orders, over a canopy of leaf area {TYPICAL_LAI:g}", f"{text}; {advice}")]
+    return [(f"5S minus successive orders, for a canopy with LAI {TYPICAL_LAI:g}", f"{text}; {advice}")]
+
+
+def ground_in_words(scenario):
+    """Classes and leaf area of the ground of a scenario."""
+    ground = scenario.ground
+    if scenario.landscape.cover != "none":
+        return f"{', '.join(scenario.class_table())} in {Path(scenario.landscape.cover).name}"
+    return Path(ground.lai_file).name if ground.lai_file else f"{ground.distribution}, arp {ground.arp:g}"
 
 
 def title(scenario):
     """Title of a run or a budget: ground, instrument and synthetic parts."""
-    ground = scenario.ground
-    scene = Path(ground.lai_file).name if ground.lai_file else f"{ground.distribution}, arp {ground.arp:g}"
-    if scenario.landscape.cover != "none":
-        scene = f"{', '.join(scenario.class_table())} in {Path(scenario.landscape.cover).name}"
+    scene = ground_in_words(scenario)
     seen, synthetic = f"{scene}, seen by {Path(scenario.sensor.instrument).name}", summary(scenario)
     return f"{seen} ({synthetic})" if synthetic else seen
 
@@ -349,14 +421,14 @@ def _thinned(rasters, step):
     return rasters.isel({axis: slice(step // 2, None, step) for axis in ("y", "x")}).compute()
 
 
-def _summary(scenario, image, truth, fits, reasons):
+def _summary(scenario, image, truth, reasons):
     """Rows of a small table with the main facts of a run."""
     grid, own, pixels = scenario.grid, scenario.sensor, image["dn"]
     valid = float((pixels != 0).all("band").mean())
     size = f"{pixels.sizes['y']} x {pixels.sizes['x']}"
     rows = [
         ("Scene", f"{grid.width / 1000:g} km x {grid.height / 1000:g} km in cells of {grid.cell:.3g} m, {grid.crs}"),
-        ("Image", f"{size} pixels of {own.pixel:g} m, {100 * valid:.1f} % of them with data"),
+        ("Image", f"{size} pixels of {own.pixel:g} m" + ("" if valid == 1 else f", {100 * valid:.1f} % with data")),
         ("Sensor", sensor_in_words(own.description, own.bands)),
         ("Blur", blur_in_words(own.description, own.bands)),
         ("Noise", noise_in_words(own.description, own.bands, own.noise)),
@@ -366,8 +438,7 @@ def _summary(scenario, image, truth, fits, reasons):
         label = f"{capital(_label(name))} of the pixels"
         mean, deviation = (fixed(float(each), 3) for each in (values.mean(), values.std()))
         rows.append((label, f"mean {mean}, standard deviation {deviation}"))
-    found = {name: f"{fit.r2:.3f}" for name, fit in fits.items()} | {name: f"none, {reasons[name]}" for name in reasons}
-    return rows + [(f"R² of {_label(name)} on NDVI", text) for name, text in found.items()]
+    return rows + [(f"R² of {_label(name)} on NDVI", f"none, {why}") for name, why in reasons.items()]
 
 
 def _ground(terrain):

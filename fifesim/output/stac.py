@@ -26,13 +26,13 @@ _COG = "image/tiff; application=geotiff; profile=cloud-optimized"
 
 # Files of a folder in the order of the item: key, title, media type and roles.
 _ASSETS = {
-    "image.tif": ("image", "What the instrument records, digital numbers", _COG, ["data"]),
-    "truth.tif": ("truth", "True means of the ground below the pixels", _COG, ["data"]),
-    "scene.tif": ("scene", "Ground by cells", _COG, ["data"]),
-    "scene.zarr": ("scene", "Ground by cells", "application/vnd+zarr", ["data"]),
+    "image.tif": ("image", "Digital numbers of the image", _COG, ["data"]),
+    "truth.tif": ("truth", "True means of ground properties over the pixels", _COG, ["data"]),
+    "scene.tif": ("scene", "Ground cells", _COG, ["data"]),
+    "scene.zarr": ("scene", "Ground cells", "application/vnd+zarr", ["data"]),
     "quicklook.png": ("thumbnail", "Scene and image", "image/png", ["thumbnail"]),
     "report.html": ("report", "Report of the run", "text/html", ["metadata"]),
-    "scenario.toml": ("scenario", "All that the run needs to be made again", "application/toml", ["metadata"]),
+    "scenario.toml": ("scenario", "All inputs for repeating the run", "application/toml", ["metadata"]),
 }
 
 # Fields of a band that are also part of the extension for electro-optical bands.
@@ -137,7 +137,7 @@ def _properties(scenario):
         "gsd": own.size,
         **{name: round(float(value), 9) for name, value in view.items()},
         "processing:software": versions(),
-        "processing:lineage": "Simulated by fifesim; the asset scenario holds every number that it took.",
+        "processing:lineage": "Simulated by fifesim; the asset scenario has all parameters.",
     }
 
 

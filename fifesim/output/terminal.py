@@ -28,7 +28,7 @@ from fifesim.base.messages import LOG, is_quiet, quiet
 
 @contextmanager
 def interrupts_blocked():
-    """Context in which Ctrl-C is delayed: KeyboardInterrupt is raised at its end."""
+    """Context that delays Ctrl-C: KeyboardInterrupt is raised at its end."""
     # An interrupted import fails in other ways, and processes started within the context never receive Ctrl-C.
     handler = signal.getsignal(signal.SIGINT)
     can_block = threading.current_thread() is threading.main_thread() and hasattr(signal, "pthread_sigmask")
@@ -36,7 +36,7 @@ def interrupts_blocked():
         # In another thread, on Windows, and where Ctrl-C is ignored or has another handler.
         yield
         return
-    # The mask is for processes that are started. In this one, another thread may take the signal.
+    # The mask protects child processes. In this process, another thread may receive the signal.
     pressed = []
     signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -64,21 +64,21 @@ class Exit(IntEnum):
     INTERRUPTED = 130
 
 
-class Door(TyperGroup):
-    """Common exit of all commands: an error or Ctrl-C is one line, and the exit code tells the kind."""
+class Commands(TyperGroup):
+    """Common exit of all commands. Errors and Ctrl-C print one line, and the exit code tells them apart."""
 
     def main(self, *arguments, **options):
         """Run the command line, and exit with its code."""
         try:
             with warnings.catch_warnings():
-                warnings.showwarning = tell
+                warnings.showwarning = print_warning
                 code = super().main(*arguments, **options | {"standalone_mode": False})
             if code == Exit.INTERRUPTED:
                 # typer turns Ctrl-C into this code.
                 raise KeyboardInterrupt
             sys.exit(code)
         except (KeyboardInterrupt, typer.Abort):
-            stop("interrupted; nothing is written", Exit.INTERRUPTED)
+            stop("interrupted; nothing was written", Exit.INTERRUPTED)
         except _UsageError as error:
             error.message = in_a_line(error.message)
             error.show()
@@ -86,7 +86,7 @@ class Door(TyperGroup):
         except (ValueError, FileNotFoundError, IsADirectoryError) as error:
             stop(error, Exit.MISTAKE)
         except (OSError, MemoryError, RuntimeError, ImportError) as error:
-            stop(error or "memory does not suffice", Exit.FAILURE)
+            stop(error or "out of memory", Exit.FAILURE)
 
 
 def _be_quiet(context: typer.Context, wanted: bool):
@@ -99,11 +99,9 @@ def _be_verbose(context: typer.Context, times: int):
         context.with_resource(listening(logging.INFO if times == 1 else logging.DEBUG))
 
 
-Quiet = Annotated[
-    bool, typer.Option("--quiet", "-q", callback=_be_quiet, help="No progress and no list of files; mistakes stay.")
-]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_be_quiet, help="Only print errors.")]
 Verbose = Annotated[
-    int, typer.Option("--verbose", "-v", count=True, callback=_be_verbose, help="Say each step; -vv its parts too.")
+    int, typer.Option("--verbose", "-v", count=True, callback=_be_verbose, help="Print each step; -vv for more detail.")
 ]
 """Options of long commands; their callbacks take effect before the command begins."""
 
@@ -131,7 +129,7 @@ def listening(level):
 
 @contextmanager
 def importing():
-    """Context for slow imports, with which a command on scenes begins."""
+    """Context for slow imports at the start of a command."""
     # Imported objects are permanent: garbage collection among them takes a sixth of the import time, and half of the
     # time at exit. The number of BLAS threads is set afterwards, as numpy comes with the package.
     atexit.register(gc.freeze)
@@ -146,34 +144,40 @@ def importing():
             threadpool_limits(1, user_api="blas")
 
 
-def say(*texts, err=False):
+def print_lines(*texts, err=False):
     """Print texts without control characters."""
     for text in texts:
         typer.echo("\n".join(in_a_line(line, sys.maxsize) for line in str(text).split("\n")), err=err)
 
 
-def tell(message, *_):
+def print_warning(message, *_):
     """Print a warning as a line."""
-    say(in_a_line(f"fifesim: warning: {message}"), err=True)
+    print_lines(in_a_line(f"fifesim: warning: {message}"), err=True)
 
 
 @contextmanager
 def kept(output):
-    """Context that tells a user who interrupts a run what remains of it."""
+    """Context that reports the remaining files when a run is interrupted."""
     try:
         yield
     except KeyboardInterrupt:
-        left = f"what is finished is kept, go on with --resume -o {output}" if output.exists() else "nothing is written"
+        left = (
+            f"finished blocks are kept, continue with --resume -o {output}"
+            if output.exists()
+            else "nothing was written"
+        )
         stop(f"interrupted; {left}", Exit.INTERRUPTED)
 
 
 def report(files, seconds, look, as_json=False, finished=False):
     """Print the files that a command has made, its duration and the file to open, unless quiet."""
     if as_json:
-        say(json.dumps({"event": "finished", "files": [str(path) for path in files], "seconds": round(seconds, 1)}))
+        print_lines(
+            json.dumps({"event": "finished", "files": [str(path) for path in files], "seconds": round(seconds, 1)})
+        )
     elif not is_quiet():
-        done = "this run was finished before, nothing is left to do" if finished else f"done in {in_time(seconds)}"
-        say(*files, f"{done}: open {look}")
+        done = "this run is already finished" if finished else f"done in {in_time(seconds)}"
+        print_lines(*files, f"{done}: open {look}")
 
 
 def in_time(seconds):
@@ -188,13 +192,13 @@ def stop(error, code):
     """Exit with a message and a code."""
     lines = str(error).split("\n")
     length = max(_LONGEST // len(lines), _SHORTEST)
-    say(
+    print_lines(
         "\n".join(in_a_line(line, length) for line in ["fifesim: " + lines[0], *lines[1:]][: _LONGEST // _SHORTEST]),
         err=True,
     )
     try:
         sys.stdout.flush()
     except OSError:
-        # Otherwise the interpreter would report the failed flush again at its end, with a traceback.
+        # Otherwise the interpreter would report the failed flush again at exit, with a traceback.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(code)

@@ -1,1 +1,1 @@
-"""Scenarios: every number of a run with its unit, and its simulation."""
+"""Scenarios: all parameters of a run with their units, and its simulation."""

@@ -1,4 +1,4 @@
-"""Chips of a study: the landscape and window of each, and the values drawn for it."""
+"""Chips of a study: their landscapes, windows and drawn values."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from fifesim.scenario.studies import Study
 
 
 def first_cell_of_chip(number, size, corner, tile, margin=(0, 0)):
-    """First row and column on the lattice of a chip of a landscape."""
-    # Chips fill one tile of the lattice after the other, in squares around the tile of the corner, without overlap. A
-    # tile also holds the margin around its chips, so that no chip needs two.
+    """First row and column of a chip on the lattice of its landscape."""
+    # Chips do not overlap. They fill the tiles of the lattice in squares around the tile of the corner. A tile also
+    # holds the margin around its chips, so a chip never needs two tiles.
     fitting = [max(tile - 2 * around, 0) // length for length, around in zip(size, margin, strict=True)]
     if not all(fitting):
         down, across = ring_place(number)
@@ -36,12 +36,12 @@ def first_cell_of_chip(number, size, corner, tile, margin=(0, 0)):
 
 
 def ring_place(number):
-    """Row and column of a number on a square spiral."""
+    """Row and column of the n-th position on a square spiral."""
     if not number:
         return 0, 0
     ring = (math.isqrt(number) + 1) // 2
     side, step = divmod(number - (2 * ring - 1) ** 2, 2 * ring)
-    # Up the right side first, then leftward, down and rightward.
+    # A ring starts up its right side, then goes left, down and right.
     along = step - ring + 1
     return [(-along, ring), (-ring, -along), (along, -ring), (ring, along)][side]
 
@@ -59,9 +59,9 @@ class Chips:
     ----------
     study : fifesim.scenario.studies.Study
     landscape : array of int, shape (n,)
-        Number of the landscape of each.
+        Landscape number of each chip.
     split : array of str, shape (n,)
-        Part of the dataset, which is the one of its landscape.
+        Part of the dataset to which the chip belongs. All chips of a landscape belong to the same part.
     corners : array, shape (n, 2)
         Easting and northing of the upper left corner. [m]
     columns : mapping of NamedKey to list
@@ -88,9 +88,9 @@ class Chips:
             raise ValueError(f"chip {chip}: {error}") from None
 
     def table(self):
-        """Drawn values and places of the chips, dims (chip,), by full key name."""
+        """Drawn values and locations of the chips, dims (chip,), by full key name."""
         variables = {
-            "landscape": (self.landscape, {"long_name": "number of the landscape, which chips of one split share"}),
+            "landscape": (self.landscape, {"long_name": "landscape number; chips of a landscape belong to one split"}),
             "split": (self.split, {"long_name": "part of the dataset"}),
             "west": (self.corners[:, 0], {"long_name": "easting of the upper left corner", "units": "m"}),
             "north": (self.corners[:, 1], {"long_name": "northing of the upper left corner", "units": "m"}),
@@ -111,22 +111,22 @@ def chips_of(study: Study, n: int) -> Chips:
     ----------
     study : fifesim.Study
     n : int
-        How many.
+        Number of chips.
 
     Returns
     -------
     chips : Chips
-        The first are the same however many there are.
+        The first chips do not depend on `n`.
 
     Raises
     ------
     ValueError
-        If there is none.
+        If `n` is below 1.
 
     Notes
     -----
-    Every round of as many chips as there are landscapes has one chip of each, in a drawn order: points of a sequence
-    that a landscape took in turn would lie in one part of the space.
+    Chips are assigned in rounds. Each round has one chip from every landscape, in random order. In a fixed order, the
+    points of the sequence assigned to one landscape could cluster in part of the parameter space.
 
     References
     ----------
@@ -146,7 +146,7 @@ def chips_of(study: Study, n: int) -> Chips:
     True
     """
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
-        raise ValueError(f"n must be a whole number of chips from 1 up, got {n!r}")
+        raise ValueError(f"n must be an integer of at least 1, got {n!r}")
     count, landscapes = int(n), study.landscapes
     rounds = -(-count // landscapes)
     orders = [generator(study.seed, _ORDER, (0, each, 0, 0)).permutation(landscapes) for each in range(rounds)]
@@ -174,7 +174,7 @@ def _corners(study, rounds):
 
 
 def _drawn(study, count, landscape):
-    """Values of the drawn keys, by landscape or by chip."""
+    """Values of the drawn keys, one for each chip."""
     shared = {key: distribution for key, distribution in study.drawn.items() if is_of_a_landscape(key)}
     own = {key: distribution for key, distribution in study.drawn.items() if key not in shared}
     found = {}
@@ -186,12 +186,12 @@ def _drawn(study, count, landscape):
 
 
 def is_of_a_landscape(key):
-    """Whether a key is drawn for each landscape, because it determines the random field whose tiles chips share."""
+    """Whether a key is drawn once for each landscape, because it determines the random field shared by its chips."""
     return key.key in ("arp", "arps") or (key.key == "seed" and key.place != ("sensor",))
 
 
 def _seeds(study, count, landscape):
-    """Seeds of landscapes, of synthetic hills and of noise, as far as needed."""
+    """Seeds of the landscapes, synthetic hills and noise that the scenario uses."""
     scenario = study.scenario
     found = {NamedKey(("ground",), "seed"): [scenario.ground.seed + int(at) for at in landscape]}
     if scenario.terrain.dem == "flint-hills":

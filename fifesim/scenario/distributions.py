@@ -1,4 +1,4 @@
-"""Distributions and space-filling sequences from which the keys of a scenario are drawn."""
+"""Distributions and space-filling sequences for drawing scenario keys."""
 
 import math
 import warnings
@@ -20,9 +20,9 @@ def points(sequence, seed, stream, count, dimensions):
     Parameters
     ----------
     sequence : {"sobol", "random"}
-        The first points are the same however many there are.
+        Type of sequence. The first points do not depend on `count`.
     seed, stream : int
-        Seed, and number of the sequence.
+        Seed, and stream number of the sequence.
     count, dimensions : int
 
     Returns
@@ -46,7 +46,7 @@ def points(sequence, seed, stream, count, dimensions):
     if sequence == "random":
         return random.random((count, dimensions))
     with warnings.catch_warnings():
-        # A training set has as many chips as its user wants, not a power of two.
+        # The number of chips is chosen by the user, and is rarely a power of two.
         warnings.filterwarnings("ignore", "The balance properties of Sobol")
         return qmc.Sobol(dimensions, scramble=True, seed=random).random(count)
 
@@ -54,20 +54,20 @@ def points(sequence, seed, stream, count, dimensions):
 SEQUENCES = ("sobol", "random")
 """Names of the sequences of points."""
 
-# Values of each kind of distribution in words, and the second key of its table.
+# Description of the values of each distribution, and the second key of its table.
 _KINDS = {
     "uniform": "[low, high]",
     "log-uniform": "[low, high], both above 0",
     "normal": "[mean, standard deviation] with within = [low, high]",
-    "choice": "a list of values, perhaps with weights = [...]",
-    "integers": "[first, last], whole numbers",
+    "choice": "a list of values, optionally with weights = [...]",
+    "integers": "[first, last], both integers",
 }
 _BESIDE = {"normal": "within", "choice": "weights"}
 
 
 @dataclass(frozen=True)
 class Distribution:
-    """Distribution from which a key of a scenario is drawn; from `distribution_of`."""
+    """Distribution from which a scenario key is drawn; see `distribution_of`."""
 
     kind: str
     values: tuple
@@ -75,8 +75,8 @@ class Distribution:
     weights: tuple = ()
 
     def quantile(self, share):
-        """Values at shares of the distribution, in the unit of the key, shape (n,)."""
-        # The inverse of the distribution function, so that evenly spaced shares give evenly spaced draws.
+        """Quantiles of the distribution, in the unit of the key, shape (n,)."""
+        # Inverse cumulative distribution function, so that evenly spread probabilities give evenly spread draws.
         share = np.asarray(share, float)
         if self.kind == "choice":
             edges = np.cumsum(self.weights or np.ones(len(self.values)))
@@ -92,7 +92,7 @@ class Distribution:
         else:
             mean, deviation = self.values
             found = stats.truncnorm.ppf(share, (low - mean) / deviation, (high - mean) / deviation, mean, deviation)
-        # Rounding stays within.
+        # Rounding errors must not exceed the limits.
         return np.clip(found, low, high).tolist()
 
     @property
@@ -107,7 +107,7 @@ class Distribution:
 
     @property
     def in_words(self):
-        """Text of kind and numbers."""
+        """Name and parameters of the distribution as text."""
         listed = ", ".join(map(_plain, self.values))
         if self.kind == "normal":
             return f"normal, mean and deviation {listed}, within {_plain(self.within[0])} to {_plain(self.within[1])}"
@@ -125,7 +125,7 @@ class Distribution:
 
 
 def distribution_of(table, convert=None):
-    """Distribution of a TOML table."""
+    """Distribution described by a TOML table."""
     if not isinstance(table, Mapping):
         raise ValueError(f"a distribution is a table such as {{ uniform = [5, 45] }}, got {shown(table)}")
     kinds = [name for name in table if name in _KINDS]
@@ -139,13 +139,13 @@ def distribution_of(table, convert=None):
     beside = _BESIDE.get(kind)
     for name in table:
         if name not in (kind, beside):
-            raise ValueError(f"{name} = {shown(table[name])} does not go with {kind}, which takes {_KINDS[kind]}")
+            raise ValueError(f"{name} = {shown(table[name])} is not a parameter of {kind}, which takes {_KINDS[kind]}")
     values = _listed(kind, table[kind], convert)
     if kind == "choice":
         return Distribution(kind, values, weights=_weights(values, table.get("weights")))
     if kind == "normal":
         if beside not in table:
-            raise ValueError(f"normal = {shown(table[kind])} needs within = [low, high] beside it, where it is cut off")
+            raise ValueError(f"normal = {shown(table[kind])} needs its limits: add within = [low, high]")
         within = _range(kind, _listed("within", table["within"], convert))
         if not values[1] > 0:
             raise ValueError(
@@ -156,7 +156,7 @@ def distribution_of(table, convert=None):
 
 
 def _listed(name, values, convert):
-    """Values of a list, which are two numbers except for choices."""
+    """Values of a list: two numbers, or any number of choices."""
     is_list = isinstance(values, list | tuple | np.ndarray) and len(values) > 0
     found = tuple(map(convert, values) if convert else values) if is_list else ()
     if not found or (name != "choice" and not (len(found) == 2 and all(map(_is_number, found)))):
@@ -171,7 +171,7 @@ def _range(kind, values):
     if kind == "log-uniform" and low <= 0:
         raise ValueError(f"log-uniform: both numbers must be above 0, got {low:g}: use uniform")
     if kind == "integers" and not all(isinstance(value, int) for value in values):
-        raise ValueError(f"integers must be [first, last], whole numbers, got {low:g} and {high:g}")
+        raise ValueError(f"integers must be [first, last], both integers, got {low:g} and {high:g}")
     return low, high
 
 
@@ -180,7 +180,7 @@ def _weights(values, weights):
         return ()
     fits = isinstance(weights, list | tuple) and all(_is_number(each) and each >= 0 for each in weights)
     if not fits or len(weights) != len(values) or not sum(weights) > 0:
-        raise ValueError(f"weights must be {len(values)} numbers, one for each choice, got {shown(weights)}")
+        raise ValueError(f"weights must be {len(values)} numbers, one per choice, got {shown(weights)}")
     return tuple(map(float, weights))
 
 

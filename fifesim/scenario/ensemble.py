@@ -1,4 +1,4 @@
-"""Many realisations of scenarios in memory: small scenes as arrays, without labels and graphs for each."""
+"""Many realisations of scenarios in memory. Small scenes are computed as plain arrays, without dask graphs."""
 
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -23,19 +23,19 @@ from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of, simulate, with_margin
 from fifesim.sensor.instrument_labels import attributes_of
 
-# Light of an image, by the names of its coordinates.
+# Coordinates of an image that describe its illumination and view.
 LIGHT = ("sza", "saa", "vza", "vaa", "earth_sun_distance")
 
-# Larger scenes are computed by chunks. [cell]
+# Larger scenes are computed in chunks. [cell]
 _LARGEST = 4_000_000
 
 
 def realise(scenario, *, complete=False):
-    """Image and truth of a scenario in memory, with the bits and coordinates of `fifesim.simulate`."""
-    # Scenes of the same grid, air, canopy or instrument share intermediate results, and scenes of the same seed and arp
-    # the tiles of their field: let them follow each other.
+    """Image and truth of a scenario in memory, identical to the result of `fifesim.simulate`."""
+    # Consecutive scenes share intermediate results if they have the same grid, atmosphere, canopy or instrument, and
+    # tiles of the random field if they have the same seed and arp.
     if not isinstance(scenario, Scenario):
-        raise TypeError(f"realise takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+        raise TypeError(f"realise needs a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     grid, setup = scenario.geobox(), setup_of(scenario)
     if _is_small(grid) and not varying_parts(setup):
         scene = _scene(scenario, grid, setup, complete)
@@ -45,7 +45,7 @@ def realise(scenario, *, complete=False):
 
 
 def realise_arrays(scenario, *, complete=False):
-    """Image and truth of a run as arrays, for small scenes whose labels would take longer than the simulation."""
+    """Image and truth as arrays, for small scenes where labels would take longer than the simulation."""
     grid, setup = scenario.geobox(), setup_of(scenario)
     if not _is_small(grid) or varying_parts(setup):
         image, truth = realise(scenario, complete=complete).values()
@@ -65,14 +65,14 @@ def _is_small(grid):
 
 
 class _Scene(NamedTuple):
-    """Land and reflectance of a scenario in memory: of one stand as arrays, else the land as a dataset."""
+    """Land and reflectance of a scenario in memory. The land is a dict of arrays for one stand, else a dataset."""
 
     driver: Driver
     setup: Setup
     grid: GeoBox
     """Cells of the scene, without a margin."""
     land: np.ndarray | xr.Dataset
-    """Within the scene."""
+    """Slices of the scene within the wider grid."""
     lit_grid: GeoBox
     """Cells of the reflectance, with the margin of a complete image."""
     reflectance: np.ndarray
@@ -87,7 +87,7 @@ def _scene(scenario, grid, setup, complete):
     is_one, dem, horizon = scenario.landscape.is_one() and not own.lai_file, None, None
     light = scenario_light_on_hills(scenario, wide, setup.geometry) if is_one else None
     if light is None and scenario.terrain.dem != "flat":
-        # Starting threads takes longer than computing so few cells.
+        # For so few cells, starting threads takes longer than the computation.
         with dask.config.set(scheduler="synchronous"):
             dem, horizon = in_memory(*elevation(scenario, wide)[:2])
     if not is_one:
@@ -130,7 +130,7 @@ def _labelled_image(scene):
 
 
 def _truth(scenario, scene):
-    """Means over the blocks of the truth: as arrays for one stand, else as a dataset."""
+    """Block means for the truth: a dict of arrays for one stand, else a dataset."""
     size, own = scenario.sensor.size, scene.setup
     if not scenario.landscape.is_one():
         return aggregate(truth_of(scenario, own, scene.land), size, min_valid=own.min_valid)
@@ -150,7 +150,7 @@ def _labelled_truth(scenario, scene):
 
 
 def _placed(variables, coordinates, others=None):
-    """Dataset on a grid; coordinates made for it are not compared."""
+    """Dataset on a grid, without comparing coordinates that were made for that grid."""
     for each in variables.values():
         each.encoding = {"grid_mapping": "spatial_ref"}
     bare = {name: each.variable for name, each in coordinates.items()}
@@ -161,14 +161,14 @@ def _driver(scenario, setup):
     """Driver of a setup, shared by scenarios that differ only in place and seeds."""
     others = {"grid": True, "ground": {"seed", "arp", "distribution", "method"}, "sensor": {"seed", "offset"}}
     if scenario.files:
-        # A file may change under its name.
+        # The content of a file may change while its name stays the same.
         return Driver(setup)
     return _known(_Keyed((scenario.model_dump_json(exclude=others), setup.geometry), setup))
 
 
 @dataclass(frozen=True)
 class _Keyed:
-    """A setup that is compared by a key."""
+    """A setup with a hashable key, for caching."""
 
     key: tuple
     setup: Setup = field(compare=False)

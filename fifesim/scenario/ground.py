@@ -20,20 +20,20 @@ from fifesim.ground.terrain.sky_labels import horizon_places
 from fifesim.ground.terrain.source_labels import elevation_grid
 from fifesim.scenario.keys import COVARIATES
 
-# The synthetic hills around a scene are made at this resolution, as its own horizons are. [m]
+# Resolution of the synthetic hills around a scene, equal to the resolution of its horizons. [m]
 _HILLS_AROUND = 30.0
 
-# A horizon has 32 numbers a cell: 16 MB in chunks of this size. [cell]
+# A horizon has 32 numbers per cell, so a chunk of this size takes 16 MB. [cell]
 _AROUND_CHUNK = 252
 
 
 def elevation(scenario, grid, chunks=None):
-    """Elevation of a scenario, the horizon of the land around, and their attributes; None on flat ground."""
+    """Elevation of a scenario, the horizon of the surrounding land, and their attributes; None on flat ground."""
     terrain = scenario.terrain
     if terrain.dem == "flat":
         return None, None, {}
     if terrain.dem == "flint-hills":
-        # One cell more on each side: slopes at the border are those of the wider land.
+        # One extra cell on each side, so that slopes at the border are exact.
         dem = flint_hills(grid.pad(1), terrain.seed, chunks=chunks)
         wider = _padded(grid, terrain.horizon_reach)
         around = flint_hills(wider, terrain.seed, chunks=_AROUND_CHUNK)
@@ -45,7 +45,7 @@ def elevation(scenario, grid, chunks=None):
         around, reach = source_dem(
             terrain.dem, grid, terrain.horizon_reach, chunks="auto", fill=fill, vertical_units=units
         )
-        # A few blocks of the file, at once: whether the sun shines is asked before anything is made.
+        # Reads a few blocks of the file now, to fail early if the sun is below the horizon.
         middle = around[_middle(around.shape)].compute(scheduler="synchronous")
     horizon = sky_labels.horizon(around, reach=terrain.horizon_reach, beside=dem)
     _check_sun(middle, around, horizon, scenario.sun_and_view())
@@ -53,8 +53,8 @@ def elevation(scenario, grid, chunks=None):
 
 
 def scenario_light_on_hills(scenario, grid, geometry):
-    """Last arguments of `slope_reflectance` for synthetic hills, in memory, with the bits of `elevation`, or None."""
-    # None where the sun is so low that all of the land around must be checked.
+    """Last arguments of `slope_reflectance` for synthetic hills, in memory, identical to `elevation`; or None."""
+    # None if the sun is so low that all surrounding land must be checked.
     terrain = scenario.terrain
     if terrain.dem != "flint-hills":
         return None
@@ -67,16 +67,16 @@ def scenario_light_on_hills(scenario, grid, geometry):
 
 
 def in_memory(dem, horizon):
-    """Elevation and horizon in memory, the horizon only above the elevation."""
+    """Elevation and horizon in memory; the horizon covers only the grid of the elevation."""
     if horizon is None:
         return dem if dem is None else dem.compute(), None
     _, (rows, columns) = horizon_places(elevation_grid(dem), horizon)
-    # A scene of a thousand pixels needs a hundredth of what lies within reach.
+    # A scene of a thousand pixels needs only 1 % of the terrain within the horizon reach.
     return dem.compute(), horizon.isel(y=rows, x=columns).compute()
 
 
 def cut(raster, grid):
-    """Cut a raster to a grid of its cells."""
+    """Crop a raster to a grid of the same cells."""
     rows, columns = grids.lattice_offset(grids.geobox(raster), grid)
     return raster.isel(y=slice(rows, rows + grid.shape.y), x=slice(columns, columns + grid.shape.x))
 
@@ -86,20 +86,20 @@ def _middle(shape):
 
 
 def _check_sun(middle, around, horizon, geometry):
-    """Raise ValueError if the sun is below the horizon everywhere; single chunks of lazy elevation cannot know."""
-    # Where no slope is as steep as the sun is high, all face it, and what hides it from them is lit itself.
+    """Raise ValueError if the sun is below the horizon everywhere, which chunks of a lazy elevation cannot detect."""
+    # If all slopes are less steep than the solar elevation, all face the sun, and terrain that shades others is lit.
     if float(terrain_labels.slope(middle).max()) < 90 - geometry.sza:
         return
     light = terrain_labels.illumination(around, geometry, horizon)
     for block in light.data.blocks.ravel():
         if np.any(block.compute() > 0):
             return
-    # Nowhere: the same on elevation in memory says so.
+    # The sun shines nowhere. The same computation in memory raises the error.
     terrain_labels.illumination(around.compute(), geometry, horizon.compute())
 
 
 def _padded(grid, margin):
-    """Coarse grid, on multiples of its cells from the origin of the CRS, that extends a margin around a fine one."""
+    """Coarse grid around a fine grid and a margin, aligned with the origin of the CRS."""
     height, width = grids.cell_size(grid)
     down, across = max(round(_HILLS_AROUND / height), 1) * height, max(round(_HILLS_AROUND / width), 1) * width
     box = grid.boundingbox
@@ -153,7 +153,7 @@ def _landscape(scenario, grid, chunks, dem):
 
 
 def warn_of_canopy(scenario):
-    """Warn if the optics of FIFE's tallgrass are used for a map of leaf area, or at another site."""
+    """Warn if the default tallgrass optics of FIFE are used for an LAI map or another site."""
     own = scenario.ground.lai_file
     if own or not on_fife_site(scenario.geobox()):
         name, classes = Path(own).name if own else "the scene", _classes(scenario)
@@ -163,7 +163,7 @@ def warn_of_canopy(scenario):
 
 
 def drawn_properties(scenario):
-    """Properties of the ground of a scenario that vary as fields, by name."""
+    """Ground properties of a scenario that vary as fields, by name."""
     land, own = scenario.ground, scenario.landscape
     return {
         name: Field(mean=getattr(land, name), sd=deviation, arp=own.arps.get(name, land.arp), coarser=own.coarser)
@@ -173,7 +173,7 @@ def drawn_properties(scenario):
 
 
 def check_leaf_area(scenario):
-    """Check that the canopy of each stand can hold the largest leaf area index of its distribution."""
+    """Check that the canopy of each stand allows the largest LAI of its distribution."""
     land, classes = scenario.ground, _classes(scenario)
     if land.lai_file:
         return
@@ -187,33 +187,33 @@ def check_leaf_area(scenario):
 
 
 def canopy_of(scenario):
-    """Canopy of the keys of [ground], without drawn properties and properties that every class defines."""
+    """Canopy from the keys of [ground], without properties that are drawn or defined by every class."""
     found = scenario.ground.canopy()
     left_out = {name for name in found.given if _all_have(scenario, name)} | set(drawn_properties(scenario))
     return found.replace(**dict.fromkeys(left_out))
 
 
 def truth_of(scenario, setup, land):
-    """True properties of the ground of a scenario with which an image is compared, by cells."""
+    """True ground properties of a scenario by cell, for comparison with an image."""
     absorbed = {name: absorbed_light(scenario, setup, land, kind) for name, kind in fpar_kinds(scenario).items()}
     varying = {name: each for name, each in land.data_vars.items() if name not in ("lai", "cover") and each.ndim == 2}
     return xr.Dataset({"lai": land["lai"], **absorbed, **varying})
 
 
 def fpar_kinds(scenario):
-    """Leaves whose absorbed light is part of the truth, by the name of the variable."""
+    """Leaves whose FPAR is part of the truth, by the name of the variable."""
     has_dead_leaves = any(numbers_of_stands(scenario, "brown")) or "brown" in drawn_properties(scenario)
     return {"fpar": "all"} | ({"green_fpar": "green"} if has_dead_leaves else {})
 
 
 def absorbed_light(scenario, setup, land, leaves="all"):
-    """Share of light absorbed by the leaves of a scenario, dims (y, x). [1]"""
+    """Fraction of light absorbed by leaves of a scenario, dims (y, x). [1]"""
     fpar_inf = scenario.ground.fpar_inf
     return fpar(land, canopy=setup.canopy, geometry=setup.geometry, leaves=leaves, fpar_inf=fpar_inf)
 
 
 def numbers_of_stands(scenario, name):
-    """Values of a property in the stands of a scenario where it is not drawn."""
+    """Values of a property in the stands of a scenario that do not draw it."""
     ground = [] if _all_have(scenario, name) else [getattr(scenario.ground, name)]
     return [*ground, *(getattr(each.canopy, name) for each in _classes(scenario) if name in each.canopy.given)]
 
@@ -229,6 +229,6 @@ def _classes(scenario):
 
 
 def _shares(scenario):
-    """Shares of the drawn classes, None if they are equal."""
+    """Area fractions of the drawn classes; None if they are equal."""
     shares = {name: stand.share for name, stand in scenario.classes.items()}
     return shares if any(shares.values()) else None

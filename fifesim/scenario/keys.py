@@ -1,4 +1,4 @@
-"""Every key of a scenario: default, unit, range and meaning. Physical limits are stated with the meaning."""
+"""All keys of a scenario: default, unit, range and meaning. `sections` adds the physical limits."""
 
 import math
 import re
@@ -16,32 +16,32 @@ from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
 
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 
-# Units of length by their power of ten. [m]
+# Power of ten of each unit of length. [m]
 _LENGTHS = {"km": 3, "m": 0, "cm": -2}
 
 
 def number(default, unit, description, **limits):
-    """Field of a key with a number, which may be optional by a default of None."""
+    """Field of a numeric key, optional if its default is None."""
     return Field(default, description=description, json_schema_extra={"unit": unit}, allow_inf_nan=False, **limits)
 
 
 def text(default, description):
-    """Field of a key with text or a switch."""
+    """Field of a key that is text or a switch."""
     return Field(default, description=description)
 
 
 def seed(default, description):
-    """Field of a key with a seed."""
+    """Field of a key that is a seed."""
     return Field(default, description=description, ge=0, lt=2**63, strict=True)
 
 
 def file(default, description, *, names=(), suffix=None):
-    """Field of a key with the path of a file, or one of some names."""
+    """Field of a key that is a file path, or one of several names."""
     return Field(default, description=description, json_schema_extra={"file": {"names": names, "suffix": suffix}})
 
 
 class Section(BaseModel):
-    """A table of the scenario. A number may be written with its unit, ``"45 km"``, a length in km, m or cm."""
+    """A table of the scenario. Numbers may have a unit, as in ``"45 km"``; lengths are in km, m or cm."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
 
@@ -54,7 +54,7 @@ class Section(BaseModel):
 
     @classmethod
     def in_unit(cls, key, value):
-        """Value of a key in its unit, from a number or a text such as ``"45 km"``."""
+        """Value of a key in its unit, from a number or text such as ``"45 km"``."""
         unit = cls.unit(key) if key in cls.model_fields else ""
         if unit and isinstance(value, bool):
             raise ValueError(f"{key} = {value}: {key} is in {unit}; write a number")
@@ -62,7 +62,7 @@ class Section(BaseModel):
             return value
         match = _QUANTITY.fullmatch(value.strip())
         if match is None and str in get_args(cls.model_fields[key].annotation):
-            # A key that takes words beside numbers.
+            # Such a key also accepts words.
             return value
         given = (match[2] or unit) if match else None
         if given != unit and not {given, unit} <= set(_LENGTHS):
@@ -74,12 +74,12 @@ class Section(BaseModel):
 
     @classmethod
     def unit(cls, key):
-        """Unit of a key, empty if it has none."""
+        """Unit of a key; empty if it has none."""
         return (cls.model_fields[key].json_schema_extra or {}).get("unit", "")
 
     @classmethod
     def names_a_file(cls, key, value):
-        """Whether the value of a key is the path of a file."""
+        """Whether the value of a key is a file path."""
         if not isinstance(value, str) or key not in cls.model_fields:
             return False
         kind = (cls.model_fields[key].json_schema_extra or {}).get("file")
@@ -92,21 +92,21 @@ class Section(BaseModel):
 
     @classmethod
     def name_or_raster(cls, key, value):
-        """Value of a key that is one of its names or the path of a raster file, else a ValueError."""
+        """Value of a key that is one of its names or the path of a raster file; otherwise raise ValueError."""
         names = cls.model_fields[key].json_schema_extra["file"]["names"]
         if value not in names and not cls.names_a_file(key, value):
-            allowed = f"allowed are {', '.join(names)}, or a raster file such as {key}.tif"
+            allowed = f"use {', '.join(names)}, or a raster file such as {key}.tif"
             raise ValueError(nearest(value, names) + allowed)
         return value
 
     @field_validator("*")
     @classmethod
     def _openable(cls, value, info):
-        """Check that a path can be written and is not empty; a missing file is reported by its reader."""
+        """Check that a path is valid text and not empty. Missing files are reported by their reader."""
         if cls.names_a_file(info.field_name, value):
             if not value:
-                raise ValueError("name a file, or drop the key")
-            value.encode()  # a ValueError where it could not be written
+                raise ValueError("name a file, or remove the key")
+            value.encode()  # ValueError if it cannot be encoded
             try:
                 check_regular(value)
             except (FileNotFoundError, NotADirectoryError):
@@ -122,35 +122,35 @@ class Section(BaseModel):
 
     @property
     def files(self):
-        """Paths of the files that the section names, by key."""
+        """Paths of the files named in the section, by key."""
         return {key: value for key, value in self if self.names_a_file(key, value)}
 
     def with_paths(self, change):
-        """Section with changed paths of its files."""
+        """Section with modified file paths."""
         return self.model_copy(update={key: change(value) for key, value in self.files.items()})
 
 
 COVERS = ("none", "pastures", "voronoi", "levels")
 VARYING = tuple(DRAWN)
 KEYS = {name: known for name, known in PROPERTIES.items() if known.default is not None}
-"""Properties of the canopy that are one key of a scenario."""
+"""Canopy properties that are single keys of a scenario."""
 COVARIATES = ("elevation", "wetness", "illumination")
 
-# By the name of a band, a spectrum or a part of a leaf.
+# Values by the name of a band, spectrum or leaf constituent.
 ByName = dict[str, Annotated[float, Field(strict=True, allow_inf_nan=False)]]
 LONGEST_NAME = 60
 _LEAF = "structure [1], chlorophyll, carotenoids, anthocyanins [ug cm-2], brown [1], water [cm], dry_matter [g cm-2]"
 
 
 class _LeafArea(Section):
-    """Leaf area of a stand of plants."""
+    """Leaf area of a stand."""
 
     distribution: str = file("burned-grazed", "LAI distribution: a treatment, or a .csv of LAI samples", suffix=".csv")
-    arp: float = number(0.15, "1", "autoregressive parameter; larger is smoother", ge=0, lt=0.25)
+    arp: float = number(0.15, "1", "autoregressive parameter; larger values give smoother fields", ge=0, lt=0.25)
 
 
 def _key(known):
-    """Type and field of a key for a property of the canopy."""
+    """Type and field of the key for a canopy property."""
     if not known.unit:
         return str, text(known.default, known.meaning)
     return float, number(known.default, known.unit, known.meaning, ge=known.lowest, le=known.highest)
@@ -159,9 +159,9 @@ def _key(known):
 _Structure = create_model("_Structure", __base__=_LeafArea, **{name: _key(known) for name, known in KEYS.items()})
 
 
-# mypy does not know classes that are made of a table.
+# mypy cannot follow classes built from a table.
 class StandKeys(_Structure):  # type: ignore[misc, valid-type]
-    """Leaf area, leaves and what lies below them, of a stand of plants."""
+    """Leaf area, leaves and background of a stand."""
 
     leaf_reflectance: ByName = text({}, "by band [1]; all bands or none")
     leaf_transmittance: ByName = text({}, "by band [1]; all bands or none")
@@ -177,64 +177,62 @@ class StandKeys(_Structure):  # type: ignore[misc, valid-type]
     def _names_that_print(cls, value):
         for name in value:
             if len(name) > LONGEST_NAME or not name.isprintable():
-                raise ValueError(f"{shown(name)} is no name: names have up to {LONGEST_NAME} characters that print")
+                raise ValueError(f"{shown(name)} is not a name: names have up to {LONGEST_NAME} printable characters")
         return value
 
     @model_validator(mode="after")
     def _one_description(self):
         for spectra, by_band in (("leaf", "leaf_reflectance"), ("background_spectra", "background")):
             if getattr(self, spectra) and getattr(self, by_band):
-                raise ValueError(f"{spectra} and {by_band} are both given: drop one of them")
+                raise ValueError(f"{spectra} and {by_band} are both given: remove one of them")
         return self
 
 
 class GroundKeys(StandKeys):
-    """Leaf area, leaves and what lies below them."""
+    """Leaf area, leaves and background."""
 
-    seed: int = seed(7, "of the random fields, a whole number")
-    method: Literal["streaming", "periodic"] = text("streaming", "streaming, or the paper's periodic (in memory)")
-    lai_file: str | None = file(None, "a LAI map to use instead of a random field")
+    seed: int = seed(7, "seed of the random fields")
+    method: Literal["streaming", "periodic"] = text("streaming", "streaming, or periodic as in the paper (in memory)")
+    lai_file: str | None = file(None, "LAI map to use instead of a random field")
     fpar_inf: float = number(0.94, "1", "FPAR of an infinitely thick canopy", gt=0, le=1)
 
 
 class ClassKeys(StandKeys):
-    """A class of cover; what it leaves out is that of [ground]."""
+    """A land cover class. Missing keys are taken from [ground]."""
 
-    share: float | None = number(None, "1", "of the ground, where cover is drawn; by default that of all", gt=0, le=1)
-    code: int | None = text(None, "in the map of cover; by default classes count from 1")
+    share: float | None = number(None, "1", "area fraction if cover is drawn; equal fractions by default", gt=0, le=1)
+    code: int | None = text(None, "code in the cover map; by default classes are numbered from 1")
 
     @property
     def written(self):
-        """Keys that differ from the ground's."""
+        """Keys that differ from [ground]."""
         return {key: known for key, known in super().written.items() if key in self.model_fields_set}
 
 
 class LandscapeKeys(Section):
-    """Classes of cover, and properties of the ground that vary; without them one stand is everywhere."""
+    """Land cover classes, and ground properties that vary. Without them, one stand covers the scene."""
 
     cover: str = file(
         "none",
-        "how classes lie: none; pastures, voronoi or levels, which are drawn; or a raster file of their codes",
+        "layout of the classes: none; pastures, voronoi or levels, which are drawn; or a raster file of class codes",
         names=COVERS,
         suffix="*",
     )
-    size: float = number(1200.0, "m", "of a pasture or patch that is drawn, along an edge or across", gt=0)
-    deviations: ByName = text(
-        {}, f"standard deviations [1] of what varies in fields that are drawn: {', '.join(VARYING)}"
-    )
-    arps: ByName = text({}, "autoregressive parameters [1] of these fields; by default that of [ground]")
+    size: float = number(1200.0, "m", "side of a drawn pasture, or width of a drawn patch", gt=0)
+    deviations: ByName = text({}, f"standard deviations [1] of properties drawn as fields: {', '.join(VARYING)}")
+    arps: ByName = text({}, "autoregressive parameters [1] of these fields; by default arp of [ground]")
     coarser: int = number(
         1,
         "1",
-        "ground cells along a side of a cell of these fields' lattice, which arps count in",
+        "ground cells per lattice cell of these fields along each side; arps refers to lattice cells",
         ge=1,
         le=100,
         strict=True,
     )
-    covary: ByName = text({}, f"correlations [1] of leaf area with {', '.join(COVARIATES + VARYING)}")
+    covary: ByName = text({}, f"correlations [1] of LAI with {', '.join(COVARIATES + VARYING)}")
 
     def is_one(self):
-        """Whether one stand is everywhere, and only its leaf area varies."""
+        """Whether one stand covers the scene and only its LAI varies."""
         return self.cover == "none" and not any((*self.deviations.values(), *self.covary.values()))
 
     @field_validator("cover")
@@ -280,7 +278,7 @@ class GridKeys(Section):
 
 
 class TerrainKeys(Section):
-    """Elevation, and the light on slopes."""
+    """Elevation, and illumination of slopes."""
 
     dem: str = file(
         "flint-hills",
@@ -288,17 +286,19 @@ class TerrainKeys(Section):
         names=LAND_FORMS,
         suffix="*",
     )
-    seed: int = seed(7, "of the synthetic hills")
-    fill: float | None = number(None, "m", "holes of the file are interpolated up to this distance", gt=0)
-    vertical_units: str | None = text(None, "of the file's elevation where they are not metres, such as ft")
-    horizon_reach: float = number(5000.0, "m", "greatest distance of terrain that hides the sky", ge=30, le=50_000)
-    upwelling: bool = text(True, "with the view's cosine on slopes (Eq. 5)")
+    seed: int = seed(7, "seed of the synthetic hills")
+    fill: float | None = number(
+        None, "m", "interpolate gaps of the file up to this distance; by default they stay", gt=0
+    )
+    vertical_units: str | None = text(None, "units of the elevation file if they are not metres, such as ft")
+    horizon_reach: float = number(5000.0, "m", "maximum distance of terrain that blocks the sky", ge=30, le=50_000)
+    upwelling: bool = text(True, "apply the cosine of the view angle on slopes (Eq. 5)")
 
     @model_validator(mode="after")
     def _options_of_a_file(self):
         for key in ("fill", "vertical_units"):
             if getattr(self, key) is not None and self.dem in LAND_FORMS:
-                raise ValueError(f"{key} is for an elevation file, dem is {self.dem!r}: name a file or drop {key}")
+                raise ValueError(f"{key} needs an elevation file, dem is {self.dem!r}: name a file or remove {key}")
         return self
 
     @field_validator("dem")
@@ -308,18 +308,18 @@ class TerrainKeys(Section):
 
 
 class SunAndViewKeys(Section):
-    """Directions; the sun's from time and place, or given by sza and saa."""
+    """Directions of sun and sensor. The sun follows from time and place, or from sza and saa."""
 
     time: str | None = text(
         None,
-        "date and time of day, UTC without an offset such as -05:00; by default a hypothetical overpass of FIFE, on "
-        "its site only; elsewhere, where sza and saa are given instead, the sun is 1 astronomical unit away",
+        "date and time, UTC unless it has an offset such as -05:00; by default a hypothetical overpass, on the FIFE "
+        "site only. With sza and saa instead, the distance to the sun is 1 astronomical unit",
     )
-    latitude: float | None = number(None, "degree", "north; by default the grid's own", ge=-90, le=90)
-    longitude: float | None = number(None, "degree", "east; by default the grid's own", ge=-180, le=360)
-    sza: float | None = number(None, "degree", "solar zenith, instead of that of time and place", ge=0, lt=90)
-    saa: float | None = number(None, "degree", "solar azimuth, clockwise from north", ge=-360, le=360)
-    vza: float = number(0.0, "degree", "sensor zenith; 0 is nadir", ge=0, le=75)
+    latitude: float | None = number(None, "degree", "degrees north; by default from the grid", ge=-90, le=90)
+    longitude: float | None = number(None, "degree", "degrees east; by default from the grid", ge=-180, le=360)
+    sza: float | None = number(None, "degree", "solar zenith angle, instead of time and place", ge=0, lt=90)
+    saa: float | None = number(None, "degree", "solar azimuth angle, clockwise from north", ge=-360, le=360)
+    vza: float = number(0.0, "degree", "sensor zenith angle; 0 is nadir", ge=0, le=75)
     vaa: float = number(0.0, "degree", "azimuth toward the sensor, clockwise from north", ge=-360, le=360)
 
     @field_validator("time", mode="before")
@@ -327,35 +327,35 @@ class SunAndViewKeys(Section):
     def _full_date(cls, value):
         if value is None:
             return value
-        # TOML has dates of its own.
+        # TOML has a date type.
         written = value.isoformat() if isinstance(value, date | time) else value
-        times.utc(written)  # refuses what it cannot read
+        times.utc(written)  # ValueError for an unreadable time
         return written
 
     @model_validator(mode="after")
     def _whole_sun(self):
         if (self.sza is None) != (self.saa is None):
-            raise ValueError("sza and saa go together: give both, or neither to have the sun of time and place")
+            raise ValueError("sza and saa go together: give both, or neither to compute the sun from time and place")
         return self
 
 
 class AirKeys(Section):
     """The atmosphere."""
 
-    profile: str = text("midlatitude-summer", "of pressure, temperature, water vapour and ozone")
+    profile: str = text("midlatitude-summer", "profile of pressure, temperature, water vapour and ozone")
     aerosol: str = file(
         "continental",
-        'aerosol model, "none", a mixture such as "dust:0.5+soot:0.5" by volume, or a .nc or .csv file of your own '
-        "tables, which needs aot",
+        'aerosol model, "none", a mixture such as "dust:0.5+soot:0.5" by volume, or a .nc or .csv file with aerosol '
+        "optical properties, which needs aot",
         suffix=(".nc", ".csv"),
     )
-    visibility: float | None = number(45.0, "km", "meteorological range; give it or aot", ge=5, le=100)
+    visibility: float | None = number(45.0, "km", "meteorological range; give either this or aot", ge=5, le=100)
     aot: float | None = number(None, "1", "aerosol optical thickness at 0.55 um, instead of visibility", ge=0, le=2)
-    altitude: float = number(0.4, "km", "of the ground above the sea; by default FIFE's, on its site only", ge=0, le=4)
-    h2o: float | None = number(None, "g cm-2", "water vapour, instead of the profile's", ge=0, le=10)
-    o3: float | None = number(None, "cm-atm", "ozone, instead of the profile's", ge=0, le=1)
-    engine: str = text("5S", f"one of {', '.join(ENGINES)}")
-    adjacency: bool = text(False, "whether light of the surroundings is scattered into a cell's view")
+    altitude: float = number(0.4, "km", "ground elevation above sea level; default only on the FIFE site", ge=0, le=4)
+    h2o: float | None = number(None, "g cm-2", "column water vapour; by default from the profile", ge=0, le=10)
+    o3: float | None = number(None, "cm-atm", "column ozone; by default from the profile", ge=0, le=1)
+    engine: str = text("5S", f"radiative transfer model: {', '.join(ENGINES)}")
+    adjacency: bool = text(False, "adjacency effect: light from the surroundings is scattered into the line of sight")
 
     @model_validator(mode="before")
     @classmethod
@@ -369,37 +369,37 @@ class AirKeys(Section):
 class SensorKeys(Section):
     """The instrument."""
 
-    instrument: str = file("TM", "see: fifesim sensors", suffix=".toml")
-    bands: list[str] = text(["TM3", "TM4"], "names of bands; by default red and near infrared, in a file green too")
+    instrument: str = file("TM", "instrument name, see: fifesim sensors", suffix=".toml")
+    bands: list[str] = text(["TM3", "TM4"], "band names; by default red and near infrared, in a file also green")
     pixel: float | None = number(
         None,
         "m",
-        "size of a pixel; by default the bands' gridded product; the footprint stays the instrument's",
+        "pixel size; by default the size in the gridded product of the bands; does not change the footprint",
         gt=0,
     )
     interval: str | float = Field(
         "product",
-        description="between pixels: product, that of their size; native, the instrument's own; or metres",
+        description="distance between pixels: product, the pixel size; native, as the instrument samples; or metres",
         json_schema_extra={"unit": "m"},
     )
     offset: list[float] = Field(
         [0.0, 0.0],
-        description="registration error southward and eastward: pixels see the ground beside them",
+        description="registration error southward and eastward, which shifts the footprints",
         json_schema_extra={"unit": "pixel"},
         min_length=2,
         max_length=2,
     )
-    response: str | None = text(None, "spatial: system, what is known of the instrument; detector; or paper, for TM")
+    response: str | None = text(None, "spatial response: system, all known components; detector; or paper, for TM")
     noise: list[str] = text(
-        [], "of the detectors: shot, thermal, fixed-pattern; or all, the kinds that the instrument has"
+        [], "detector noise: shot, thermal, fixed-pattern; or all that are known for the instrument"
     )
     noise_model: ByName = text(
         {},
-        "of every band, instead of the instrument's: thermal [W m-2 sr-1 um-1], shot [W m-2 sr-1 um-1], detectors, "
+        "noise of all bands, replacing the instrument's: thermal [W m-2 sr-1 um-1], shot [W m-2 sr-1 um-1], detectors, "
         "gain_spread [1], offset_spread [W m-2 sr-1 um-1]",
     )
-    seed: int = seed(0, "of the noise")
-    min_valid: float = number(0.98, "1", "share of its footprint that a pixel needs on valid cells", ge=0, le=1)
+    seed: int = seed(0, "seed of the noise")
+    min_valid: float = number(0.98, "1", "minimum fraction of a pixel's footprint on valid cells", ge=0, le=1)
 
     @field_validator("bands")
     @classmethod
@@ -413,7 +413,7 @@ class SensorKeys(Section):
     def _known_interval(cls, value):
         if value in INTERVALS or (not isinstance(value, str) and 0 < value < math.inf):
             return value
-        raise ValueError(f"must be {' or '.join(INTERVALS)}, or metres above 0 between pixels")
+        raise ValueError(f"must be {' or '.join(INTERVALS)}, or a positive distance between pixels in metres")
 
     @field_validator("offset")
     @classmethod
@@ -424,7 +424,7 @@ class SensorKeys(Section):
 
 
 class Keys(Section):
-    """The sections of a scenario, spelled as they may be; that of each class is ``[classes.NAME]``."""
+    """The sections of a scenario as written in TOML; each class has a section ``[classes.NAME]``."""
 
     grid: GridKeys = GridKeys()
     ground: GroundKeys = GroundKeys()
@@ -441,13 +441,13 @@ class Keys(Section):
         for name in value:
             if len(name) > LONGEST_NAME or not name.isprintable() or len(name.split()) != 1:
                 raise ValueError(
-                    f"{shown(name)} is no name of a class: names are one word of up to {LONGEST_NAME} characters"
+                    f"{shown(name)} is not a valid class name: names are one word of up to {LONGEST_NAME} characters"
                 )
         return value
 
     @classmethod
     def section(cls, place):
-        """Section type of a table by its place, None if there is none."""
+        """Section type of a table by its place; None if it is unknown."""
         name, *inside = place
         if name not in cls.model_fields or (name == "classes") != bool(inside):
             return None
@@ -464,7 +464,7 @@ class Keys(Section):
     @model_validator(mode="before")
     @classmethod
     def _no_invented_hills(cls, values):
-        """Set a map of real ground without an elevation to flat: synthetic hills are for synthetic landscapes."""
+        """Set terrain to flat for a LAI map without elevation. Synthetic hills would not match a real landscape."""
         if not isinstance(values, dict):
             return values
         ground, terrain = values.get("ground"), values.get("terrain", {})

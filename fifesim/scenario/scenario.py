@@ -1,4 +1,4 @@
-"""Scenario of a run: every number with its unit and range, its keys by name, and its summary in words."""
+"""Scenario of a run, its keys by name, and a summary in words."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -35,8 +35,8 @@ _BY_BAND = ("leaf_reflectance", "leaf_transmittance", "background")
 
 def with_false_colour(values):
     """Values of a file with the default bands green, red and near infrared."""
-    # Unchanged where bands are named, where the instrument has no green on their grid or is unknown, where optics are
-    # given by band without green, and where a noise model is.
+    # Unchanged if bands are named, if the instrument is unknown or has no green band on the same grid, if optics are
+    # given by band without green, or if a noise model is given.
     sensor = values.get("sensor", {})
     if not isinstance(sensor, Mapping) or "bands" in sensor:
         return values
@@ -49,7 +49,7 @@ def with_false_colour(values):
 
 
 def _found(name):
-    """Bands of an instrument, none if it is unknown, which is reported when the scenario is made."""
+    """Bands of an instrument; empty if it is unknown, which is reported when the scenario is created."""
     if not isinstance(name, str) or (name.endswith(".toml") and not os.path.isfile(name)):
         return ()
     try:
@@ -73,7 +73,7 @@ _COUNTS = {1: "grass type", 2: "two grass types", 3: "three grass types"}
 
 def statement(scenario):
     """Sentence on the synthetic parts of a scenario, the parts from files, and the overpass."""
-    # Identical for a scenario and its completed form, unless a LAI file determines the grid.
+    # The same for a scenario and its completed form, unless a LAI file determines the grid.
     synthetic, given = _parts(scenario)
     clauses = [f"{_listed(synthetic)} {_are(synthetic)} synthetic"] if synthetic else []
     if given:
@@ -88,7 +88,7 @@ def statement(scenario):
 
 
 def summary(scenario):
-    """Short text of the synthetic parts of a scenario for a title, empty if there are none."""
+    """Short text on the synthetic parts of a scenario, for a title; empty if there are none."""
     overpass = "hypothetical overpass" if _is_hypothetical(scenario) else ""
     return ", ".join(filter(None, (_landscape(*_parts(scenario)), overpass)))
 
@@ -118,10 +118,10 @@ def _landscape(synthetic, given):
 
 
 def _of_fife(scenario):
-    """Parts from FIFE of a landscape without files."""
+    """Parts of a landscape without files that come from FIFE."""
     types = _distributions(scenario)
     found = [f"the {_COUNTS[len(types)]}"] if types <= set(treatments()) else []
-    return found + ["the location"] * _is_on_site(scenario)
+    return found + ["the location"] * is_on_site(scenario)
 
 
 def _distributions(scenario):
@@ -131,22 +131,22 @@ def _distributions(scenario):
     return {stand.lai_source(scenario.ground) for stand in scenario.classes.values()} or set(treatments())
 
 
-def _is_on_site(scenario):
+def is_on_site(scenario):
     """Whether the scenario is known to be on the FIFE site, without opening a file."""
     if scenario.ground.lai_file and not scenario.grid.model_fields_set.intersection(EXTENT):
         return False
     try:
         return on_fife_site(scenario.geobox())
     except ValueError:
-        # An invalid grid is refused where the scenario is completed.
+        # An invalid grid raises an error when the scenario is completed.
         return False
 
 
 def _is_hypothetical(scenario):
-    """Whether the time is the default one on the FIFE site, when no Landsat passed."""
+    """Whether the time is the default on the FIFE site, at which no Landsat passed."""
     given = scenario.geometry
     default = given.time is None or utc(given.time)[0] == utc(times.TIME)[0]
-    return given.sza is None and default and _is_on_site(scenario)
+    return given.sza is None and default and is_on_site(scenario)
 
 
 def _overpass(scenario):
@@ -154,11 +154,12 @@ def _overpass(scenario):
     if given.sza is not None:
         return "Sun angles as given."
     if _is_hypothetical(scenario):
-        return f"Hypothetical overpass, {_time(times.TIME)}."
-    return "" if given.time is None else f"Time as given, {_time(given.time)}."
+        return f"Hypothetical overpass, {time_in_words(times.TIME)}."
+    return "" if given.time is None else f"Time as given, {time_in_words(given.time)}."
 
 
-def _time(time):
+def time_in_words(time):
+    """Day and time in UTC as text."""
     (known,) = utc(time)
     return f"{known.day} {known.month_name()} {known.year} {known:%H:%M} UTC"
 
@@ -173,23 +174,23 @@ def _are(names):
     return "are" if plural else "is"
 
 
-# Shares of classes may miss 1 by rounding.
+# Tolerance for the sum of area fractions. [1]
 _WHOLE = 1e-6
 
 
 class Scenario(Keys):
     """
-    What a run simulates; the defaults are the paper's case, one stand of plants on the whole FIFE site.
+    Parameters of a simulation. The defaults are the case of the paper: one stand on the FIFE site.
 
     Parameters
     ----------
     grid, ground, landscape, classes, terrain, geometry, atmosphere, sensor : mapping
-        Of keys; ``fifesim scenario`` prints all of them, with their units, meanings and defaults.
+        Keys of each section. ``fifesim scenario`` prints all keys with unit, meaning and default.
 
     Raises
     ------
     ValueError
-        If a key is unknown or a value not allowed: one line a mistake.
+        If a key is unknown or a value is not allowed. The message has one line per mistake.
 
     Examples
     --------
@@ -216,26 +217,26 @@ class Scenario(Keys):
     @model_validator(mode="after")
     def _classes_of_a_cover(self):
         if self.landscape.cover == "none" and self.classes:
-            raise ValueError('classes: are given, and landscape.cover is none: say how they lie, such as "pastures"')
+            raise ValueError('classes are given, but landscape.cover is none: choose a layout, such as "pastures"')
         if not self.landscape.is_one() and self.ground.method == "periodic":
             raise ValueError(
-                'ground.method = "periodic" is for one stand: type method = "streaming", or cover = "none"'
+                'ground.method = "periodic" needs a single stand: use method = "streaming" or cover = "none"'
             )
         needing = [name for name in COVARIATES if self.landscape.covary.get(name)]
         if needing and self.terrain.dem == "flat":
-            raise ValueError(f"landscape.covary: {', '.join(needing)} is of an elevation, and terrain.dem is flat")
+            raise ValueError(f"landscape.covary: {', '.join(needing)} needs an elevation, but terrain.dem is flat")
         if self.landscape.covary and self.ground.lai_file:
-            raise ValueError("landscape.covary: a lai_file goes with the ground as it does: leave covary out")
+            raise ValueError("landscape.covary cannot be used with a lai_file: remove covary")
         shares = [stand.share for stand in self.classes.values()]
         if any(shares) and not all(shares):
             lacking = ", ".join(name for name, stand in self.classes.items() if stand.share is None)
-            raise ValueError(f"classes: {lacking} has no share, others have: give it to all, or to none")
+            raise ValueError(f"classes: {lacking} has no share but others have: give shares to all classes or to none")
         if any(shares) and abs(sum(shares) - 1) > _WHOLE:
-            raise ValueError(f"classes: their shares sum to {sum(shares):g}: they must sum to 1")
+            raise ValueError(f"classes: shares sum to {sum(shares):g}: they must sum to 1")
         return self
 
     def class_table(self) -> dict[str, CoverClass]:
-        """Classes of cover by name, a dict of `CoverClass`; those of FIFE where the keys say none."""
+        """Classes of cover by name, a dict of `CoverClass`; by default the classes of FIFE."""
         return {name: stand.cover_class(name, self.ground) for name, stand in self.classes.items()} or fife_classes()
 
     def geobox(self) -> GeoBox:
@@ -245,12 +246,12 @@ class Scenario(Keys):
         Returns
         -------
         grid : odc.geo.geobox.GeoBox
-            That of the keys; without corner and size, that which covers the LAI file.
+            From the keys of [grid]; without corner and size, the extent of the LAI file.
 
         Raises
         ------
         ValueError
-            If there is no such grid, or a CRS of one's own comes without the corner.
+            If the grid is invalid, or a CRS is given without the corner.
         """
         grid, own = self.grid, self.grid.model_fields_set
         lacking = [key for key in EXTENT if key not in own]
@@ -261,8 +262,8 @@ class Scenario(Keys):
         corner = [key for key in ("west", "north") if key in lacking]
         if "crs" in own and corner and box.crs != times.CORNERS["NAD83"][0]:
             raise ValueError(
-                f"grid.crs = {shown(grid.crs)} is given without {' and '.join(corner)}: type the upper left corner in "
-                "metres of that CRS"
+                f"grid.crs = {shown(grid.crs)} is given without {' and '.join(corner)}: give the upper left corner in "
+                "the metres of this CRS"
             )
         return box
 
@@ -277,11 +278,11 @@ class Scenario(Keys):
         return geometry.Geometry(sun.sza, sun.saa, given.vza, given.vaa, distance)
 
     def _time(self):
-        """Date and time: as given, else of FIFE on its site."""
+        """Date and time as given; by default the FIFE overpass if the scene is on the site."""
         return self.geometry.time or (times.TIME if on_fife_site(self.geobox()) else None)
 
     def sun_place(self) -> tuple[float, float]:
-        """Latitude and longitude of the sun: as given, else FIFE's on its site, else those of the grid's middle."""
+        """Latitude and longitude for the position of the sun; by default FIFE's on its site, else the grid centre."""
         longitude, latitude = projection.middle(self.geobox())
         if on_fife_site(self.geobox()):
             longitude, latitude = times.LONGITUDE, times.LATITUDE
@@ -290,17 +291,17 @@ class Scenario(Keys):
         return latitude, longitude if given.longitude is None else given.longitude
 
     def _check_place(self):
-        """Raise ValueError if the defaults of the FIFE site for overpass, altitude and hills are used elsewhere."""
+        """Raise ValueError if the FIFE defaults for overpass, altitude and hills would be used at another site."""
         wanted = []
         if self.geometry.time is None and self.geometry.sza is None:
             wanted.append('geometry.time, such as "2022-06-01T10:05:00Z", or geometry.sza and saa')
         if "altitude" not in self.atmosphere.model_fields_set:
-            wanted.append("atmosphere.altitude, of the ground [km]")
+            wanted.append("atmosphere.altitude, the ground elevation [km]")
         if "dem" not in self.terrain.model_fields_set:
-            wanted.append('terrain.dem, a file of elevation or "flat"')
+            wanted.append('terrain.dem, an elevation file or "flat"')
         if wanted and not on_fife_site(self.geobox()):
             where = projection.place_in_words(*projection.middle(self.geobox()))
-            raise ValueError(f"grid: its middle, {where}, is not on the site of FIFE: give {'; and '.join(wanted)}")
+            raise ValueError(f"grid: its centre, {where}, is not on the FIFE site: give {'; and '.join(wanted)}")
 
     def model_atmosphere(self) -> Atmosphere:
         """The atmosphere, a `fifesim.atmosphere.models.Atmosphere`."""
@@ -309,7 +310,7 @@ class Scenario(Keys):
 
     def complete(self) -> Self:
         """
-        The same scenario with every default that a run decides written out.
+        Scenario with all defaults that depend on other keys written out.
 
         Returns
         -------
@@ -325,7 +326,7 @@ class Scenario(Keys):
         """
         for place, path in self.files.items():
             if not os.path.exists(path) and not path.startswith("/vsi"):
-                raise ValueError(f"{'.'.join(place)} = {shown(path)}: there is no such file")
+                raise ValueError(f"{'.'.join(place)} = {shown(path)}: the file does not exist")
         box, own = self.geobox(), self.sensor
         bands = [band.response for band in own.description.select(own.bands)]
         self._check_image(box)
@@ -387,12 +388,12 @@ class Scenario(Keys):
 
     def with_paths(self, change: Callable[[str], str]) -> Self:
         """
-        The same with other paths of its files.
+        Scenario with modified file paths.
 
         Parameters
         ----------
         change : callable
-            Gives a path for a path.
+            Function from the old path to the new one.
 
         Returns
         -------
@@ -403,7 +404,7 @@ class Scenario(Keys):
         return self.model_copy(update={place[0]: each for place, each in changed.items()} | {"classes": classes})
 
     def _check_image(self, box):
-        """Check that pixels are at least as large as cells and see enough of them."""
+        """Check that pixels are at least as large as cells, and that the image has enough pixels."""
         own, cell = self.sensor, max(grids.cell_size(box))
         spaced = {"pixel": (own.size, own.size)}
         if own.interval == "native":
@@ -413,23 +414,23 @@ class Scenario(Keys):
         for key, (down, across) in spaced.items():
             if min(down, across) < cell * (1 - 1e-6) and (key, own.interval) != ("interval", "native"):
                 raise ValueError(
-                    f"sensor.{key} = {down:g} m is smaller than a cell of the ground: type {cell:g} m or more, or a "
+                    f"sensor.{key} = {down:g} m is smaller than a ground cell: use {cell:g} m or more, or a "
                     "smaller grid.cell"
                 )
             fitting = int(box.shape.y * cell / down + 1e-6), int(box.shape.x * cell / across + 1e-6)
             if min(fitting) < 2:
                 raise ValueError(
                     f"grid: the image must have 2 x 2 pixels or more, sensor.{key} of {down:g} x {across:g} m fits "
-                    f"{fitting[0]} x {fitting[1]} times into {grids.in_words(box)}: type a larger width and height"
+                    f"{fitting[0]} x {fitting[1]} times into {grids.in_words(box)}: use a larger width and height"
                 )
             if any(abs(shift) >= size for shift, size in zip(own.offset, fitting, strict=True)):
                 raise ValueError(
-                    f"sensor.offset = {own.offset} pixels moves the image beyond the scene, which has {fitting[0]} x "
-                    f"{fitting[1]}: type smaller numbers"
+                    f"sensor.offset = {own.offset} pixels moves the image out of the scene, which has {fitting[0]} x "
+                    f"{fitting[1]} pixels: use a smaller offset"
                 )
 
     def _check_fields(self):
-        """Check that drawn shares can have their deviations."""
+        """Check that the standard deviations of drawn fractions are feasible."""
         for name, drawn in drawn_properties(self).items():
             if name in SHARES:
                 try:
@@ -438,18 +439,18 @@ class Scenario(Keys):
                     raise ValueError(f"landscape.deviations: {error}") from None
 
     def provenance(self) -> str:
-        """The synthetic parts of the landscape, the parts from files, and the overpass, in one line of text."""
+        """One line on the synthetic parts of the landscape, the parts from files, and the overpass."""
         return statement(self)
 
     @property
     def files(self) -> dict[tuple[str, ...], str]:
-        """Paths of the files that the scenario reads, by the names of table and key, a dict of tuple to str."""
+        """Paths of the files that the scenario reads: a dict from (table, key) to str."""
         return {(*place, key): path for place, table in self.sections().items() for key, path in table.files.items()}
 
 
 def default_scenario() -> Scenario:
     """
-    The landscape of the FIFE site that a run without a scenario simulates, ``data/fife.toml``.
+    Default landscape of the FIFE site, from ``data/fife.toml``.
 
     Returns
     -------
@@ -465,26 +466,26 @@ def default_scenario() -> Scenario:
 
 
 def grid_keys(box):
-    """Grid section of a scenario for a grid of square cells."""
+    """[grid] section of a scenario, from a grid of square cells."""
     a = box.affine
     crs = f"EPSG:{box.crs.epsg}" if box.crs.epsg else box.crs.to_wkt()
     return GridKeys(crs=crs, west=a.c, north=a.f, width=a.a * box.shape.x, height=-a.e * box.shape.y, cell=a.a)
 
 
 def parse_scenario(values):
-    """Scenario from nested mappings, as in TOML."""
+    """Scenario from nested mappings with the structure of the TOML file."""
     return Scenario(**values)
 
 
 def read_scenario(path: FilePath) -> Scenario:
     """
-    Scenario of a TOML file.
+    Read a scenario from a TOML file.
 
     Parameters
     ----------
     path : str or path
-        Files that it names lie relative to it. Where it names no bands, green is seen beside red and near infrared,
-        for a picture in false colours.
+        TOML file. Paths in it are relative to its folder. If it names no bands, green is added to red and near
+        infrared, for a false-colour image.
 
     Returns
     -------
@@ -493,8 +494,8 @@ def read_scenario(path: FilePath) -> Scenario:
     Raises
     ------
     ValueError
-        If it is missing or not TOML, or a key or value is wrong: one line a mistake, with the key, the value and what
-        is allowed.
+        If the file is missing or not TOML, or a key or value is wrong. The message has one line per mistake, with the
+        key, the value and the allowed range.
 
     Examples
     --------
@@ -510,7 +511,7 @@ def read_scenario(path: FilePath) -> Scenario:
 
 
 class NamedKey(NamedTuple):
-    """Key of a scenario, or an entry of a key that is a table, such as ``ground.leaf.chlorophyll``."""
+    """Key of a scenario, or an entry of a table, such as ``ground.leaf.chlorophyll``."""
 
     place: tuple[str, ...]
     key: str
@@ -518,7 +519,7 @@ class NamedKey(NamedTuple):
 
     @property
     def path(self):
-        """Names from the section down."""
+        """Names from the section to the key."""
         return (*self.place, self.key) + (() if self.entry is None else (self.entry,))
 
     @property
@@ -554,18 +555,16 @@ def find_key(name, called="the axis"):
         return found[0]
     if found:
         written = " or ".join(each.name for each in found)
-        raise ValueError(f"{called} {shown(name)} is a key of several sections: write {written}")
+        raise ValueError(f"{called} {shown(name)} exists in several sections: use {written}")
     places = [*Scenario().sections(), *(table for table in tables if len(table) == 2)]
     # A name with its section is compared with whole names.
     known = {(*place, key) for place in places for key in Keys.section(place).model_fields}
     hint = nearest(name, sorted(".".join(each) if "." in str(name) else each[-1] for each in known))
-    raise ValueError(
-        f"{called} {shown(name)} is no key of a scenario: {hint}`fifesim scenario` prints all that there are"
-    )
+    raise ValueError(f"{called} {shown(name)} is not a key of a scenario: {hint}`fifesim scenario` lists all keys")
 
 
 def _has(section, parts):
-    """Whether a section has a key, and whether the key has entries if one is named."""
+    """Whether a section has a key, and, if an entry is named, whether the key has entries."""
     if section is None or not parts or parts[0] not in section.model_fields or "" in parts:
         return False
     return len(parts) == 1 or (len(parts) == 2 and section.model_fields[parts[0]].annotation == ByName)
@@ -577,7 +576,7 @@ def values_of(scenario):
 
 
 def put(values, path, value):
-    """Put a value into nested mappings in place, with numpy numbers as Python numbers."""
+    """Set a value in nested mappings in place, converting numpy numbers to Python numbers."""
     *tables, last = path
     for name in tables:
         values = values.setdefault(name, {})
@@ -585,7 +584,7 @@ def put(values, path, value):
 
 
 def in_text(value):
-    """Value for one cell of a table: text for a list."""
+    """Value as a table cell: lists become text."""
     if np.ndim(value) == 0:
         return value
     return ", ".join(str(part) for part in np.ravel(value).tolist()) or "none"

@@ -1,4 +1,4 @@
-"""Meaning of the values of a scenario, section by section, and their physical limits."""
+"""Sections of a scenario as descriptions of canopy, atmosphere and instrument, and their physical limits."""
 
 import os
 from dataclasses import asdict, fields
@@ -26,7 +26,7 @@ _BY_BAND = ("leaf_reflectance", "leaf_transmittance")
 
 
 def _check_keys(values, kind, without=None):
-    """Raise ValueError for keys that are no fields of a dataclass."""
+    """Raise ValueError for keys that are not fields of a dataclass."""
     known = [field.name for field in fields(kind) if field.name != without]
     for name in values:
         if name not in known:
@@ -34,7 +34,7 @@ def _check_keys(values, kind, without=None):
 
 
 class Stand(StandKeys):
-    """Leaf area, leaves and what lies below them, of a stand of plants."""
+    """Leaf area, leaves and background of a stand."""
 
     @field_validator("distribution")
     @classmethod
@@ -65,7 +65,7 @@ class Stand(StandKeys):
         return Background(value).fractions if value else value
 
     def leaf_optics(self):
-        """Leaf optics by band, or a Leaf, None for the default. [1]"""
+        """Leaf optics by band [1], or a Leaf; None for the default."""
         if self.leaf:
             return Leaf(**self.leaf)
         if set(self.leaf_reflectance) != set(self.leaf_transmittance):
@@ -73,11 +73,11 @@ class Stand(StandKeys):
         return {band: (value, self.leaf_transmittance[band]) for band, value in self.leaf_reflectance.items()} or None
 
     def below_canopy(self):
-        """Background by band or as a mixture of spectra, None for the default."""
+        """Background by band or as a mixture of spectra; None for the default."""
         return Background(self.background_spectra) if self.background_spectra else self.background or None
 
     def canopy(self, keys=KEYS):
-        """Canopy of some keys, with optics if the table has them."""
+        """Canopy from the given keys, with optics if the table has them."""
         return Canopy(
             leaf_optics=self.leaf_optics(),
             brown_leaf=Leaf(**self.brown_leaf) if self.brown_leaf else None,
@@ -87,7 +87,7 @@ class Stand(StandKeys):
 
 
 class Ground(Stand, GroundKeys):
-    """Leaf area, leaves and what lies below them."""
+    """Leaf area, leaves and background."""
 
     @model_validator(mode="after")
     def _streaming_limit(self):
@@ -98,7 +98,7 @@ class Ground(Stand, GroundKeys):
         return self
 
     def complete_optics(self, bands):
-        """Keys of leaf and background with their defaults filled in."""
+        """Keys of leaf and background, with defaults."""
         names = [band.name for band in bands]
         leaf = optics.band_leaf_optics(bands, self.leaf_optics())
         background = optics.band_background(bands, self.below_canopy())
@@ -109,7 +109,7 @@ class Ground(Stand, GroundKeys):
 
 
 class CoverStand(Stand, ClassKeys):
-    """A class of cover; what it leaves out is that of [ground]."""
+    """A land cover class. Missing keys are taken from [ground]."""
 
     @field_validator("arp")
     @classmethod
@@ -119,11 +119,11 @@ class CoverStand(Stand, ClassKeys):
         return value
 
     def lai_source(self, ground):
-        """LAI distribution of the class: as given, else the one of [ground]."""
+        """LAI distribution of the class; by default the distribution of [ground]."""
         return (self if "distribution" in self.model_fields_set else ground).distribution
 
     def cover_class(self, name, ground):
-        """Class of cover; missing canopy properties come from the call of `surface_reflectance`."""
+        """Land cover class. Missing canopy properties are set in `surface_reflectance`."""
         given, lai = self.model_fields_set, self.lai_source(ground)
         canopy = self.canopy([key for key in KEYS if key in given])
         return CoverClass(name, lai=lai, arp=self.arp if "arp" in given else None, canopy=canopy, code=self.code)
@@ -134,7 +134,7 @@ def _by_band(names, values):
 
 
 class Terrain(TerrainKeys):
-    """Elevation, and the light on slopes."""
+    """Elevation, and illumination of slopes."""
 
     @field_validator("vertical_units")
     @classmethod
@@ -166,7 +166,7 @@ class Air(AirKeys):
         return self
 
     def model(self):
-        """Atmosphere of the keys."""
+        """Atmosphere described by the keys."""
         keys = self.model_dump(exclude={"adjacency"})
         if "aerosol" in self.files:
             keys["aerosol"] = read_aerosol(self.aerosol)
@@ -212,7 +212,7 @@ class Sensor(SensorKeys):
         return value
 
     def given_noise(self):
-        """Noise model of the keys, None for the model of the instrument."""
+        """Noise model from the keys; None for the model of the instrument."""
         if not self.noise_model:
             return None
         scan = self.description.scan
@@ -222,7 +222,7 @@ class Sensor(SensorKeys):
 
     @property
     def description(self):
-        """Instrument with the requested response."""
+        """Instrument with the requested spatial response."""
         try:
             return instrument(self.instrument, self.response)
         except OSError as error:
@@ -230,18 +230,18 @@ class Sensor(SensorKeys):
 
     @property
     def size(self):
-        """Size of a pixel: as given, else from the gridded product of the bands. [m]"""
+        """Pixel size as given; by default the pixel size of the gridded product of the bands. [m]"""
         return self.pixel or _shared_pixel(self.description, self.bands)
 
 
 def _shared_pixel(description, names):
-    """Pixel size of the gridded product of some bands, which must agree. [m]"""
+    """Common pixel size of the bands in the gridded product. [m]"""
     sizes = {}
     for band in description.select(names):
         sizes.setdefault(description.pixel(band), []).append(band.name)
     if len(sizes) > 1:
         groups = "; ".join(f"{size:g} m: {', '.join(each)}" for size, each in sizes.items())
         raise ValueError(
-            f"bands of {description.name} lie on different grids ({groups}): name those of one, or give pixel"
+            f"bands of {description.name} have different grids ({groups}): name bands of one grid, or give pixel"
         )
     return next(iter(sizes))

@@ -1,4 +1,4 @@
-"""Figure 1 from end to end: a scenario as scene, image and truth."""
+"""Simulation of a scenario: scene, image and truth, as in Figure 1."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fifesim.sensor.pixel_labels import pixel_grid, shifts_of
 
 def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = False) -> xr.DataTree:
     """
-    Scene, image and truth of a scenario.
+    Simulate scene, image and truth of a scenario.
 
     Parameters
     ----------
@@ -31,23 +31,24 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
     chunks : mapping or int, optional
         Chunks of the scene; by default whole tiles of the random field.
     complete : bool, optional
-        Simulate ground around the scene, as far as the footprints of its pixels reach, so that the image has no missing
-        pixels along its edge. Scene, truth and pixels keep their place. Chips of `fifesim.dataset` are complete.
+        If True, also simulate the ground around the scene within reach of the pixel footprints, so that the image has
+        no missing pixels at its edge. The positions of scene, truth and pixels do not change. Chips of
+        `fifesim.dataset` are complete.
 
     Returns
     -------
     run : xarray.DataTree
-        Lazy. ``scene`` holds ``lai`` and ``surface_reflectance`` by cells, and ``dem`` where the ground is not flat;
-        ``image`` the digital numbers ``dn`` and their ``ndvi``; ``truth`` the means of ``lai`` and ``fpar`` over the
-        ground of the pixels of the gridded product, whatever the interval. With terrain, ``terrain`` holds ``dem``,
-        ``slope`` and ``kt`` over the same ground; its attributes say how far the elevation is known beyond the scene.
-        ``level`` holds the digital numbers on level ground.
+        Lazy. ``scene`` has ``lai`` and ``surface_reflectance`` by cell, and ``dem`` unless the ground is flat.
+        ``image`` has digital numbers ``dn`` and ``ndvi``. ``truth`` has means of ``lai`` and ``fpar`` over the pixels
+        of the gridded product, for any sampling interval. With terrain, ``terrain`` has ``dem``, ``slope`` and ``kt``
+        averaged in the same way, with the known extent of the elevation in its attributes; ``level`` has the digital
+        numbers for level ground.
 
     Raises
     ------
     ValueError
-        If the scenario asks for what cannot be, or a field of ``method = "periodic"`` is to be complete: it ends at the
-        edge of the scene.
+        If values of the scenario contradict each other, or `complete` is used with ``method = "periodic"``, whose field
+        ends at the edge of the scene.
 
     Examples
     --------
@@ -58,7 +59,7 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
     (['scene', 'truth', 'image'], (2, 10, 10))
     """
     if not isinstance(scenario, Scenario):
-        raise TypeError(f"simulate takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+        raise TypeError(f"simulate needs a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     grid, setup = scenario.geobox(), setup_of(scenario)
     ground, setup, inside = with_margin(scenario, setup) if complete else (grid, setup, {})
 
@@ -87,7 +88,7 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
 
 
 def setup_of(scenario):
-    """Setup of a scenario with ground, atmosphere and instrument, without elevation."""
+    """Setup of a scenario: ground, atmosphere and instrument, without elevation."""
     own = scenario.sensor
     aligned = own.interval == "product"
     return Setup(
@@ -109,9 +110,9 @@ def setup_of(scenario):
 
 
 def with_margin(scenario, setup):
-    """Grid that the footprints of all pixels of an image cover, its setup, and slices of the scenario in it."""
+    """Grid covered by the footprints of all pixels, its setup, and the slices of the scenario in it."""
     if scenario.ground.method == "periodic":
-        raise ValueError('ground.method = "periodic" has no ground beyond the scene: type method = "streaming"')
+        raise ValueError('ground.method = "periodic" has no ground beyond the scene: use method = "streaming"')
     grid, bands = scenario.geobox(), setup.instrument.select(setup.bands)
     pixels = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
     spreads = zip(*map(setup.instrument.line_spreads, bands), strict=True)

@@ -1,4 +1,4 @@
-"""Studies: a scenario, and the keys that are drawn anew for each of many chips."""
+"""Studies: a scenario and the distributions of the keys that vary between chips."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fifesim.scenario.toml import full_path, load_values, write_tables
 _HEADING = "Study of a fifesim dataset. Make it with: fifesim dataset THIS_FILE -o chips.zarr -n 1000"
 _SPLIT = MappingProxyType({"train": 0.8, "validation": 0.1, "test": 0.1})
 
-# Keys that determine the shape of a chip or the map from which it is cut.
+# Keys that determine the shape of a chip, or the map from which it is cropped.
 _FIXED = {
     ("ground", "lai_file"),
     ("ground", "method"),
@@ -38,31 +38,32 @@ _BY_BAND = (("leaf_reflectance", "leaf_transmittance"), ("background",))
 @dataclass(frozen=True)
 class Study:
     """
-    A scenario of the size of a chip, and what of it is drawn anew for each of many.
+    A scenario with the size of one chip, and distributions for the keys that vary between chips.
 
     Parameters
     ----------
     scenario : fifesim.Scenario
-        Its grid has the size of a chip; chips of a landscape are windows of the ground about it, which do not overlap.
+        Common values. Its grid has the size of a chip. The chips of a landscape are non-overlapping windows around this
+        grid.
     draws : mapping
-        By name of a key, as `fifesim.sweep` has them, the table of a distribution: ``{"visibility": {"uniform":
-        [10, 60]}, "ground.brown": {"normal": [0.2, 0.1], "within": [0, 1]}}``; also ``log-uniform``, ``choice``,
-        perhaps with ``weights``, and ``integers``. An ``arp`` is drawn for each landscape, all else for each chip.
+        Distributions by key, with names as in `fifesim.sweep`: ``{"visibility": {"uniform": [10, 60]}, "ground.brown":
+        {"normal": [0.2, 0.1], "within": [0, 1]}}``. Other distributions are ``log-uniform``, ``integers`` and
+        ``choice``, optionally with ``weights``. ``arp`` is drawn once per landscape, other keys once per chip.
     sequence : {"sobol", "random"}, optional
         Sequence of points from which values are drawn.
     seed : int, optional
-        Of the draws.
+        Seed of the draws.
     landscapes : int, optional
-        Pairs of seed and arp; seeds count from those of the scenario.
+        Number of landscapes. They have consecutive seeds, starting with the seed of the scenario.
     split : mapping of str to float, optional
-        Shares of the landscapes by name; by default train .8, validation .1, test .1.
+        Fraction of the landscapes in each part of the dataset; by default train 0.8, validation 0.1, test 0.1.
 
     Raises
     ------
     ValueError
-        If a key or a distribution is not possible, or a value of it not allowed.
+        If a key or distribution is invalid, or its values are out of range.
     TypeError
-        If the scenario is none.
+        If `scenario` is not a Scenario.
 
     See Also
     --------
@@ -86,7 +87,7 @@ class Study:
 
     def __post_init__(self):
         if not isinstance(self.scenario, Scenario):
-            raise TypeError(f"a study takes a Scenario, got {type(self.scenario).__name__}: see fifesim.read_scenario")
+            raise TypeError(f"a study needs a Scenario, got {type(self.scenario).__name__}: see fifesim.read_scenario")
         check_seed(self.seed)
         _check_ground(self.scenario)
         _check_plan(self)
@@ -97,11 +98,11 @@ class Study:
 
     @cached_property
     def values(self) -> dict[str, Any]:
-        """What all chips share, nested as in a scenario; sun and altitude are those of the scenario's own place."""
+        """Values common to all chips, nested as in a scenario. Sun and altitude refer to the grid of the scenario."""
         return _settled(self.scenario, {key.path for key in self.drawn})  # type: ignore[attr-defined]
 
     def quotas(self) -> dict[str, int]:
-        """Landscapes of each part of the split, a dict of int by name."""
+        """Number of landscapes in each part of the dataset, a dict of int by name."""
         shares = {name: share * self.landscapes for name, share in self.split.items()}
         found = {name: max(int(share + 1e-9), 1) for name, share in shares.items()}
         while sum(found.values()) < self.landscapes:
@@ -112,7 +113,7 @@ class Study:
         return found
 
     def to_toml(self) -> str:
-        """The study as a TOML file has it, a str; reading it gives the same study."""
+        """The study as TOML text. Reading it gives the same study."""
         plan = {"sequence": self.sequence, "seed": self.seed, "landscapes": self.landscapes, "split": dict(self.split)}
         tables = {("dataset",): plan, ("draw",): self.draws}
         for place, section in self.scenario.sections().items():
@@ -121,12 +122,12 @@ class Study:
 
     def scenario_with(self, drawn: Mapping[tuple[str, ...], Any]) -> Scenario:
         """
-        Scenario of values that are drawn, at the study's own place.
+        Scenario with drawn values, on the grid of the study.
 
         Parameters
         ----------
         drawn : mapping of tuple of str to object
-            By the path of a key.
+            Drawn values by the path of their key.
 
         Returns
         -------
@@ -135,7 +136,7 @@ class Study:
         Raises
         ------
         ValueError
-            If they are not allowed.
+            If a value is not allowed.
         """
         values = deepcopy(self.values)
         for path, value in drawn.items():
@@ -150,12 +151,12 @@ StudyLike: TypeAlias = Annotated[
 
 def read_study(path: FilePath) -> Study:
     """
-    Study of a TOML file: a scenario with the tables ``[draw]`` and ``[dataset]``.
+    Read a study from a TOML file: a scenario with the tables ``[draw]`` and ``[dataset]``.
 
     Parameters
     ----------
     path : str or path
-        Files that it names lie relative to it.
+        TOML file. Paths in it are relative to its folder.
 
     Returns
     -------
@@ -164,7 +165,7 @@ def read_study(path: FilePath) -> Study:
     Raises
     ------
     ValueError
-        If it is missing or not TOML, or a key, a value or a distribution is wrong.
+        If the file is missing or not TOML, or a key, value or distribution is wrong.
 
     Examples
     --------
@@ -191,7 +192,7 @@ def read_study(path: FilePath) -> Study:
 
 
 def _with_whole_paths(name, table, folder):
-    """Distribution whose choices of files have full paths."""
+    """Distribution with absolute paths if it is a choice of files."""
     key = find_key(name, called="draw:")
     if not isinstance(table, Mapping) or not isinstance(table.get("choice"), list) or key.entry:
         return table
@@ -200,7 +201,7 @@ def _with_whole_paths(name, table, folder):
 
 
 def _check_ground(scenario):
-    """Raise ValueError for maps of real ground, which have one landscape: a study draws its ground."""
+    """Raise ValueError for maps of real ground. They are a single landscape, and a study needs many."""
     for section, key, names in (
         ("ground", "lai_file", (None,)), ("terrain", "dem", LAND_FORMS), ("landscape", "cover", COVERS),
     ):  # fmt: skip
@@ -209,42 +210,40 @@ def _check_ground(scenario):
             drawn = " or ".join(name for name in names if name) or "none"
             raise ValueError(
                 f"{section}.{key} = {shown(value)}: chips of one map would share ground between training and test; a "
-                f"study takes {drawn}"
+                f"study needs {drawn}"
             )
     if scenario.ground.method != "streaming":
-        raise ValueError('ground.method = "periodic" has no windows to cut chips from: type method = "streaming"')
+        raise ValueError('ground.method = "periodic" has no windows for chips: use method = "streaming"')
     lacking = [key for key in ("width", "height") if key not in scenario.grid.model_fields_set]
     if lacking:
-        raise ValueError(
-            f"grid.{lacking[0]} is not given: it is the size of a chip, such as width = 1110, height = 1110"
-        )
+        raise ValueError(f"grid.{lacking[0]} is missing: give the size of a chip, such as width = 1110, height = 1110")
 
 
 def _check_plan(study):
-    """Check the sequence, the number of landscapes and their split."""
+    """Check sequence, number of landscapes and split."""
     if study.sequence not in SEQUENCES:
         hint = nearest(str(study.sequence), SEQUENCES)
         raise ValueError(f"dataset.sequence = {shown(study.sequence)}: {hint}must be one of {', '.join(SEQUENCES)}")
     split, landscapes = study.split, study.landscapes
     if not isinstance(landscapes, int) or isinstance(landscapes, bool) or landscapes < 1:
-        raise ValueError(f"dataset.landscapes = {shown(landscapes)}: must be a whole number from 1 up")
+        raise ValueError(f"dataset.landscapes = {shown(landscapes)}: must be an integer of at least 1")
     shares = list(split.values()) if isinstance(split, Mapping) else []
     are_positive = bool(shares) and all(isinstance(share, int | float) and share > 0 for share in shares)
     if not are_positive or abs(sum(shares) - 1) > 1e-6:
         raise ValueError(
-            f"dataset.split = {shown(split)} must be shares that sum to 1, such as {{ train = 0.8, test = 0.2 }}"
+            f"dataset.split = {shown(split)} must be fractions that sum to 1, such as {{ train = 0.8, test = 0.2 }}"
         )
     if landscapes < len(split):
         raise ValueError(
-            f"dataset.landscapes = {landscapes} cannot be split into {', '.join(split)}, which share no landscape: "
-            f"give {len(split)} or more, or another split"
+            f"dataset.landscapes = {landscapes} are too few for the parts {', '.join(split)}: "
+            f"use {len(split)} or more, or change the split"
         )
 
 
 def _draws(draws, scenario):
     """Drawn keys and their distributions."""
     if not isinstance(draws, Mapping) or not draws:
-        raise ValueError("a study draws something: give a table [draw], such as visibility = { uniform = [10, 60] }")
+        raise ValueError("a study needs a table [draw], such as visibility = { uniform = [10, 60] }")
     known = set()
     for name, table in _flat(draws):
         key = find_key(name, called="draw:")
@@ -259,7 +258,7 @@ def _draws(draws, scenario):
 
 
 def _flat(table, above=""):
-    """Iterate over nested tables with dotted names, and their distributions."""
+    """Iterate over distributions in nested tables, with dotted names."""
     for name, found in table.items():
         if isinstance(found, Mapping) and found and all(isinstance(each, Mapping) for each in found.values()):
             yield from _flat(found, f"{above}{name}.")
@@ -269,19 +268,17 @@ def _flat(table, above=""):
 
 def _check_may_be_drawn(key, scenario):
     if key.path[-1] == "seed":
-        raise ValueError(
-            f"draw.{key.name}: landscapes and noise have seeds of their own, from {key.name} on: leave it out"
-        )
+        raise ValueError(f"draw.{key.name}: seeds are assigned automatically, starting with {key.name}: remove it")
     if key.path in _FIXED or key.place == ("grid",):
-        raise ValueError(f"draw.{key.name}: is the same for all chips: give one value under [{'.'.join(key.place)}]")
+        raise ValueError(f"draw.{key.name} must be equal for all chips: give one value under [{'.'.join(key.place)}]")
     if key.place[0] == "classes" and key.place[1] not in scenario.classes:
         known = ", ".join(scenario.classes) or "none"
-        raise ValueError(f"draw.{key.name}: there is no [{'.'.join(key.place)}], classes are {known}")
+        raise ValueError(f"draw.{key.name}: there is no section [{'.'.join(key.place)}]; the classes are {known}")
 
 
 def _settled(scenario, drawn):
-    """Values that chips share, with explicit sun and atmosphere."""
-    # Chips lie outside the grid of the scenario, but sun and atmosphere must not change with their position.
+    """Values common to all chips, with explicit sun and atmosphere."""
+    # Chips lie outside the grid of the scenario, but must have the same sun and atmosphere.
     whole, values = scenario.complete(), values_of(scenario)
     latitude, longitude = scenario.sun_place()
     sun = {"time": whole.geometry.time, "latitude": latitude, "longitude": longitude}
@@ -292,7 +289,7 @@ def _settled(scenario, drawn):
     settled |= {("atmosphere", "altitude"): scenario.atmosphere.altitude, ("terrain", "dem"): scenario.terrain.dem}
     settled |= {("grid", key): value for key, value in grid_keys(scenario.geobox())}
     for keys in _BY_BAND:
-        # If one band is drawn, the other bands are needed too.
+        # If one band is drawn, values of the other bands are also needed.
         if any(path[:2] == ("ground", key) for path in drawn for key in keys if len(path) == 3):
             settled |= {("ground", key): dict(getattr(whole.ground, key)) for key in keys}
     for path, value in settled.items():
@@ -301,9 +298,9 @@ def _settled(scenario, drawn):
 
 
 def _check_extremes(study):
-    """Check each key at the ends of its distribution, with the others at usual values."""
+    """Check each key at the ends of its distribution, with the other keys at their medians."""
     middle = {key: distribution.usual for key, distribution in study.drawn.items()}
-    cases = [(middle, "draw, all at their medians or first choices: ")]
+    cases = [(middle, "draw, all keys at their median or first choice: ")]
     for key, distribution in study.drawn.items():
         for value in distribution.extremes:
             where = f"draw.{key.name} = {shown(distribution.table)} at {shown(value)}: "

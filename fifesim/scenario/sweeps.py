@@ -1,4 +1,4 @@
-"""Scenarios along axes: regressions for a range of parameters, in one lazy Dataset."""
+"""Parameter sweeps: regressions over ranges of scenario keys, in one lazy Dataset."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fifesim.scenario.ensemble import realise
 from fifesim.scenario.scenario import Scenario, find_key, in_text
 from fifesim.scenario.simulation import simulate
 
-# What is kept of a regression of the truth on NDVI.
+# Statistics of the regression of the truth on NDVI.
 STATISTICS = ("slope", "intercept", "r2", "residual_deviation", "n")
 VARIABLES = ("lai", "fpar")
 
@@ -31,36 +31,36 @@ def sweep(
     pair: Pairing = "coordinates",
 ) -> xr.Dataset:
     """
-    Simulate a scenario along axes of its parameters.
+    Simulate a scenario for all combinations of parameter values.
 
-    All points share the scenario's seeds, and so their random numbers.
+    All combinations use the seeds of the scenario, and therefore the same random numbers.
 
     Parameters
     ----------
     scenario : fifesim.scenario.scenario.Scenario
     axes : mapping
-        By name, the values of a key of the scenario, such as ``{"arp": [0.05, 0.15], "visibility": [10, 45]}``; a key
-        that several sections have is written ``"ground.seed"``, one of a class ``"classes.grass.brown"``. Or by any
-        name a pair of values and a function that takes a Scenario and a value and gives a Scenario. Values that are
-        lists, such as an ``offset``, stand in the coordinate as text: "0.2, 0.0".
+        Values by key, such as ``{"arp": [0.05, 0.15], "visibility": [10, 45]}``. Add the section if the key occurs in
+        several, as in ``"ground.seed"`` or ``"classes.grass.brown"``. Alternatively, an arbitrary name with a tuple of
+        values and a function of (Scenario, value) that returns a Scenario. In the coordinate, list values such as
+        ``offset`` are text: "0.2, 0.0".
     measures : mapping of str to callable, optional
-        Each takes the run, an `xarray.DataTree` with ``image`` and ``truth`` in memory, and gives a number. By default
-        the regressions of true LAI and FPAR on NDVI.
+        Functions that compute a number from a run, an `xarray.DataTree` with ``image`` and ``truth`` in memory. By
+        default the regressions of true LAI and FPAR on NDVI.
     pair : {"coordinates", "index"}, optional
         As in `regress`, for the default measures.
 
     Returns
     -------
     results : xarray.Dataset
-        Lazy, one task a point. Dimensions are the axes and, for the default measures, ``variable`` (lai, fpar): slope,
-        intercept, r2, residual_deviation and n.
+        Lazy, one task per combination. The dimensions are the axes. The default measures are slope, intercept, r2,
+        residual_deviation and n, with an additional dimension ``variable`` (lai, fpar).
 
     Raises
     ------
     ValueError
-        If an axis has no values or is no key.
+        If an axis has no values or is not a key.
     TypeError
-        If the axes are no mapping.
+        If `axes` is not a mapping.
 
     Examples
     --------
@@ -70,11 +70,11 @@ def sweep(
     {'arp': 3, 'visibility': 2, 'variable': 2}
     """
     if not isinstance(scenario, Scenario):
-        raise TypeError(f"sweep takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+        raise TypeError(f"sweep needs a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     if not isinstance(axes, Mapping):
         raise TypeError(f"axes must map keys to values, such as {{'visibility': [5, 45]}}, got {described(axes)}")
     if not axes:
-        raise ValueError("a sweep needs an axis, such as {'arp': [0.05, 0.15, 0.24]}")
+        raise ValueError("a sweep needs at least one axis, such as {'arp': [0.05, 0.15, 0.24]}")
     check_pair(pair)
     steps = {name: _axis(name, given) for name, given in axes.items()}
     names = STATISTICS if measures is None else tuple(measures)
@@ -97,11 +97,11 @@ def sweep(
 
 
 def _point(scenario, measures, pair):
-    """Results of one scenario, computed in this thread, because points run in parallel."""
+    """Results of one scenario, computed in the calling thread, because scenarios run in parallel."""
     if measures is not None:
         run = simulate(scenario)
         kept = xr.DataTree.from_dict({name: run[name].to_dataset() for name in ("image", "truth")})
-        # A measure may need any part of the run.
+        # A user-defined measure may need any part of the run.
         kept = kept.map_over_datasets(lambda node: node.compute(scheduler="synchronous"))
         return np.array([float(measure(kept)) for measure in measures.values()])
     kept = realise(scenario)
@@ -110,11 +110,11 @@ def _point(scenario, measures, pair):
 
 
 def _axis(name, given):
-    """Values of an axis, the function that puts a value into a scenario, and attributes for plots."""
+    """Values of an axis, the function that sets a value in a scenario, and attributes for plots."""
     has_function = isinstance(given, tuple) and len(given) == 2 and callable(given[1])
     values = given[0] if has_function else given
     if isinstance(values, str) or not np.iterable(values) or not len(list(values)):
-        raise ValueError(f"the axis {name!r} needs a list of values, got {values!r}: write [value], even for one")
+        raise ValueError(f"the axis {name!r} needs a list of values, got {values!r}: write [value] for a single value")
     if has_function:
         return list(values), given[1], {}
     key = find_key(name)

@@ -1,4 +1,4 @@
-"""Scenarios as TOML text: a check of the spelling of keys, one line for each mistake, and writing with every unit."""
+"""Scenarios as TOML text: spelling checks with one line per mistake, and writing with units."""
 
 import inspect
 import os
@@ -13,14 +13,14 @@ from fifesim.base.files import in_a_line, read_toml, shown
 from fifesim.base.messages import closest, in_own_words, nearest
 from fifesim.scenario.keys import Keys
 
-# Length of the text on all mistakes of a scenario. [character]
+# Maximum length of the message on all mistakes of a scenario. [character]
 _LONGEST = 500
 # Types of errors whose message is followed by the meaning of the key.
 _OTHER_KINDS = ("dict_type", "list_type", "string_type")
 
 
 def load_values(path):
-    """Values of a TOML file, with full paths for the files that it names relative to it."""
+    """Values of a TOML file. Relative paths in it become absolute."""
     path = Path(path)
     try:
         values = read_toml(path)
@@ -30,14 +30,14 @@ def load_values(path):
 
 
 def with_folder(values, folder):
-    """Values of a scenario with full paths of its files, changed in place."""
+    """Make the file paths of a scenario absolute, in place."""
     for _, table, key in list(named_files(values)):
         table[key] = full_path(table[key], folder)
     return values
 
 
 def full_path(path, folder="."):
-    """Full path of a file in a scenario, without resolving links; GDAL's virtual paths stay."""
+    """Absolute path of a file in a scenario, without resolving links. GDAL's virtual paths are unchanged."""
     return path if path.startswith("/vsi") else os.path.abspath(os.path.join(folder, path))
 
 
@@ -60,8 +60,8 @@ def _tables(values):
 
 def mistakes(error, values, model):
     """Mistakes of a scenario, one line each."""
-    # A section with an unknown key is not checked as a whole, so the values are checked again with near misses
-    # corrected, and without other unknown keys.
+    # A section with an unknown key is not checked as a whole. Check the values again after correcting near misses and
+    # removing other unknown keys.
     found = error.errors()
     lines, unknown = [_explain(item) for item in found], [item for item in found if item["type"] == "extra_forbidden"]
     if unknown:
@@ -81,7 +81,7 @@ def mistakes(error, values, model):
 
 
 def _shortened(lines):
-    """As many lines as are readable, and the number of the others."""
+    """The first lines, and the number of omitted lines."""
     kept = lines[:1]
     for line in lines[1:]:
         if len("\n".join((*kept, line))) > _LONGEST - len("\nand 1000000 more"):
@@ -128,7 +128,7 @@ def _document(heading, tables):
 def _described(section):
     """Table of a section, with the meaning of each key in a comment."""
     table = tomlkit.table().comment(inspect.getdoc(type(section)).splitlines()[0])
-    # A key below a table inside this one would be part of that table.
+    # A key after a nested table would become part of that table.
     for key, known in sorted(section.written.items(), key=lambda item: isinstance(getattr(section, item[0]), dict)):
         value, unit = getattr(section, key), section.unit(key)
         meaning = f"{unit}; {known.description}" if unit else known.description
@@ -145,7 +145,7 @@ def _known(place):
 
 
 def _explain(error):
-    """One line that names the key, the value and the allowed values."""
+    """One line with the key, the value and the allowed values."""
     place, value = [str(part) for part in error["loc"]], error["input"]
     key = in_a_line(".".join(place), 100)
     if error["type"] == "extra_forbidden":
@@ -158,7 +158,7 @@ def _explain(error):
         known = section.model_fields.get(place[-1]) if section else None
         message += f" ({known.description})" if known else ""
     if isinstance(value, str):
-        # Messages of libraries repeat the value in full.
+        # Messages of libraries repeat the complete value.
         message = message.replace(repr(value), shown(value))
     if isinstance(value, dict):
         return in_a_line(": ".join(filter(None, (key, message))))

@@ -80,7 +80,7 @@ def _in_micrometres(coordinate, scale):
 MIN_COVERAGE = 0.99
 """Share of a band's weight that a spectrum must cover [1]."""
 
-# A message names so many bands, and refers to others by their number.
+# Maximum number of band names in a message.
 _NAMED = 3
 
 
@@ -92,44 +92,42 @@ def to_bands(
     min_coverage: float = MIN_COVERAGE,
 ) -> xr.DataArray:
     """
-    Spectra as the bands of an instrument: a hyperspectral image, or field spectra.
+    Convert spectra to the bands of an instrument, for hyperspectral images and field spectra.
 
-    Reflectance is weighted by spectral response times solar irradiance, for a band's reflectance is reflected over
-    incident light. Radiance is weighted by the response alone. `units` tells them apart.
+    Reflectance is weighted by spectral response times solar irradiance, because band reflectance is the ratio of
+    reflected to incident light. Radiance is weighted by the response alone. The attribute `units` determines the case.
 
     Parameters
     ----------
     spectra : xarray.DataArray
-        Reflectance or radiance with a coordinate ``wavelength`` along one of its dimensions, in um, or in nm where its
-        attribute ``units`` says so; in any order, evenly spaced or not. Other dimensions are what they are: (y, x),
-        (sample), (time, y, x). A coordinate ``fwhm`` along the same dimension says how wide the samples are.
-        [1 or W m-2 sr-1 um-1]
+        Reflectance or radiance with a coordinate ``wavelength`` along one dimension, in um, or in nm if stated in its
+        attribute ``units``. Any order and spacing is possible, and any other dimensions. A coordinate ``fwhm`` along
+        the same dimension gives the width of the samples. [1 or W m-2 sr-1 um-1]
     instrument : str or Instrument
-        Whose bands.
+        Instrument that has the bands.
     bands : str or sequence of str, optional
         Names of its bands; all by default.
     min_coverage : float, optional
-        Share of a band's weight that must lie on wavelengths that the spectra cover. [1]
+        Minimum fraction of the band weight on wavelengths covered by the spectra. [1]
 
     Returns
     -------
     image : xarray.DataArray
-        With a dimension ``band``, of the same dimensions otherwise, and the coordinates that are not along wavelength.
-        NaN where a sample that counts in the band is. Lazy where the spectra are. [1 or W m-2 sr-1 um-1]
+        The wavelength dimension is replaced by ``band``; other dimensions and coordinates are kept. NaN if a sample
+        within the band is NaN. Lazy if the spectra are. [1 or W m-2 sr-1 um-1]
 
     Raises
     ------
     ValueError
-        If a band is not covered; the message names the wavelengths that are missing. If wavelengths have no unit and
-        are not in um, or the spectra are whole numbers.
+        If a band is not covered (the message names the missing wavelengths), the unit of the wavelengths is unclear, or
+        the spectra are integers without a scale.
 
     Notes
     -----
-    The samples are taken as they are, as points of a spectrum that is straight between them: they are already means
-    over the response of the spectrometer, and that is not undone. A step is a gap, which covers nothing, where the
-    hole between two samples is wider than the mean of both ``fwhm``; without ``fwhm``, where the step is more than
-    2.5 times the median of those around it. What is missing within ``min_coverage`` has no weight: a flat spectrum
-    stays flat.
+    Spectra are interpolated linearly between samples, without deconvolving the response of the spectrometer. A step is
+    treated as a gap if the uncovered interval exceeds the mean ``fwhm`` of its samples; without ``fwhm``, if the step
+    exceeds 2.5 times the median of the neighbouring steps. Gaps allowed by ``min_coverage`` have no weight, so a flat
+    spectrum remains flat.
 
     See Also
     --------
@@ -151,7 +149,7 @@ def to_bands(
     if spectra.dtype.kind != "f":
         raise ValueError(
             f"spectra must be reflectance or radiance, got whole numbers ({spectra.dtype}) without a scale: type "
-            ".assign_attrs(scale_factor=0.0001) for what scales them"
+            ".assign_attrs(scale_factor=0.0001) with the scale of the data"
         )
     if not 0 < min_coverage <= 1:
         raise ValueError(f"min_coverage must be in (0, 1], got {min_coverage:g}: it is a share, such as 0.95")

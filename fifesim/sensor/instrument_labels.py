@@ -22,7 +22,7 @@ from fifesim.sensor.description.spectral_response import ResponseList
 
 _ADAPTER: TypeAdapter = TypeAdapter(Instrument)
 
-# What the paper simulates, and so scenes made on its site.
+# Instrument of the paper, the default for scenes on the FIFE site.
 _FIFE = "TM"
 
 
@@ -79,8 +79,8 @@ def given_instrument(given, array):
         found = find_instrument(_FIFE)
     if found is None:
         raise ValueError(
-            f"nothing says which instrument looks at {array.name or 'the raster'}: give instrument=, one of "
-            f"{', '.join(instrument_names())}, or a file of your own"
+            f"the instrument of {array.name or 'the raster'} is unknown: give instrument=, one of "
+            f"{', '.join(instrument_names())}, or an instrument file"
         )
     return found
 
@@ -197,7 +197,7 @@ def psf(instrument: InstrumentLike = "TM", band: str | None = None, *, spacing: 
     band : str, optional
         Name of a band; the first by default.
     spacing : float, optional
-        Between samples; by default the response is 121 samples wide. [m]
+        Distance between samples; by default the response is 121 samples wide. [m]
 
     Returns
     -------
@@ -208,7 +208,7 @@ def psf(instrument: InstrumentLike = "TM", band: str | None = None, *, spacing: 
     Raises
     ------
     ValueError
-        If there is no such instrument or band, or the spacing is not positive.
+        If the instrument or band is unknown, or the spacing is not positive.
 
     See Also
     --------
@@ -255,21 +255,20 @@ def mtf(
     bands : str or sequence of str, optional
         Names of bands; all by default.
     frequency : array, optional
-        Spatial frequencies; by default from 0 to that of the closest samples, twice the Nyquist frequency.
-        [cycles m-1]
+        Spatial frequencies; by default from 0 to twice the Nyquist frequency of the finest sampling. [cycles m-1]
 
     Returns
     -------
     mtf : xarray.DataArray, dims (band, direction, frequency)
-        ``direction`` is "along" or "across" the track. Negative where bright and dark change places. Coordinates along
-        band and direction are the Nyquist frequency of the band's own interval, ``nyquist``, and the transfer there,
-        ``at_nyquist``; those of the pixels of the gridded product are ``product_nyquist`` and ``at_product_nyquist``.
-        [1]
+        ``direction`` is "along" or "across" the track. Negative values mean reversed contrast. Coordinates along band
+        and direction are the Nyquist frequency of the sampling interval, ``nyquist``, and the transfer there,
+        ``at_nyquist``; and likewise ``product_nyquist`` and ``at_product_nyquist`` for the pixels of the gridded
+        product. [1]
 
     Raises
     ------
     ValueError
-        If there is no such instrument or band.
+        If the instrument or band is unknown.
 
     See Also
     --------
@@ -344,7 +343,7 @@ def noise_equivalent_radiance(instrument: InstrumentLike, band: str, radiance: N
     Raises
     ------
     ValueError
-        If there is no such instrument or band, its description has no noise, or a radiance is negative.
+        If the instrument or band is unknown, its description has no noise, or a radiance is negative.
 
     Examples
     --------
@@ -375,7 +374,7 @@ def snr(instrument: InstrumentLike, band: str, radiance: Numbers) -> np.ndarray:
     Raises
     ------
     ValueError
-        If there is no such instrument or band, its description has no noise, or a radiance is negative.
+        If the instrument or band is unknown, its description has no noise, or a radiance is negative.
 
     Examples
     --------

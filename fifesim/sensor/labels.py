@@ -50,8 +50,8 @@ def check_scaling(scaling, description, quantise=True):
         raise ValueError("scaling='product' is one of digital numbers: leave it out, or quantise=False")
     if scaling == "product" and description.product is None:
         raise ValueError(
-            f"the description of {description.name} has no product that is scaled by reflectance, as those of OLI, "
-            "OLI2, MSI and MSI-B have: leave scaling out, or give [product] in a file of your own"
+            f"the description of {description.name} has no product scaled to reflectance, unlike OLI, "
+            "OLI2, MSI and MSI-B: leave scaling out, or add [product] to an instrument file"
         )
 
 
@@ -73,7 +73,7 @@ def recorded(radiance, description, bands, quantise, product_geometry=None):
     scales = {}
     if quantise:
         gain, offset, bits = scale(description, bands, product_geometry)
-        # A product's numbers are linear, whatever the detector's are.
+        # Numbers of a product are linear, even if those of the detector are not.
         compression = [band.compressed_count(bits) if product_geometry is None else 0 for band in bands]
         scales = {"gain": gain, "offset": offset} | ({"compression": compression} if any(compression) else {})
         along_band = [xr.Variable("band", values) for values in (gain, offset, compression)]
@@ -146,8 +146,8 @@ def noise_models(instrument, bands, kinds, given=None):
     return models
 
 
-# Share of its footprint's weight that a pixel needs on valid cells. The footprint of Table 1, 30.32 m, leaves a
-# scene of whole 30 m pixels by 0.16 m.
+# Minimum weight of a footprint on valid cells. The footprint of Table 1, 30.32 m, extends 0.16 m beyond a scene of
+# whole 30 m pixels.
 MIN_VALID = 0.98
 
 # Coordinates that turn digital numbers into radiance.
@@ -172,59 +172,58 @@ def sense(
     time: Time | None = None,
 ) -> Image:
     """
-    Image that an instrument records: regularized onto its pixels, with its noise, and digitised.
+    Simulate the image recorded by an instrument: spatial response, noise and digitisation.
 
     Parameters
     ----------
     toa : xarray.DataArray, dims (band, y, x)
-        Reflectance or radiance at the top of the atmosphere, by cells. Bands are those of the instrument that have the
-        same name, or else whose response is there at their ``wavelength``. [1 or W m-2 sr-1 um-1]
+        Reflectance or radiance of the cells at the top of the atmosphere. Bands are matched with the instrument by
+        name, or by ``wavelength``. [1 or W m-2 sr-1 um-1]
     instrument : str or fifesim.sensor.description.instruments.Instrument, optional
-        By default that whose bands the array carries.
+        Instrument; by default from the array.
     onto : odc.geo.geobox.GeoBox, optional
         North-up grid of pixels in the CRS of the scene, of any size and offset. By default the instrument's gridded
         product, with the upper left corner of the scene.
     interval : "native", float or (float, float), optional
-        Distance between pixels instead of that of the gridded product: the instrument's own at nadir, or metres, down
-        and across. The coordinates move with it; footprints stay. [m]
+        Distance between pixels, instead of the gridded product: "native" for the sampling interval at nadir, or metres,
+        down and across. It changes the coordinates, but not the footprints. [m]
     offset : (float or array, float or array), optional
-        Registration error southward and eastward, a number or a drift of one for each row and each column. The pixels
-        see the ground beside them; the coordinates stay nominal. [pixel]
+        Registration error southward and eastward, as numbers, or as a drift with one value per row and per column.
+        Footprints are shifted; coordinates stay nominal. [pixel]
     noise : str or sequence of str, optional
-        Among "shot", "thermal" and "fixed-pattern", or "all" for the kinds that the instrument has. Its description
-        has their size; a kind that it lacks is refused.
+        Noise components: "shot", "thermal" and "fixed-pattern", or "all" components known for the instrument. Unknown
+        components raise an error.
     seed : int, optional
-        Of the noise.
+        Seed of the noise generator.
     noise_models : fifesim.sensor.response.noise.NoiseModel, or mapping of str to NoiseModel, optional
-        Size of the noise for every band, or by name of a band, where the description lacks it or is not to count.
+        Noise model for all bands, or by band name, instead of the description of the instrument.
     quantise : bool, optional
-        Whether to digitise; radiance otherwise.
+        If False, return radiance.
     scaling : "detector" or "product", optional
-        What a digital number is: a count of the instrument's own, spread over its radiances; or one of the agency's
-        Level-1 product, which is scaled by reflectance (OLI, OLI2; MSI and MSI-B with the offset of processing baseline
-        04.00). Those are finer than the detector's, whose steps are not in them.
+        Scaling of digital numbers: counts of the detector over its range of radiance, or numbers of the Level-1
+        product, which are scaled to reflectance (OLI, OLI2; MSI and MSI-B with the offset of processing baseline
+        04.00). Product numbers have smaller steps than the detector; its quantisation is not simulated for them.
     min_valid : float, optional
-        Share of its footprint that a pixel needs on valid cells; below it is no data. [1]
+        Minimum fraction of the footprint on valid cells; below it the pixel is no data. [1]
     geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
-        By default that which the array carries, else of the sun at its time and place. A radiance needs none.
+        Directions of sun and sensor; by default from the coordinates of the array, else from its time and place. Not
+        needed for radiance.
     time : str or datetime, optional
-        In the place of ``geometry``: when the sun stood over the scene.
+        Time for the position of the sun, instead of ``geometry``.
 
     Returns
     -------
     image : xarray.DataArray of unsigned integers, dims (band, y, x)
         Digital numbers from 1; 0 is no data. ``gain``, ``offset``, ``wavelength`` and ``solar_irradiance`` are
-        coordinates along band, and ``compression`` where a band has a scale of square roots. Without ``quantise``,
-        radiance with ``wavelength`` and ``solar_irradiance``. Of bands of several resolutions, an `xarray.DataTree`
-        with a node for each, such as ``/10m`` and ``/20m``, that holds its ``dn``, or ``toa_radiance``.
-        [1 or W m-2 sr-1 um-1]
+        coordinates along band, and ``compression`` if a band has a square-root scale. With ``quantise=False``, radiance
+        with ``wavelength`` and ``solar_irradiance``. For bands of several resolutions, an `xarray.DataTree` with one
+        node per resolution, such as ``/10m``, which has ``dn`` or ``toa_radiance``. [1 or W m-2 sr-1 um-1]
 
     Raises
     ------
     ValueError
-        If the instrument is unknown, has none of the bands, no such noise or no such scaling, ``onto`` is no grid of
-        the scene's CRS or lies beside the scene, a point spread is wider than the scene, or `to_toa` made the raster
-        for another sun.
+        If the instrument, its bands, noise or scaling are unknown; ``onto`` has another CRS or does not overlap the
+        scene; a point spread is wider than the scene; or `to_toa` used another sun.
 
     See Also
     --------
@@ -271,7 +270,7 @@ def sensed(
         means = means_by_band(
             scene, description, bands, pixels, offset=offset, min_valid=min_valid, line_spreads=line_spreads
         )
-        # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
+        # Lines are counted from the origin of the CRS, so that a window has the same noise as the whole image.
         first = grids.lattice_position(pixels)
         radiance = noisy(as_radiance(means, bands, light), description, bands, noise, seed, first, noise_models)
         image, carried = recorded(radiance, description, bands, quantise, light if scaling == "product" else None)
@@ -335,18 +334,18 @@ def to_radiance(image: xr.DataArray) -> xr.DataArray:
     Parameters
     ----------
     image : xarray.DataArray of unsigned integers, dims (band, y, x)
-        With coordinates ``gain`` and ``offset``, and ``compression`` where it has one, as `sense` makes it.
+        With coordinates ``gain`` and ``offset``, and ``compression`` if applicable, as from `sense`.
 
     Returns
     -------
     radiance : xarray.DataArray, dims (band, y, x)
-        Within half a count of what was recorded, NaN where there are no data. [W m-2 sr-1 um-1]
+        Radiance, within half a count; NaN for no data. [W m-2 sr-1 um-1]
 
     Raises
     ------
     ValueError
-        If the image carries no calibration, a gain is not above 0, its units are not those of digital numbers, or a
-        value is negative, fractional or above the largest digital number; for lazy data, when they are computed.
+        If the image has no calibration, a gain is not above 0, the units are wrong, or a value is negative, fractional
+        or above the largest digital number. Lazy data are checked when they are computed.
 
     See Also
     --------
@@ -387,7 +386,7 @@ def to_reflectance(image: xr.DataArray) -> xr.DataArray:
     Parameters
     ----------
     image : xarray.DataArray, dims (band, y, x)
-        Digital numbers or radiance, with the coordinates that `sense` gives.
+        Digital numbers or radiance, with the coordinates from `sense`.
 
     Returns
     -------
@@ -397,8 +396,8 @@ def to_reflectance(image: xr.DataArray) -> xr.DataArray:
     Raises
     ------
     ValueError
-        If the image carries no calibration, solar irradiance or solar zenith angle, they give impossible values, or a
-        value cannot be a digital number, as in `to_radiance`.
+        If calibration, solar irradiance or solar zenith angle are missing or give impossible values, or a value is not
+        a valid digital number, as in `to_radiance`.
 
     See Also
     --------

@@ -43,7 +43,7 @@ def _shift(offset, size, pixel, axis):
     if np.abs(offset).min() >= size:
         raise ValueError(
             f"the offset of {axis} must be less than the {size} pixels of the image, got {offset.flat[0]:g}: every "
-            "pixel would lie beside the scene; give it in pixels, not metres"
+            "pixel would be outside the scene; give it in pixels, not metres"
         )
     return offset * pixel
 
@@ -57,7 +57,7 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
     """Grid of the pixels of an image."""
     if onto is not None:
         if interval is not None:
-            raise ValueError("onto and interval both say where pixels lie: give one of them")
+            raise ValueError("onto and interval both determine the pixel grid: give one of them")
         pixels = grids.check_grid(onto)
         if pixels.crs != scene.crs:
             wanted, got = (projection.name_of(grid.crs.proj) for grid in (scene, pixels))
@@ -116,7 +116,7 @@ def common_size(instrument, bands, size):
             for (along, across), numbers in groups.items()
         ]
         raise ValueError(
-            f"bands of {instrument.name} lie on different grids ({'; '.join(parts)}): sense each group by itself, or "
+            f"bands of {instrument.name} have different grids ({'; '.join(parts)}): sense each group separately, or "
             "bring all onto one grid with onto= or interval="
         )
     return next(iter(groups))

@@ -51,27 +51,27 @@ def scan_geometry(
     ----------
     instrument : str or fifesim.sensor.description.instruments.Instrument
     grid : odc.geo.geobox.GeoBox
-        Of cells or of pixels.
+        Grid of cells or pixels.
     track : fifesim.sensor.response.scan.Track, optional
-        Ground track. By default it passes beside the middle of the grid.
+        Ground track; by default derived from `nadir_offset` and `heading`.
     nadir_offset : float, optional
-        Distance of the middle of the grid from the track, to the right of the flight. [m]
+        Distance of the grid centre from the track, to the right of the flight direction. [m]
     heading : float, optional
-        Direction of flight that goes with ``nadir_offset``, clockwise from north; southward by default, so that the
-        right is the west. [degree]
+        Flight direction for ``nadir_offset``, clockwise from north; by default southward, with west on the right.
+        [degree]
     chunks : mapping or int or "auto", optional
-        Makes the result lazy.
+        Chunks of a lazy result; in memory by default.
 
     Returns
     -------
     view : xarray.Dataset of ``vza`` and ``vaa``, dims (y, x)
-        Azimuth toward the sensor, clockwise from true north; NaN where the instrument does not see the ground. Altitude
-        and track are attributes. [degree]
+        Azimuth toward the sensor, clockwise from true north; NaN outside the swath. Altitude and track are attributes.
+        [degree]
 
     Raises
     ------
     ValueError
-        If the grid is no grid, both ways of giving the track are used, or all of the grid lies outside of the swath.
+        If the grid is invalid, the track is given in two ways, or the grid is outside the swath.
 
     See Also
     --------
@@ -108,7 +108,7 @@ def find_track(grid, track=None, nadir_offset=0.0, heading=180.0):
     """Ground track, as given or at an offset from the middle of a grid."""
     if track is not None:
         if nadir_offset:
-            raise ValueError("track and nadir_offset both say where the instrument flies: give one of them")
+            raise ValueError("track and nadir_offset both determine the track: give one of them")
         if not isinstance(track, scan.Track):
             raise TypeError(f"track must be a fifesim.Track(latitude, longitude, heading), got {track!r}")
         return track
@@ -173,7 +173,7 @@ def _view(name, grid, track, altitude, limit, row, column, shape):
     return np.where(seen, np.degrees(np.arctan2(east, north)) % 360, np.nan)
 
 
-# Rows and columns of pixels that are made at once.
+# Rows and columns of pixels per block.
 _BLOCK = 512
 
 
@@ -229,7 +229,7 @@ def _checked(means, vza, vaa, scan_vza, scan_vaa, tolerance, arguments):
     apart = np.where(np.isnan(means), np.nan, angle_between(vza, vaa, scan_vza, scan_vaa))
     if np.any(apart > tolerance):
         raise ValueError(
-            f"the light was computed for another view, vza {_span(vza)}, than that of the scan, vza {_span(scan_vza)}: "
+            f"toa was computed for another view, vza {_span(vza)}, than the scan, vza {_span(scan_vza)}: "
             f"up to {np.nanmax(apart):.1f} degrees apart. Compute it with geometry=fifesim.scan_geometry({arguments})"
             ".assign(sza=..., saa=...), or give view_tolerance=180 if it does not depend on the view"
         )
@@ -241,7 +241,7 @@ def _span(values):
     return f"{low:.1f}" if high - low < 0.05 else f"{low:.1f} to {high:.1f}"
 
 
-# Pixels along each side of a block: the operator of a whole image would fill the memory.
+# Pixels along each side of a block, to limit the memory of the operator.
 _SWATH_BLOCK = 128
 
 # Displacement on the ground by which the frame of a pixel is found. [m]
@@ -266,44 +266,44 @@ def sense_swath(
     view_tolerance: float = 1.0,
 ) -> xr.DataArray:
     """
-    Image of a scan as the instrument takes it: by line and sample, at its own interval, and never resampled.
+    Simulate a scan by line and sample, at the sampling interval of the instrument and without resampling.
 
-    Each pixel has the footprint of its scan angle, turned as the track lies on the grid. Lines that a whiskbroom sweeps
-    together spread toward the ends of the scan and overlap the lines of the next sweep (bow-tie). Samples are summed,
-    and lines deleted, as on board.
+    The footprint of each pixel depends on its scan angle and is rotated with the track. Lines of one sweep of a
+    whiskbroom scanner spread toward the ends of the scan and overlap the next sweep (bow-tie). Samples are summed and
+    lines deleted as on board.
 
     Parameters
     ----------
     toa : xarray.DataArray, dims (band, y, x)
         As in `fifesim.sensor.labels.sense`. [1 or W m-2 sr-1 um-1]
     instrument : str or fifesim.sensor.description.instruments.Instrument, optional
-        By default that whose bands the array carries.
+        Instrument; by default from the array.
     track, nadir_offset, heading : optional
         As in `fifesim.sensor.scan_labels.scan_geometry`.
     noise, seed, noise_models, quantise, min_valid, geometry, time : optional
         As in `fifesim.sensor.labels.sense`.
     view_tolerance : float, optional
-        How far the view that the light was computed for may be from that of the scan; 180 takes light that does not
-        depend on it. [degree]
+        Maximum difference between the view directions of `toa` and of the scan; use 180 if `toa` does not depend on the
+        view. [degree]
 
     Returns
     -------
     image : xarray.DataArray, dims (band, line, sample)
-        Digital numbers or radiance. Lines follow the flight, samples go from its left to its right. ``latitude``,
+        Digital numbers or radiance. Lines are in flight direction, samples from left to right. ``latitude``,
         ``longitude``, ``x``, ``y``, ``vza`` and ``vaa`` are coordinates of each pixel. ``sweep`` is the number of the
         sweep of each line if several lines are swept together. ``deleted`` marks the pixels that the instrument
-        deletes on board: they have a place, and NaN or digital number 0. [1 or W m-2 sr-1 um-1]
+        deletes on board, which are NaN or digital number 0. [1 or W m-2 sr-1 um-1]
 
     Raises
     ------
     ValueError
-        As in `fifesim.sensor.labels.sense`, if no pixel of the scan lies in the scene, and, where angles are lazy when
-        it computes, if the light was computed for another view.
+        As in `fifesim.sensor.labels.sense`, or if no pixel is in the scene, or `toa` was computed for another view (for
+        lazy angles, when computed).
 
     Notes
     -----
-    Sweeps follow each other by the height of a sweep at nadir. The platform stands still during a sweep, the
-    instrument stands abeam of each pixel, and noise does not depend on the number of samples that are summed.
+    Sweeps are spaced by the height of a sweep at nadir. The platform does not move during a sweep, each pixel is seen
+    at right angles to the track, and noise does not depend on the number of summed samples.
 
     See Also
     --------

@@ -112,8 +112,8 @@ def test_bright_surroundings_brighten(ground):
 @pytest.mark.parametrize(
     "options, message",
     [
-        ({"surroundings": 0.2}, "surroundings matter with adjacency=True only"),
-        ({"adjacency": True, "elevation": True}, "adjacency takes one geometry and one altitude, got elevation"),
+        ({"surroundings": 0.2}, "surroundings have an effect only with adjacency=True"),
+        ({"adjacency": True, "elevation": True}, "adjacency needs a single geometry and altitude, got elevation"),
     ],
 )
 def test_options_that_do_not_go_together_are_named(ground, options, message):
@@ -126,12 +126,12 @@ def test_options_that_do_not_go_together_are_named(ground, options, message):
 def test_swath_needs_a_table(ground, swath):
     with pytest.raises(ValueError, match="engine='6S' runs for one geometry"):
         toa_from_surface(ground, fifesim.Atmosphere(engine="6S"), BANDS, swath)
-    with pytest.raises(ValueError, match="adjacency takes one geometry and one altitude, got rasters of sza, vza"):
+    with pytest.raises(ValueError, match="adjacency needs a single geometry and altitude, got rasters of sza, vza"):
         toa_from_surface(ground, AIR, BANDS, swath, adjacency=True)
 
 
 def test_angle_on_other_cells_is_refused(ground, swath):
-    with pytest.raises(ValueError, match="lie on different grids"):
+    with pytest.raises(ValueError, match="have different grids"):
         toa_from_surface(ground, AIR, BANDS, by_cell(40.0, 120.0, swath.vza[:-1], 200.0))
 
 

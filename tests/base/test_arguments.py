@@ -221,7 +221,7 @@ def calls(tmp_path_factory):
         "invert": {"ndvi": ndvi, "fit": fifesim.regress(lai, ndvi), "quantity": "lai", "level": 0.95},
         "inversion_error": {"estimate": lai, "truth": lai, "pair": "coordinates"},
         "score": {"estimate": fifesim.invert(ndvi, fit), "truth": lai.isel(y=slice(6), x=slice(6)), "pair": "index"},
-        "noise_std": {"image": image, "instrument": "TM", "noise_models": fifesim.NoiseModel(thermal=1.0)},
+        "noise_std": {"image": image, "instrument": "TM", "noise_models": fifesim.NoiseModel(1.0, 0.1)},
         "share_kept": {"pixels": lai, "cells": lai},
         "density": {"array": lai, "points": 32, "bandwidth": None},
         "scale_bias": {"algorithm": np.sqrt, "array": lai, "pixel": 30.0},
@@ -422,7 +422,10 @@ def test_what_a_user_typed(calls):
         (lambda: fifesim.open_landsat("x_MTL.txt", quality="yes"), "quality must be True or False, got 'yes'"),
         (lambda: fifesim.open_sentinel2("x.SAFE", quality=1), "quality must be True or False, got 1"),
         (lambda: lai.fifesim.surface_reflectance("TM", dems=1), r"no argument 'dems': did you mean 'dem'"),
-        (lambda: rho.drop_vars(["band", "wavelength"]).drop_attrs(deep=False).fifesim.to_toa(), "neither.*wavelength"),
+        (
+            lambda: rho.drop_vars(["band", "wavelength"]).drop_attrs(deep=False).fifesim.to_toa(),
+            "no instrument and no wavelength",
+        ),
     ]
     for call, message in typed:
         with pytest.raises((TypeError, ValueError), match=message) as caught:

@@ -72,8 +72,8 @@ def test_bands_and_options_reach_the_instruments(lai):
 @pytest.mark.parametrize(
     ("instruments", "options", "message"),
     [
-        (["TM", "tm"], {}, "each once"),
-        ([], {}, "at least one"),
+        (["TM", "tm"], {}, "different names, got TM, TM"),
+        ([], {}, "one or more different names, got none"),
         (["TM"], {"bands": {"OLI": ["B4"]}}, "OLI, which is not compared"),
         (["TM", "MT"], {}, "MT"),
     ],
@@ -139,7 +139,7 @@ def test_images_of_an_instrument_s_other_pixels_have_rows_of_their_own(lai):
 
 
 def test_table_of_something_else_is_refused(lai):
-    with pytest.raises(ValueError, match="TM holds no dn and no toa_radiance, but lai"):
+    with pytest.raises(ValueError, match="TM has no dn or toa_radiance, but lai"):
         xr.DataTree.from_dict({"/TM": lai.to_dataset(name="lai")}).fifesim.comparison_table()
 
 

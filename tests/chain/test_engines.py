@@ -70,7 +70,7 @@ def test_reflectance_of_ones_own():
     found = compare_engines(setup(bands=("TM3",)), reflectance=0.25, engines="5S")
     assert found["surface_reflectance"].values.tolist() == [0.25] and "ndvi" not in found
     for wrong in (1.2, [0.1, 0.2, 0.3], np.nan):
-        with pytest.raises(ValueError, match="one number from 0 to 1, or 2, one for each band"):
+        with pytest.raises(ValueError, match="a number from 0 to 1, or 2 numbers, one per band"):
             compare_engines(setup(), reflectance=wrong)
     with pytest.raises(TypeError, match=r"must be a fifesim\.Setup"):
         compare_engines(HAZE)

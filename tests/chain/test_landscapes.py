@@ -78,7 +78,7 @@ def test_arguments_are_those_of_classes_that_leave_them_open(land, rho, lai):
 
 
 def test_argument_that_would_change_nothing_is_refused(land):
-    with pytest.raises(ValueError, match="background is given, and all classes of the landscape have their own"):
+    with pytest.raises(ValueError, match="background is given and also defined by all classes of the landscape"):
         land.fifesim.surface_reflectance("TM", canopy=fifesim.Canopy(background=0.1))
 
 
@@ -119,8 +119,8 @@ def test_code_without_a_class_is_named(land):
 @pytest.mark.parametrize(
     "change, message",
     [
-        (lambda land: land[["cover"]], "a landscape has a variable lai, this Dataset has cover"),
-        (lambda land: land.assign(cover=land.cover.drop_attrs(deep=False)), "does not say what its classes are"),
+        (lambda land: land[["cover"]], "a landscape needs a variable lai, this Dataset has cover"),
+        (lambda land: land.assign(cover=land.cover.drop_attrs(deep=False)), "the classes of the cover are unknown"),
     ],
 )
 def test_other_datasets_are_refused(land, change, message):
@@ -242,7 +242,7 @@ def test_variables_of_a_landscape_win_over_its_classes(site, land):
     alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(brown=scene.brown))
     grass = (land.cover == 1).values
     np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
-    with pytest.raises(ValueError, match="brown is given, and the landscape has a variable brown"):
+    with pytest.raises(ValueError, match="brown is given and also a variable of the landscape"):
         scene.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(brown=0.1))
     number = fifesim.landscape(site, lai=land.lai, brown=0.3).fifesim.surface_reflectance("TM", bands=TM34)
     xr.testing.assert_equal(

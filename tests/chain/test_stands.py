@@ -21,10 +21,10 @@ def own_map(grid=GRID):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({}, "tallgrass is taken for soil and litter, green leaves; give background=.*give leaf_optics="),
-        (BARE, "what grows on lai: FIFE's tallgrass is taken for green leaves; give leaf_optics="),
-        (GREEN, r"taken for soil and litter; give background=\{'soil_dry': 1.0\}"),
-        (GREEN | BARE | {"brown": 0.2}, "taken for dead leaves; give brown_leaf="),
+        ({}, "using FIFE's tallgrass for soil and litter, green leaves; give background=.*give leaf_optics="),
+        (BARE, "the vegetation of lai is unknown: using FIFE's tallgrass for green leaves; give leaf_optics="),
+        (GREEN, r"tallgrass for soil and litter; give background=\{'soil_dry': 1.0\}"),
+        (GREEN | BARE | {"brown": 0.2}, "tallgrass for dead leaves; give brown_leaf="),
     ],
 )
 def test_tallgrass_on_a_map_of_ones_own_is_a_warning(given, message):
@@ -35,7 +35,7 @@ def test_tallgrass_on_a_map_of_ones_own_is_a_warning(given, message):
     ):
         with pytest.warns(UserWarning, match=message) as said:
             function()
-        assert len([each for each in said if "grows" in str(each.message)]) == 1
+        assert len([each for each in said if "vegetation" in str(each.message)]) == 1
         assert {each.filename for each in said if each.category is UserWarning} == {__file__}
 
 
@@ -57,7 +57,7 @@ def test_classes_with_leaves_need_optics():
     patches = fifesim.Patches("voronoi", 100)
     land = fifesim.landscape(ELSEWHERE, cover=patches, classes={"water": water, "forest": forest}, seed=7)
     with pytest.warns(
-        UserWarning, match="grows on lai: FIFE's tallgrass is taken for soil and litter; give background"
+        UserWarning, match="vegetation of lai is unknown: using FIFE's tallgrass for soil and litter; give background"
     ):
         land.fifesim.surface_reflectance("TM", **KNOWN)
     with warnings.catch_warnings(action="error", category=UserWarning):

@@ -149,7 +149,7 @@ def test_hole_in_the_ground_is_no_data_in_the_image(lai):
     [
         (
             {"horizon": xr.DataArray(np.zeros((16, 2, 2)), dims=("direction", "y", "x"))},
-            "a horizon stands around a dem",
+            "a horizon needs an elevation",
         ),
         ({"instrument": "TN"}, "TM"),
         ({"bands": ["TM33"]}, "TM3"),

@@ -95,7 +95,7 @@ def test_dtype_is_known_before_anything_is_computed():
 
 def test_rasters_on_other_grids_are_refused():
     other = raster(fifesim.fife_site(30 / 9, window=((0, 36), (6, 51))), seed=1)
-    with pytest.raises(ValueError, match="'raster0' and 'raster1' lie on different grids"):
+    with pytest.raises(ValueError, match="'raster0' and 'raster1' have different grids"):
         chunks.pointwise(np.add, raster(), other)
 
 

@@ -74,7 +74,7 @@ def test_other_rasters_of_the_same_dates_go_along(season):
     rho = season.fifesim.surface_reflectance("TM", bands=["TM3"], canopy=fifesim.Canopy(background=background))
     alone = season[2].fifesim.surface_reflectance("TM", bands=["TM3"], canopy=fifesim.Canopy(background=background[2]))
     np.testing.assert_array_equal(rho[2], alone)
-    with pytest.raises(ValueError, match=r"the times of .* are not those of the raster"):
+    with pytest.raises(ValueError, match=r"the times of .* differ from the times of the raster"):
         season.fifesim.surface_reflectance("TM", canopy=fifesim.Canopy(background=background[:2]))
 
 
@@ -106,7 +106,7 @@ def test_dates_may_lie_within_what_is_given(season):
 def test_dates_that_do_not_fit_are_told(season):
     with pytest.raises(ValueError, match=r"dimension time has no coordinate.*assign_coords\(time="):
         season.drop_vars("time").fifesim.surface_reflectance("TM")
-    with pytest.raises(ValueError, match="the raster has dates of its own: leave time= out"):
+    with pytest.raises(ValueError, match="the raster has a dimension time: leave time= out"):
         season.fifesim.surface_reflectance("TM", time="2022-05-01T17:00Z")
     with pytest.raises(ValueError, match="dem has dates and the raster of kt has none"):
         fifesim.kt(season[0].fifesim.surface_reflectance("TM"), season * 0)

@@ -170,7 +170,7 @@ def test_write_that_fails_leaves_things_as_they_were(image, tmp_path, before):
 
 def test_angles_that_a_geotiff_cannot_hold_are_said(image, tmp_path):
     swath = image.assign_coords(vza=(("y", "x"), np.full(image.shape[1:], 20.0)))
-    with pytest.warns(UserWarning, match=r"swath.tif leaves out vza, which vary over the cells.* give geometry="):
+    with pytest.warns(UserWarning, match=r"swath.tif lacks vza, which vary by cell.* give geometry="):
         export.to_geotiff(swath, tmp_path / "swath.tif")
 
 

@@ -86,7 +86,7 @@ def test_what_can_be_a_reflectance():
 def test_a_dark_scene_in_percent_is_a_warning():
     """Below 5 % everywhere, so that no value is impossible; a few bright cells are none."""
     for percent in (np.linspace(0.9, 4.5, 100), np.append(np.full(40, 0.2), np.full(60, 1.2))):
-        with pytest.warns(UserWarning, match=r"reflectances above 1.*divide them by\s+100"):
+        with pytest.warns(UserWarning, match=r"reflectances above 1.*divide by\s+100"):
             check_reflectance(percent)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -105,7 +105,7 @@ def test_what_has_no_data_is_not_told_another_value(fractions):
 
 def test_fractions_that_say_a_scale_are_asked_whether_it_was_applied(fractions):
     """Arithmetic keeps attributes, so a raster that was divided still says its scale."""
-    with pytest.raises(ValueError, match=r"says scale_factor 0\.0001.*drop them from \.attrs.*mask_and_scale=True"):
+    with pytest.raises(ValueError, match=r"also scale_factor 0\.0001.*remove them from \.attrs.*mask_and_scale=True"):
         incoming(fractions.assign_attrs(scale_factor=1e-4), "surface_reflectance")
     incoming(fractions.assign_attrs(scale_factor=1.0, add_offset=0.0), "surface_reflectance")
 
@@ -202,7 +202,7 @@ def test_a_dataset_says_its_scale_once(fractions):
 def test_no_data_that_nobody_marks_is_told(fractions):
     """Digital number 0 of Landsat's Level 2 would be a reflectance of -0.2."""
     mine = stored(fractions.fillna(0), scale_factor=2.75e-5, add_offset=-0.2)
-    with pytest.warns(UserWarning, match=r"no value for cells without data.*_FillValue=0"):
+    with pytest.warns(UserWarning, match=r"no value for no data.*_FillValue=0"):
         incoming(mine, "surface_reflectance")
 
 

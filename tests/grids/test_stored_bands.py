@@ -259,5 +259,5 @@ def test_a_composite_without_its_band_of_dates_opens(composite, tmp_path):
 
 def test_dates_that_digital_numbers_cannot_hold_are_left_out_with_a_warning(image, tmp_path):
     dates = np.full(image.shape[1:], np.datetime64("1987-06-06", "ns"))
-    with pytest.warns(UserWarning, match="leaves out date"):
+    with pytest.warns(UserWarning, match="lacks date"):
         image.assign_coords(date=(("y", "x"), dates)).fifesim.to_geotiff(tmp_path / "image.tif")

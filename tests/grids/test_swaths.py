@@ -108,7 +108,7 @@ def test_latitude_and_longitude_are_enough():
     other = image.drop_vars(["x", "y", "spatial_ref"])
     other = other.assign_coords(latitude=(dims, np.asarray(latitude)), longitude=(dims, np.asarray(longitude)))
     np.testing.assert_array_equal(grid_swath(other, GRID), grid_swath(image, GRID))
-    with pytest.raises(ValueError, match="does not say where its pixels lie"):
+    with pytest.raises(ValueError, match="the pixel positions are unknown"):
         grid_swath(image.drop_vars("x"), GRID)
 
 

@@ -27,7 +27,7 @@ from fifesim.output.colours import (
     unit,
 )
 from fifesim.output.maps import composite_bands, false_colour_names, relief_map, value_map
-from fifesim.output.report import finding, fit_figure
+from fifesim.output.report import fit_figure, main_results
 from fifesim.scenario.keys import GroundKeys
 from fifesim.sensor.description.fields import false_colour_bands
 from fifesim.sensor.description.instruments import instrument, instrument_names
@@ -61,7 +61,7 @@ def test_a_quantity_of_the_table_has_its_words_everywhere(clumping, whole):
     fit = fifesim.regress(truth["clumping"], image["ndvi"])
     axis = fit_figure(image, truth, "clumping", fit).axes[0]
     assert axis.get_ylabel() == "True clumping [m² m⁻²]" and axis.get_ylim()[0] >= CLUMPING.lowest
-    assert "of true clumping." in finding(truth, {"clumping": fit}, {})
+    assert "of true clumping about" in main_results(truth, image, truth, {"clumping": fit})[0][2]
     assert layer_words(["clumping"])["clumping"]["axis"] == "clumping [m² m⁻²]"
     sheet = contact_sheet(chips(clumping), ["train"])
     assert [axis.get_ylabel() for axis in sheet.axes if axis.get_ylabel()] == ["image: TM4", "clumping"]

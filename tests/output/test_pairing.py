@@ -43,7 +43,7 @@ def test_run_of_the_papers_ground_says_why_its_r2_is_another():
     mean_x, mean_y = sum(x) / len(x), sum(y) / len(y)
     xy = sum((a - mean_x) * (b - mean_y) for a, b in pairs)
     r2 = xy**2 / sum((a - mean_x) ** 2 for a in x) / sum((b - mean_y) ** 2 for b in y)
-    assert float(re.search(r"R² (0\.\d\d) over 333 x 333 cells", typed)[1]) == pytest.approx(r2, abs=0.0051)
+    assert float(re.search(r"R² (0\.\d\d) for 333 x 333 cells", typed)[1]) == pytest.approx(r2, abs=0.0051)
     assert 0.45 < r2 < 0.7
 
 
@@ -63,4 +63,4 @@ def test_other_runs_are_not_compared(sections):
 
 def test_small_scene_says_what_to_type_alone():
     (_, why), (_, typed) = rows(grid={"width": 120, "height": 120})
-    assert why.startswith("0.61") and typed.startswith("type interval")
+    assert why.startswith("0.61") and typed.startswith("use interval")

@@ -1,11 +1,23 @@
 """What a page says of a scenario."""
 
+import re
+
+import numpy as np
 import pytest
-import xarray as xr
 
 import fifesim
 from fifesim.analysis.regression_labels import regress
-from fifesim.output.report import engine_rows, finding, pairing, title
+from fifesim.output.report import (
+    cautions,
+    engine_rows,
+    finding,
+    fixed,
+    headline,
+    inputs_in_words,
+    main_results,
+    pairing,
+    title,
+)
 from fifesim.scenario.scenario import parse_scenario
 
 
@@ -67,17 +79,46 @@ def test_pairs_are_told_with_how_far_they_lie_apart(run):
     assert ("0.5 pixels further south and 0 further east" in text) is (scenario.sensor.offset == [0.5, 0.0])
 
 
-def test_finding_is_that_of_the_line(run):
+def test_results_are_those_of_the_line(run):
+    """Residuals by numpy, paired by row and column as the regression is."""
     _, image, truth = run
     fit = regress(truth["lai"], image["ndvi"], pair="index")
-    text = finding(truth, {"lai": fit}, {})
-    assert f"explains {100 * fit.r2:.1f} % of the variance of true LAI." in text
+    (value, name, text), (span, *_) = main_results(truth, image, truth, {"lai": fit})
     share = fit.residual_deviation / float(truth["lai"].mean())
-    assert f"{fit.residual_deviation:.3f}, {100 * share:.0f} % of the mean" in text
+    assert (value, name) == (f"± {fit.residual_deviation:.3f}", "LAI")
+    assert f", {100 * share:.0f} % of the mean; R² = {fit.r2:.3f}" in text
+    rows, columns = (min(image.sizes[axis], truth.sizes[axis]) for axis in ("y", "x"))
+    ndvi, true = (each.values[:rows, :columns] for each in (image["ndvi"], truth["lai"]))
+    low, high = np.nanpercentile(fit.intercept + fit.slope * ndvi - true, [5, 95])
+    assert span == f"{fixed(low, 2, True)} to {fixed(high, 2, True)}"
+    assert main_results(truth, image, truth, {}) == []
 
 
 def test_finding_without_a_line_says_why():
-    assert finding(xr.Dataset(), {}, {"lai": "NDVI does not vary", "fpar": "NDVI does not vary"}) == (
+    assert finding({}, {"lai": "NDVI does not vary", "fpar": "NDVI does not vary"}) == (
         "No line was fitted: NDVI does not vary"
     )
-    assert "no NDVI" in finding(xr.Dataset(), {}, {})
+    assert "no NDVI" in finding({}, {})
+
+
+def test_headline_names_instrument_place_and_time():
+    far = {"crs": "EPSG:32735", "west": 600000.0, "north": 7200000.0, "width": 600.0, "height": 600.0}
+    case = {
+        "grid": far,
+        "geometry": {"time": "2022-06-01T10:05Z"},
+        "atmosphere": {"altitude": 1.0},
+        "terrain": {"dem": "flat"},
+        "sensor": {"instrument": "OLI"},
+    }
+    text = headline(parse_scenario(case).complete())
+    assert re.fullmatch(
+        r"Simulated .*Operational Land Imager.* image, 25\.\d\d° S, 2[78]\.\d\d° E, 1 June 2022 10:05 UTC \(.*\)", text
+    )
+
+
+def test_cautions_name_what_is_left_out(run):
+    scenario, image, _ = run
+    said = " ".join(cautions(scenario))
+    assert ("perfectly registered" in said) is not any(scenario.sensor.offset)
+    assert "No detector noise" in said
+    assert "visibility 45 km" in inputs_in_words(scenario, image) and "nadir view" in inputs_in_words(scenario, image)

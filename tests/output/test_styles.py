@@ -56,14 +56,14 @@ def ramp(renderer):
     return [(float(item.get("value")), item.get("color")) for item in renderer.iter("item")]
 
 
-def test_leaf_area_and_ndvi_have_ramps_from_pale_to_green(image, travelled, tmp_path):
+def test_leaf_area_and_ndvi_have_ramps_of_their_own(image, travelled, tmp_path):
     truth = fifesim.open_image(travelled / "truth.tif")
     shown = ramp(style(truth, tmp_path / "truth.tif"))
     assert shown[0] == (0.0, "#ffffe5")
     assert shown[-1][0] == pytest.approx(float(np.percentile(truth.sel(band="lai"), 99)), rel=1e-5)
     assert [value for value, _ in shown] == sorted(value for value, _ in shown)
     ndvi = ramp(style(image.fifesim.ndvi(), tmp_path / "ndvi.tif"))
-    assert (ndvi[0], ndvi[-1]) == ((0.0, "#ffffe5"), (1.0, "#004529"))
+    assert (ndvi[0], ndvi[-1]) == ((0.0, "#440154"), (1.0, "#fde725"))
 
 
 def test_no_data_is_not_stretched(image, tmp_path):

@@ -7,7 +7,7 @@ import logging
 import pytest
 
 from fifesim.base.messages import LOG, quiet
-from fifesim.output.terminal import Exit, importing, in_time, listening, report, say, stop, tell
+from fifesim.output.terminal import Exit, importing, in_time, listening, print_lines, print_warning, report, stop
 
 
 def test_the_last_line_says_how_long_it_took_and_what_to_open(capsys):
@@ -40,12 +40,12 @@ def test_the_logger_is_heard_within_a_context_only(capsys):
 
 
 def test_names_from_elsewhere_cannot_steer_a_terminal(capsys):
-    say("one\x1b[31m", "two\nthree")
+    print_lines("one\x1b[31m", "two\nthree")
     assert capsys.readouterr().out == "one\\x1b[31m\ntwo\nthree\n"
 
 
 def test_a_warning_is_a_line(capsys):
-    tell(UserWarning("a\nb"))
+    print_warning(UserWarning("a\nb"))
     assert capsys.readouterr().err == "fifesim: warning: a\\nb\n"
 
 

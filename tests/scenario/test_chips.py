@@ -105,5 +105,5 @@ def test_two_seeds_are_two_sets():
 
 @pytest.mark.parametrize("count", [0, -1, 2.5, True])
 def test_a_number_of_chips_is_a_whole_one(count):
-    with pytest.raises(ValueError, match="n must be a whole number of chips from 1 up"):
+    with pytest.raises(ValueError, match="n must be an integer of at least 1"):
         chips_of(study_of(), count)

@@ -300,15 +300,15 @@ def test_number_of_a_property_that_is_not_drawn_stays_beside_what_is():
     [
         (
             {"landscape": {"covary": {"elevation": 0.3}}},
-            "landscape.covary: elevation is of an elevation, and terrain.dem",
+            "landscape.covary: elevation needs an elevation, but terrain.dem",
         ),
-        ({"landscape": {"covary": {"wetness": 0.3, "illumination": 0.1}}}, "wetness, illumination is of an elevation"),
+        ({"landscape": {"covary": {"wetness": 0.3, "illumination": 0.1}}}, "wetness, illumination needs an elevation"),
         (
             {"ground": {"lai_file": "lai.tif"}, "landscape": {"covary": {"soil": 0.1}, "deviations": {"soil": 0.1}}},
-            "a lai_file goes with the ground as it does: leave covary out",
+            "cannot be used with a lai_file: remove covary",
         ),
-        ({"ground": {"method": "periodic"}, "landscape": {"deviations": {"moisture": 0.1}}}, "is for one stand"),
-        ({"ground": {"method": "periodic"}, "landscape": {"deviations": {"soil": 0.1}}}, "is for one stand"),
+        ({"ground": {"method": "periodic"}, "landscape": {"deviations": {"moisture": 0.1}}}, "needs a single stand"),
+        ({"ground": {"method": "periodic"}, "landscape": {"deviations": {"soil": 0.1}}}, "needs a single stand"),
     ],
 )
 def test_ground_that_cannot_be_is_refused(sections, said):
@@ -357,9 +357,9 @@ LEAF, SOIL = {"leaf": {"chlorophyll": 40}}, {"background_spectra": {"soil_dry": 
         ({"grid": {"width": 600, "height": 600}}, ""),
         (
             {"grid": {"width": 600, "height": 600}, "ground": {"lai_file": "lai.tif"}},
-            "lai.tif: .*soil and litter, green",
+            "lai.tif is unknown: .*soil and litter, green",
         ),
-        (ELSEWHERE, r"the scene: .*soil and litter, green leaves.*\[ground\.leaf\]"),
+        (ELSEWHERE, r"the scene is unknown: .*soil and litter, green leaves.*\[ground\.leaf\]"),
         (ELSEWHERE | {"ground": SOIL}, "for green leaves; give"),
         (ELSEWHERE | {"ground": LEAF}, "for soil and litter; give"),
         (ELSEWHERE | {"ground": LEAF | SOIL | {"brown": 0.3}}, "for dead leaves; give"),

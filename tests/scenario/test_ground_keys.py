@@ -80,9 +80,9 @@ def test_numbers_come_with_their_unit_and_limits_are_allowed():
         (
             LandscapeKeys,
             {"cover": "voronoy"},
-            "did you mean 'voronoi'. allowed are none, pastures, voronoi, levels, or a",
+            "did you mean 'voronoi'. use none, pastures, voronoi, levels, or a",
         ),
-        (LandscapeKeys, {"cover": ""}, "allowed are none"),
+        (LandscapeKeys, {"cover": ""}, "use none"),
         (LandscapeKeys, {"size": 0.0}, "greater than 0"),
         (LandscapeKeys, {"size": "1 degree"}, "size is in m"),
         (LandscapeKeys, {"moisture": 0.1}, "moisture\n +Extra inputs are not permitted"),
@@ -118,9 +118,9 @@ def test_numbers_come_with_their_unit_and_limits_are_allowed():
         (
             StandKeys,
             {"background_spectra": {"shade": 1.0}, "background": {"TM3": 0.1}},
-            "background_spectra and background are both given: drop one of them",
+            "background_spectra and background are both given: remove one of them",
         ),
-        (StandKeys, {"brown_leaf": {"a\nb": 0.1}}, "is no name: names have up to 60 characters that print"),
+        (StandKeys, {"brown_leaf": {"a\nb": 0.1}}, "is not a name: names have up to 60 printable characters"),
         (ClassKeys, {"share": 0.0}, "greater than 0"),
         (ClassKeys, {"code": "one"}, "valid integer"),
         (ClassKeys, {"seed": 7}, "seed"),

@@ -27,7 +27,7 @@ from fifesim.scenario.scenario import Scenario
 def test_engines_are_those_of_the_atmosphere():
     """The keys name the engines that the atmosphere has."""
     described = AirKeys.model_fields["engine"].description
-    assert described == f"one of {', '.join([*engines.SCATTERING, '6S'])}"
+    assert described == f"radiative transfer model: {', '.join([*engines.SCATTERING, '6S'])}"
     assert (*engines.SCATTERING, "6S") == ENGINES
 
 
@@ -55,8 +55,8 @@ def test_a_class_has_the_keys_of_a_stand():
     ("section", "values", "said"),
     [
         (TerrainKeys, {"dem": "flt"}, "did you mean 'flat'"),
-        (TerrainKeys, {"fill": 30.0}, "fill is for an elevation file"),
-        (SensorKeys, {"interval": 0.0}, "metres above 0"),
+        (TerrainKeys, {"fill": 30.0}, "fill needs an elevation file"),
+        (SensorKeys, {"interval": 0.0}, "a positive distance between pixels in metres"),
         (SensorKeys, {"offset": [float("inf"), 0.0]}, "two finite numbers"),
         (AirKeys, {"aot": 2.5}, "less than or equal to 2"),
         (LandscapeKeys, {"cover": "pasture"}, "did you mean 'pastures'"),

@@ -25,16 +25,16 @@ def test_a_key_is_found_by_its_name(name, whole):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("visibilty", "the axis 'visibilty' is no key of a scenario: did you mean 'visibility'"),
-        ("seed", r"of several sections: write ground\.seed or terrain\.seed"),
-        ("sensor.sed", r"no key of a scenario: did you mean 'sensor\.seed'"),
-        ("senser.seed", r"no key of a scenario: did you mean 'sensor\.seed'"),
-        ("classes.grass.brwn", r"no key of a scenario: did you mean 'classes\.grass\.brown'"),
-        ("ground.arp.tall", "no key of a scenario"),
-        ("ground.leaf.", "no key of a scenario"),
-        ("ground", "no key of a scenario"),
-        ("classes", "no key of a scenario"),
-        ("classes.grass", "no key of a scenario"),
+        ("visibilty", "the axis 'visibilty' is not a key of a scenario: did you mean 'visibility'"),
+        ("seed", r"in several sections: use ground\.seed or terrain\.seed"),
+        ("sensor.sed", r"not a key of a scenario: did you mean 'sensor\.seed'"),
+        ("senser.seed", r"not a key of a scenario: did you mean 'sensor\.seed'"),
+        ("classes.grass.brwn", r"not a key of a scenario: did you mean 'classes\.grass\.brown'"),
+        ("ground.arp.tall", "not a key of a scenario"),
+        ("ground.leaf.", "not a key of a scenario"),
+        ("ground", "not a key of a scenario"),
+        ("classes", "not a key of a scenario"),
+        ("classes.grass", "not a key of a scenario"),
     ],
 )
 def test_what_is_no_key_is_refused(name, message):

@@ -145,7 +145,7 @@ def test_lengths_are_taken_in_any_of_their_units():
         ("[ground.leaf]\nwater = 12", "water must be in [0, 0.2] cm, got 12"),
         (
             "[ground.leaf]\nwater = 0.01\n[ground.leaf_reflectance]\nTM3 = 0.1",
-            "ground: leaf and leaf_reflectance are both given: drop one",
+            "ground: leaf and leaf_reflectance are both given: remove one",
         ),
         ("[ground.background_spectra]\nsoil = 1.0", "unknown spectrum 'soil': allowed are soil_dry, "),
         ("[ground.background_spectra]\nsoil_dry = 0.9", "must add up to 1, got 0.9"),
@@ -155,7 +155,7 @@ def test_lengths_are_taken_in_any_of_their_units():
         ("[sensor]\ninstrument = 'TN'", "TM"),
         ("[sensor]\nbands = ['TM9']", "TM9"),
         ("[sensor]\nbands = []", "name at least one band"),
-        ("[sensor]\ninterval = 'natve'", "interval = 'natve': must be product or native, or metres above 0"),
+        ("[sensor]\ninterval = 'natve'", "interval = 'natve': must be product or native, or a positive distance"),
         ("[sensor]\ninterval = '30 degree'", "interval is in m"),
         ("[sensor]\ninterval = -3", "sensor.interval = -3"),
         ("[sensor]\noffset = [1.0]", "sensor.offset"),
@@ -247,14 +247,14 @@ def test_place_of_a_grid_is_its_own_and_what_holds_for_fife_is_asked_for():
     with pytest.raises(ValueError) as caught:
         parse_scenario({"grid": SOUTH}).complete()
     said = str(caught.value)
-    assert said.startswith("grid: its middle, latitude -25.13, longitude 28.19, is not on the site of FIFE: give ")
+    assert said.startswith("grid: its centre, latitude -25.13, longitude 28.19, is not on the FIFE site: give ")
     assert (
         "geometry.time" in said
         and "geometry.sza and saa" in said
         and "atmosphere.altitude" in said
         and "terrain.dem" in said
     )
-    with pytest.raises(ValueError, match=r"FIFE: give geometry.time, such as [^;]*$"):
+    with pytest.raises(ValueError, match=r"FIFE site: give geometry.time, such as [^;]*$"):
         parse_scenario({"grid": SOUTH, "atmosphere": {"altitude": 1.3}, "terrain": {"dem": "flat"}}).complete()
     air = {"atmosphere": {"altitude": 1.3}, "terrain": {"dem": "flat"}}
     overpass = parse_scenario({"grid": SOUTH, "geometry": {"time": "2022-06-01T08:05Z"}} | air).complete()
@@ -267,7 +267,7 @@ def test_place_of_a_grid_is_its_own_and_what_holds_for_fife_is_asked_for():
 
 
 def test_crs_alone_has_no_corner():
-    with pytest.raises(ValueError, match=r"grid.crs = 'EPSG:32614' is given without west and north: type the upper"):
+    with pytest.raises(ValueError, match=r"grid.crs = 'EPSG:32614' is given without west and north: give the upper"):
         parse_scenario({"grid": {"crs": "EPSG:32614"}}).geobox()
 
 
@@ -287,27 +287,27 @@ def test_a_map_of_real_ground_lies_on_no_invented_hills():
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"grid": {"north": 1e300}}, "north = 1e+300: the grid lies outside of the area of EPSG:26914"),
-        ({"grid": {"north": 2**64}}, "north = 1.844674407e+19: the grid lies outside"),
-        ({"grid": {"west": 1e12}}, "west = 1e+12, north = 4334220: the grid lies outside"),
-        ({"grid": {"cell": 1000}}, "holds no cell of 1000 x 1000 m: type a width and height of a cell or more"),
+        ({"grid": {"north": 1e300}}, "north = 1e+300: the grid is outside the area of EPSG:26914"),
+        ({"grid": {"north": 2**64}}, "north = 1.844674407e+19: the grid is outside"),
+        ({"grid": {"west": 1e12}}, "west = 1e+12, north = 4334220: the grid is outside"),
+        ({"grid": {"cell": 1000}}, "holds no cell of 1000 x 1000 m: use a larger width and height"),
         ({"grid": {"width": 1}}, "width = 1, height = 150 m holds no cell of 3.33333 x 3.33333 m"),
         ({"grid": {"width": 1e12}}, "holds over 2147483647 cells of 3.33333 x 3.33333 m along a side"),
         ({"grid": {"width": 10}}, "the image must have 2 x 2 pixels or more, sensor.pixel of 30 x 30 m fits 5 x 0"),
         ({"grid": {"width": 30}}, "fits 5 x 1 times"),
         ({"grid": {"width": 56}, "sensor": {"interval": "native"}}, "sensor.pixel of 30 x 30 m fits 5 x 1 times"),
         ({"sensor": {"interval": 100.0}}, "sensor.interval of 100 x 100 m fits 1 x 3 times"),
-        ({"sensor": {"pixel": 0.1}}, "sensor.pixel = 0.1 m is smaller than a cell of the ground: type 3.33333 m or"),
-        ({"sensor": {"interval": 0.1}}, "sensor.interval = 0.1 m is smaller than a cell"),
+        ({"sensor": {"pixel": 0.1}}, "sensor.pixel = 0.1 m is smaller than a ground cell: use 3.33333 m or"),
+        ({"sensor": {"interval": 0.1}}, "sensor.interval = 0.1 m is smaller than a ground cell"),
         (
             {"sensor": {"offset": [0.0, 1000.0]}},
-            "sensor.offset = [0.0, 1000.0] pixels moves the image beyond the scene",
+            "sensor.offset = [0.0, 1000.0] pixels moves the image out of the scene",
         ),
         ({"grid": {"crs": "nonsense\x1b"}}, r"crs = 'nonsense\x1b': PROJ knows no such coordinate reference system"),
         ({"grid": {"crs": "EPSG:3857", "west": -1.075e7, "north": 4.7e6}}, "use another CRS, such as EPSG:32614"),
         ({"geometry": {"time": "1987-06-06T06:00Z"}}, "the sun is below the horizon"),
         ({"geometry": {"sza": 80, "saa": 0}}, "sza must be from 0 to 75 degrees, got 80"),
-        ({"ground": {"lai_file": "none.tif"}}, "ground.lai_file = 'none.tif': there is no such file"),
+        ({"ground": {"lai_file": "none.tif"}}, "ground.lai_file = 'none.tif': the file does not exist"),
     ],
 )
 def test_what_no_run_can_be_is_one_line_before_it_begins(values, said):
@@ -333,10 +333,10 @@ def test_engine_that_is_not_installed_is_told_at_once(monkeypatch):
 @pytest.mark.parametrize(
     ("sections", "said"),
     [
-        ({"classes": {"grass": {}}}, "landscape.cover is none: say how they lie"),
+        ({"classes": {"grass": {}}}, "landscape.cover is none: choose a layout"),
         ({"classes": {"a": {"share": 0.5}, "b": {}}, "landscape": {"cover": "voronoi"}}, "b has no share"),
         ({"classes": {"a": {"share": 0.5}, "b": {"share": 0.6}}, "landscape": {"cover": "levels"}}, "sum to 1.1"),
-        ({"ground": {"method": "periodic"}, "landscape": {"cover": "levels"}}, "is for one stand"),
+        ({"ground": {"method": "periodic"}, "landscape": {"cover": "levels"}}, "needs a single stand"),
         (
             {"classes": {"a": {"arp": 0.2499}}, "landscape": {"cover": "levels"}},
             "classes.a.arp = 0.2499: must be at most",

@@ -64,8 +64,8 @@ def test_file_of_an_aerosol_lies_beside_the_scenario(tmp_path, monkeypatch):
     inside = fifesim.Scenario(atmosphere={"aerosol": "mine.nc", "aot": 0.3})
     assert inside.complete().atmosphere.aerosol == str(tmp_path / "mine.nc")
     for wrong, message in (
-        ({"aerosol": "mine.nc"}, "must be an aot"),
-        ({"aerosol": "mine.nc", "visibility": 23}, "must be an aot, from 0 to 2, got visibility=23"),
+        ({"aerosol": "mine.nc"}, "must be given as aot"),
+        ({"aerosol": "mine.nc", "visibility": 23}, "must be given as aot, from 0 to 2, got visibility=23"),
         ({"aerosol": "other.nc", "aot": 0.3}, "other.nc' does not exist"),
     ):
         with pytest.raises(ValueError, match=message):
@@ -86,7 +86,7 @@ def test_pixels_are_those_of_the_bands_as_in_python():
     assert Sensor(instrument="MSI", bands=["MSI11"]).size == 20
     assert Sensor(instrument="MSI", bands=["MSI4", "MSI11"], pixel=20).size == 20
     with pytest.raises(
-        ValueError, match=r"bands of MSI lie on different grids \(10 m: MSI4; 20 m: MSI11\): name those"
+        ValueError, match=r"bands of MSI have different grids \(10 m: MSI4; 20 m: MSI11\): name bands of one"
     ):
         Sensor(instrument="MSI", bands=["MSI4", "MSI11"])
 

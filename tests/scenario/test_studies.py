@@ -92,18 +92,18 @@ def test_one_band_may_be_drawn_beside_the_others():
 @pytest.mark.parametrize(
     ("draws", "message"),
     [
-        ({}, r"a study draws something: give a table \[draw\]"),
-        ({"visibilty": {"uniform": [10, 60]}}, "draw: 'visibilty' is no key of a scenario: did you mean 'visibility'"),
+        ({}, r"a study needs a table \[draw\]"),
+        ({"visibilty": {"uniform": [10, 60]}}, "draw: 'visibilty' is not a key of a scenario: did you mean 'visib"),
         ({"visibility": {"unifrom": [10, 60]}}, r"draw\.atmosphere\.visibility: needs .* did you mean 'uniform'"),
         ({"visibility": {"uniform": [1, 60]}}, r"draw\.atmosphere\.visibility = .* at 1\.0: .*must be at least 5"),
         ({"visibility": {"uniform": ["10 m", "60 miles"]}}, r"visibility is in km"),
         ({"visibility": 5}, r"draw\.atmosphere\.visibility: a distribution is a table"),
-        ({"ground.seed": {"integers": [1, 9]}}, r"draw\.ground\.seed: landscapes and noise have seeds of their own"),
-        ({"pixel": {"choice": [30.0, 60.0]}}, r"draw\.sensor\.pixel: is the same for all chips"),
-        ({"width": {"uniform": [200, 300]}}, r"draw\.grid\.width: is the same for all chips"),
+        ({"ground.seed": {"integers": [1, 9]}}, r"draw\.ground\.seed: seeds are assigned automatically"),
+        ({"pixel": {"choice": [30.0, 60.0]}}, r"draw\.sensor\.pixel must be equal for all chips"),
+        ({"width": {"uniform": [200, 300]}}, r"draw\.grid\.width must be equal for all chips"),
         ({"visibility": {"uniform": [9, 60]}, "atmosphere": {"visibility": {"uniform": [9, 60]}}}, "is given twice"),
-        ({"classes.grass.brown": {"uniform": [0, 1]}}, r"there is no \[classes\.grass\], classes are none"),
-        ({"sza": {"uniform": [20, 50]}}, "draw, all at their medians or first choices: .*sza and saa go together"),
+        ({"classes.grass.brown": {"uniform": [0, 1]}}, r"there is no section \[classes\.grass\]; the classes are none"),
+        ({"sza": {"uniform": [20, 50]}}, "draw, all keys at their median or first choice: .*sza and saa go together"),
         ({"sza": {"uniform": [20, 89.9]}, "saa": {"uniform": [0, 90]}}, r"draw\.geometry\.sza = .* at 89\.9"),
         ({"distribution": {"choice": ["burned-grazed", "burnt"]}}, r"draw\.ground\.distribution .* 'burnt'"),
     ],
@@ -118,10 +118,10 @@ def test_what_cannot_be_drawn_is_refused(draws, message):
     ("plan", "message"),
     [
         ({"sequence": "sobel"}, "did you mean 'sobol'"),
-        ({"landscapes": 0}, "must be a whole number from 1 up"),
-        ({"landscapes": 2}, "cannot be split into train, validation, test"),
-        ({"split": {"train": 0.8}}, "must be shares that sum to 1"),
-        ({"split": {"train": 1.5, "test": -0.5}}, "must be shares that sum to 1"),
+        ({"landscapes": 0}, "must be an integer of at least 1"),
+        ({"landscapes": 2}, "are too few for the parts train, validation, test"),
+        ({"split": {"train": 0.8}}, "must be fractions that sum to 1"),
+        ({"split": {"train": 1.5, "test": -0.5}}, "must be fractions that sum to 1"),
         ({"seed": -1}, "seed must be a whole number"),
     ],
 )
@@ -134,10 +134,10 @@ def test_impossible_plans_are_refused(plan, message):
     ("section", "keys", "message"),
     [
         ("terrain", {"dem": "dem.tif"}, "terrain.dem = 'dem.tif': chips of one map would share ground"),
-        ("landscape", {"cover": "cover.tif"}, "landscape.cover = .* a study takes none or pastures"),
+        ("landscape", {"cover": "cover.tif"}, "landscape.cover = .* a study needs none or pastures"),
         ("ground", {"lai_file": "lai.tif"}, "ground.lai_file = 'lai.tif': chips of one map"),
-        ("ground", {"method": "periodic"}, "has no windows to cut chips from"),
-        ("grid", {"cell": 5.0}, "grid.width is not given: it is the size of a chip"),
+        ("ground", {"method": "periodic"}, "has no windows for chips"),
+        ("grid", {"cell": 5.0}, "grid.width is missing: give the size of a chip"),
     ],
 )
 def test_ground_that_is_not_drawn_is_refused(section, keys, message):
@@ -146,7 +146,7 @@ def test_ground_that_is_not_drawn_is_refused(section, keys, message):
 
 
 def test_a_study_takes_a_scenario():
-    with pytest.raises(TypeError, match="a study takes a Scenario, got dict"):
+    with pytest.raises(TypeError, match="a study needs a Scenario, got dict"):
         fifesim.Study({}, DRAWS)
 
 

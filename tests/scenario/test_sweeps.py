@@ -67,14 +67,14 @@ def test_axis_may_be_a_function(small):
 @pytest.mark.parametrize(
     ("axes", "message"),
     [
-        ({}, "needs an axis"),
-        ({"seed": [1, 2]}, r"several sections: write ground\.seed or terrain\.seed"),
-        ({"visibilty": [10]}, "'visibilty' is no key of a scenario"),
+        ({}, "needs at least one axis"),
+        ({"seed": [1, 2]}, r"several sections: use ground\.seed or terrain\.seed"),
+        ({"visibilty": [10]}, "'visibilty' is not a key of a scenario"),
         ({"arp": [0.3]}, "must be below 0.25"),
         ({"arp": 0.15}, "needs a list of values, got 0.15"),
         ({"instrument": "TM"}, "needs a list of values, got 'TM'"),
         ({"arp": []}, "needs a list of values"),
-        ({"sensor.arp": [0.1]}, "no key of a scenario"),
+        ({"sensor.arp": [0.1]}, "not a key of a scenario"),
     ],
 )
 def test_impossible_axes_are_refused(small, axes, message):
@@ -109,5 +109,5 @@ def test_a_key_of_a_class_is_an_axis(small):
     fit = fifesim.sweep(patches, {"classes.grass.distribution": values}).compute()
     np.testing.assert_array_equal(fit["slope"], fifesim.sweep(patches, {"ground.distribution": values})["slope"])
     assert len(np.unique(fit["slope"].sel(variable="lai"))) == 2
-    with pytest.raises(ValueError, match="no key of a scenario"):
+    with pytest.raises(ValueError, match="not a key of a scenario"):
         fifesim.sweep(patches, {"classes.grass.brwn": [0.1]})

@@ -55,7 +55,7 @@ def test_spelling_tells_each_mistake_in_a_line(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("[sensor]\nnoise = true", "sensor.noise = True: must be a list, in brackets (of the detectors: shot, thermal"),
+        ("[sensor]\nnoise = true", "sensor.noise = True: must be a list, in brackets (detector noise: shot, thermal"),
         ("[sensor]\nbands = [3]", "sensor.bands.0 = 3: must be text, in quotes"),
         ("[ground]\narp = 0.3", "ground.arp = 0.3: must be below 0.25"),
         ("[terrain]\nupwelling = 'x'", "terrain.upwelling = 'x': must be true or false"),
@@ -129,7 +129,7 @@ def test_no_file_of_a_scenario_makes_it_wait(tmp_path, section, key, suffix):
 
 def test_an_empty_name_is_no_file(tmp_path):
     assert refusal(written(tmp_path, "[ground]\nlai_file = ''")) == (
-        "ground.lai_file = '': name a file, or drop the key"
+        "ground.lai_file = '': name a file, or remove the key"
     )
 
 

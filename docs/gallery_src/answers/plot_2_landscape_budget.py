@@ -1,14 +1,14 @@
 """
-What soil, dead leaves and cover add
-====================================
+Sources of the scatter between NDVI and LAI
+===========================================
 
-The last question of Friedl et al. (1995): how much scatter do soil, land cover and dead leaves add beside the
-instrument? Here it is for the default landscape, which is made up
-(:ref:`sphx_glr_gallery_instruments_plot_4_landscape.py` shows it), through TM, MSI and MODIS with all that is known
-of each: blur, noise, and the error of the product's place. Bars are the parts of 1 − R² of leaf area on NDVI that
-each stage adds, the mean over all orders in which the stages can come (Shapley); below zero a stage makes the
-relation straighter. Whiskers are standard errors over the windows of the site. ``python
-docs/make_landscape_budget.py`` computes the table.
+The figure shows how much each stage contributes to 1 − R² of leaf area on NDVI: soil, dead leaves and cover, the
+instrument, terrain, atmosphere and the non-linear relation itself. Friedl et al. (1995) asked this question at the end
+of their paper. The ground is the synthetic default landscape (:ref:`sphx_glr_gallery_instruments_plot_4_landscape.py`),
+seen by TM, MSI and MODIS with their known blur, noise and geolocation error. The share of a stage is its contribution
+averaged over all orders of adding stages (Shapley value). A negative share means that the stage makes the relation more
+linear. Error bars are standard errors over windows of the site. ``python docs/make_landscape_budget.py`` computes the
+table.
 """
 
 import textwrap
@@ -28,6 +28,8 @@ GROUND = ["soil", "dead leaves", "cover", "covariance"]
 SENSOR = ["registration", "point spread", "noise", "quantisation"]
 OTHERS = ["topography", "atmosphere", "NDVI scaling", "non-linearity", "curvature"]
 stages = [*GROUND, *SENSOR, *OTHERS]
+
+# sphinx_gallery_start_ignore
 colors = dict(zip(["TM", "MSI", "MODIS"], ["#0072B2", "#E69F00", "#666666"], strict=True))
 
 figure, axis = plt.subplots(figsize=(8, 6.4), layout="constrained")
@@ -36,7 +38,7 @@ for number, instrument in enumerate(instruments):
     total = table.loc[(instrument, "total")]
     at = np.arange(len(stages)) + 0.26 * (number - 1)
     label = (
-        f"{instrument}, in all {100 * total['share']:.0f} ± {100 * total['share_error']:.0f} %"
+        f"{instrument}, total {100 * total['share']:.0f} ± {100 * total['share_error']:.0f} %"
     )
     error = 100 * rows["share_error"]
     axis.barh(at, 100 * rows["share"], 0.24, color=colors[instrument], label=label)
@@ -55,49 +57,49 @@ for group, color in ((GROUND, "#f3ede2"), (SENSOR, "#e8eef4")):
 axis.axvline(0, color="#222222", linewidth=0.8)
 axis.set_yticks(range(len(stages)), stages)
 axis.invert_yaxis()
-axis.set_xlabel("share of the variance of leaf area that a line on NDVI does not explain [%]")
+axis.set_xlabel("share of the variance of leaf area not explained by a line on NDVI [%]")
 axis.spines[["top", "right", "left"]].set_visible(False)
 axis.tick_params(axis="y", length=0)
 axis.legend(frameon=False, loc="lower right")
+# sphinx_gallery_end_ignore
 
 # %%
-# In words, with the table's own figures:
+# *Covariance* is the correlation of leaf area with terrain and soil. *Curvature* remains with all stages ideal. For
+# MODIS, most shares are close to zero. The values for the ground and the instrument:
 
 for instrument in instruments:
     shares = 100 * table.loc[instrument]["share"]
     errors = 100 * table.loc[instrument]["share_error"]
     ground, sensor = shares[GROUND[:3]].sum(), shares[SENSOR].sum()
     shown = shares.round(1) + 0.0  # no -0.0
-    said = ", ".join(f"{stage} {shown[stage]:.1f} ± {errors[stage]:.1f}" for stage in GROUND)
-    print(f"{instrument}: {said} % of the variance.")
+    listed = ", ".join(f"{stage} {shown[stage]:.1f} ± {errors[stage]:.1f}" for stage in GROUND)
+    print(f"{instrument}: {listed} % of the variance.")
     print(
-        f"    Soil, dead leaves and cover add {ground:.1f} % together,"
-        f" place, blur, noise and counts {sensor:.1f} %."
+        f"    In total, soil, dead leaves and cover contribute {ground:.1f} %,"
+        f" registration, point spread, noise and quantisation {sensor:.1f} %."
     )
 
 # %%
-# To cite:
+# The result for TM in a form that can be cited:
 
 tm = table.loc["TM"]
 
 
 def percent(stage):
-    """A share with its standard error."""
+    """Share with its standard error."""
     return f"{100 * tm.loc[stage, 'share']:.1f} ± {100 * tm.loc[stage, 'share_error']:.1f} %"
 
 
 side, windows = tm["cells"].iloc[0] / 300, tm["realisations"].iloc[0]
 sentences = [
     f"In {windows} windows of {side:g} km of a simulated tallgrass landscape",
-    "(fifesim, default scenario), a line of leaf area on the NDVI of the Thematic Mapper",
-    f"leaves {percent('total')} of the variance between pixels of 30 m.",
-    f"Soil adds {percent('soil')}, dead leaves {percent('dead leaves')},",
-    f"leaves and litter that differ by treatment {percent('cover')};",
-    f"pixels displaced by the product's stated error add {percent('registration')},",
-    f"blur {percent('point spread')}.",
-    "That grass is denser where it is wet and the soil dark changes this by",
-    f"{percent('covariance')}: leaf area then varies more between pixels,",
-    "and the same disturbances count for less.",
+    "(fifesim, default scenario), a linear regression of leaf area on the NDVI of the",
+    f"Thematic Mapper leaves {percent('total')} of the variance between pixels of 30 m unexplained.",
+    f"Soil contributes {percent('soil')}, dead leaves {percent('dead leaves')},",
+    f"and treatment-dependent leaves and litter {percent('cover')};",
+    f"the stated geolocation error of the product contributes {percent('registration')},",
+    f"and the point spread {percent('point spread')}.",
+    "The correlation of leaf area with wetness and dark soil changes the total by",
+    f"{percent('covariance')}, because leaf area then varies more between pixels.",
 ]
 print(textwrap.fill(" ".join(sentences), 90))
-plt.show()

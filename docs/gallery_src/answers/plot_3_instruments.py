@@ -1,17 +1,16 @@
 """
-What each instrument loses
-==========================
+Information lost by each instrument
+===================================
 
-The same ground, burned and grazed prairie on level land, through every instrument: which share of the variance of leaf
-area a line on NDVI leaves unexplained, by stage. Cells are 3.33 m; truth is the mean over a pixel. An instrument has
-the point spread function, the noise and the geolocation error that a source states. **Hatched cells are unknown, not
-zero.** An instrument with an unknown term has no total, and its other shares are computed without that term. Shares are
-means over 20 realisations; ``python docs/make_instruments.py`` computes the table, and ``fifesim budget --sensor MSI``
-one of its rows.
+The figure shows which fraction of the variance of leaf area is not explained by a line on NDVI, by stage and
+instrument. The ground is level burned, grazed prairie in cells of 3.33 m, and the truth is the mean over a pixel. Point
+spread, noise and geolocation error of each instrument are taken from published sources. **Hatched cells are unknown,
+not zero.** An instrument with an unknown term has no total, and its other shares are computed without that term. Shares
+are means over 20 realisations.
 
-The ground is one homogeneous grass: nothing in it is larger than some ten metres. Coarse pixels therefore hold little
-variance to explain, and quantisation and atmosphere weigh more in them. The geolocation error of a product counts
-against the truth of the same pixel.
+The table is computed by ``python docs/make_instruments.py``, and a single row by ``fifesim budget --sensor MSI``. The
+ground is homogeneous grass that varies over some ten metres at most. Large pixels therefore have little variance, and
+quantisation and atmosphere have larger shares.
 """
 
 from pathlib import Path
@@ -44,6 +43,7 @@ columns = (
     "total",
 )
 
+# sphinx_gallery_start_ignore
 figure, axes = plt.subplots(
     1, 3, figsize=(11, 0.3 * len(names) + 2), sharey=True, layout="constrained"
 )
@@ -68,16 +68,17 @@ axes[0].set_yticks(
     [f"{name}, {pixel:g} m" for name, pixel in zip(names, sizes["pixel"], strict=True)],
     fontsize=8,
 )
-figure.suptitle("Share of the variance of leaf area that a line on NDVI leaves unexplained")
+figure.suptitle("Fraction of the variance of leaf area not explained by a line on NDVI")
 figure.legend(
     handles=[Patch(facecolor="white", edgecolor="0.6", hatch="////")],
     labels=["Hatched cells are unknown, not zero."],
     loc="outside lower center",
     frameon=False,
 )
+# sphinx_gallery_end_ignore
 
 # %%
-# R² of leaf area on NDVI, for the instruments whose terms are all known:
+# R² of leaf area on NDVI for instruments with complete information:
 
 totals = table[table["stage"] == "total"].dropna(subset="share")
 r2 = 1 - totals.pivot(index="instrument", columns="arp", values="share")
@@ -86,11 +87,10 @@ text = r2.map("{:.2f}".format) + " ± " + error.map("{:.3f}".format)
 print(text.loc[[name for name in names if name in text.index]].to_string())
 
 # %%
-# Smallest and largest share of each term among the instruments where it is known. **Registration** takes most wherever
-# the agency states the geolocation error of its product: the ground varies within some ten metres, and truth is read
-# where the map says. **Noise and quantisation** matter where a pixel holds little variance: six bits, ten bits over a
-# kilometre, the finest bands of MODIS. A **uniform atmosphere** takes little from R²: it changes the slope and the
-# intercept of the line.
+# The smallest and largest share of each term are listed below. **Registration** has the largest share wherever a
+# geolocation error is published, because the ground varies over short distances. **Noise and quantisation** matter if
+# pixels have little variance: instruments with 6 bits, 1 km pixels with 10 bits, and the finest bands of MODIS. A
+# **uniform atmosphere** has little effect on R², because it mainly changes slope and intercept.
 
 for stage in columns[:5]:
     print(stage)
@@ -98,4 +98,3 @@ for stage in columns[:5]:
         found = shares.loc[arp, stage].dropna()
         least, most = found.idxmin(), found.idxmax()
         print(f"    arp {arp:.2f}: {found[least]:.2f} ({least}) to {found[most]:.2f} ({most})")
-plt.show()

@@ -2,10 +2,10 @@
 Table 2 and Figures 3 to 9 of the paper
 =======================================
 
-``fifesim.reproduce`` repeats the nine scenes of Friedl et al. (1995): on level ground, with pixels that drift from the
-blocks of ground that they are compared with, as Table 1 has their interval, and from leaf area, leaves and soil that
-were inferred from Table 2 itself. The paper's text speaks for aligned pixels, which are shown too. :doc:`/paper` says
-what of the agreement is found, fitted and assumed, and computes what is drawn here over more realisations.
+This page compares ``fifesim.reproduce`` with the published results of Friedl et al. (1995) and shows its figures. The
+ground is level. Leaf area, leaf optics and soil are fitted to Table 2, because the paper does not list them. *Native*
+pixels have the sampling interval of Table 1 and drift from the ground blocks; *aligned* pixels coincide with them, as
+the text of the paper suggests. :doc:`/paper` states which agreement is found, fitted or assumed.
 """
 
 # sphinx_gallery_thumbnail_number = 6
@@ -21,9 +21,9 @@ import fifesim
 found = fifesim.reproduce(realisations=3)
 
 # %%
-# **Table 2 beside the paper's.** Means over three realisations; *native* pixels drift, *aligned* ones lie on the
-# blocks.
+# **Table 2.** Means over three realisations, compared with the published values.
 
+# sphinx_gallery_start_ignore
 MARKERS = {
     "native": ("o", "#0072B2"),
     "aligned": ("x", "#D55E00"),
@@ -63,16 +63,20 @@ axes[0, 0].invert_yaxis()
 figure.legend(
     *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False
 )
+# sphinx_gallery_end_ignore
 
 # %%
-# **Other readings, and relief.** Lines of LAI on NDVI. Pixels on the blocks leave R² high; blur brings it down, too,
-# but raises the slopes. Relief is that of synthetic hills. From here on the numbers are those of :doc:`/paper`.
+# Native pixels reproduce R². Aligned pixels have a higher R² than published.
+#
+# **Other interpretations of Table 1, and terrain.** Regressions of LAI on NDVI, with the numbers of :doc:`/paper`.
+# Stronger blur also lowers R², but increases the slopes.
 
 folders = (Path("../.."), Path("docs"))
 numbers = json.loads(
     next(at / "paper.json" for at in folders if (at / "paper.json").exists()).read_text("utf-8")
 )
 
+# sphinx_gallery_start_ignore
 figure, axes = plt.subplots(
     2, 2, figsize=(9.5, 6.6), layout="constrained", sharex="col", sharey=True
 )
@@ -96,10 +100,11 @@ axes[0, 0].invert_yaxis()
 figure.legend(
     *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False
 )
+# sphinx_gallery_end_ignore
 
 # %%
-# **What each input does** to the nine rows of LAI, changed by a little: slopes and intercepts follow soil and leaf
-# area, R² none of them.
+# **Sensitivity.** Changes of the nine LAI regressions for small changes of the inputs. Slopes and intercepts depend on
+# soil and leaf area. R² hardly depends on any input.
 
 changes = numbers["sensitivity"]
 names = [f"{one['name']}: {one['before']} → {one['after']}" for one in changes]
@@ -108,6 +113,7 @@ panels = {
     "lai_slope": ("slope [%]", 100),
     "lai_intercept": ("intercept", 1),
 }
+# sphinx_gallery_start_ignore
 figure, axes = plt.subplots(1, 3, figsize=(9.5, 4.2), layout="constrained", sharey=True)
 for axis, (key, (title, scale)) in zip(axes, panels.items(), strict=True):
     axis.barh(names, [scale * one[key] for one in changes], color="#0072B2")
@@ -116,13 +122,16 @@ for axis, (key, (title, scale)) in zip(axes, panels.items(), strict=True):
     axis.spines[["top", "right", "left"]].set_visible(False)
     axis.tick_params(axis="y", labelsize=8, length=0)
 axes[0].invert_yaxis()
+# sphinx_gallery_end_ignore
 
 # %%
-# **Figures 3 to 9**, of the first realisation. Figure 3, densities of leaf area.
+# **Figures 3 to 9** for the first realisation. Figure 3 shows the leaf area distributions.
+
+# sphinx_gallery_start_ignore
 
 
 def show(number, reading="native"):
-    """A figure of the package as one that the gallery collects."""
+    """Show a figure of the package in the gallery."""
     canvas = FigureCanvasAgg(fifesim.plot_reproduction(number, found, reading=reading))
     canvas.figure.set_dpi(100)
     canvas.draw()
@@ -131,39 +140,40 @@ def show(number, reading="native"):
     )
 
 
+# sphinx_gallery_end_ignore
 show(3)
 
 # %%
-# Figure 4, leaf area of the ground, burned and grazed, at three length scales.
+# Figure 4: leaf area of the burned, grazed ground at three correlation lengths.
 
 show(4)
 
 # %%
-# Figure 5, leaf area and FPAR against NDVI of the ground and of the image.
+# Figure 5: leaf area and FPAR against NDVI of the ground and of the image.
 
 show(5)
 
 # %%
-# Figure 6, densities of cells and of 200 pixels.
+# Figure 6: densities of cells and of 200 pixels.
 
 show(6)
 
 # %%
-# Figure 7, relative equivalent noise.
+# Figure 7: relative equivalent noise.
 
 show(7)
 
 # %%
-# Figure 8, NDVI of the mean reflectance against the mean NDVI.
+# Figure 8: NDVI of the mean reflectance against the mean NDVI.
 
 show(8)
 
 # %%
-# Figure 9, reflectance of the image against that of the ground below it, with the drift.
+# Figure 9: reflectance at the top of the atmosphere against surface reflectance, for native pixels.
 
 show(9)
 
 # %%
-# The same with pixels on their blocks.
+# Figure 9 for aligned pixels. Most of the scatter is caused by the drift of native pixels.
 
 show(9, "aligned")

@@ -1,9 +1,9 @@
 """
-Benchmarks of others
-====================
+Comparison with published benchmarks
+====================================
 
-fifesim beside results that others published: polarized light of the sky, ground below an atmosphere, a canopy of discs.
-:doc:`How good is it? </benchmarks>` says what the pictures mean.
+The figures compare fifesim with published results of other codes: polarized sky light, surfaces below an atmosphere,
+and a canopy of discs. :doc:`/benchmarks` explains the results.
 """
 
 # sphinx_gallery_thumbnail_number = 2
@@ -16,21 +16,23 @@ COLORS = {"I": "#1b1b1b", "Q": "#2166ac", "U": "#b2182b"}
 
 
 def band(axis, noise, label):
+    """Mark the noise around zero."""
     axis.axhspan(-noise, noise, color="#fdae61", alpha=0.35, linewidth=0, label=label)
     axis.axhline(0, color="0.5", linewidth=0.8)
 
 
 # %%
-# Six cases of the polarized intercomparison, at the top and at the ground: fifesim less MYSTIC, in units of the
-# standard deviation of MYSTIC, which is a Monte Carlo program.
+# **Polarized light, IPRT cases.** Differences between fifesim and the Monte Carlo code MYSTIC at the top of the
+# atmosphere and at the ground, in units of the standard deviation of MYSTIC. They are within the noise.
 
 cases = ("A1a", "A1b", "A1c", "A2", "A3", "B1")
+# sphinx_gallery_start_ignore
 figure, axes = plt.subplots(
     2, 3, figsize=(11, 5.4), layout="constrained", sharex=True, sharey=True
 )
 for axis, case in zip(axes.flat, cases, strict=True):
     table, found = benchmarks.iprt(case)
-    band(axis, 3, "three times the noise")
+    band(axis, 3, "3 x noise")
     at_ground = (table["level"] == "ground").to_numpy()
     for number, (name, values) in enumerate(zip("IQU", found, strict=True)):
         away = ((values - table[name]) / table[f"sd_{name}"]).to_numpy()
@@ -39,7 +41,7 @@ for axis, case in zip(axes.flat, cases, strict=True):
             place = table["vza"].to_numpy()[rows] + 2.4 * (number - 1)
             axis.plot(place, away[rows], style, color=COLORS[name], markersize=3.5, label=label)
     axis.set(title=case, ylim=(-4.5, 4.5), xticks=[0, 15, 30, 60, 75])
-axes[1, 1].set_xlabel("zenith angle of the view [degree]")
+axes[1, 1].set_xlabel("view zenith angle [degree]")
 for axis in axes[:, 0]:
     axis.set_ylabel("(fifesim − MYSTIC) / noise")
 figure.legend(
@@ -49,13 +51,15 @@ figure.legend(
     frameon=False,
     fontsize=8,
 )
+# sphinx_gallery_end_ignore
 
 # %%
-# One of them as it is: Q and U of the sky above molecules of depth .5, the sun at 30 degrees.
+# I, Q and U of the sky for one case, molecules with an optical depth of 0.5 and the sun at 30 degrees.
 
 table, found = benchmarks.iprt("A1b")
 rows = ((table["level"] == "ground") & (table["vza"] == 60)).to_numpy()
 order = np.argsort(-table["raa"].to_numpy()[rows])
+# sphinx_gallery_start_ignore
 figure, axis = plt.subplots(figsize=(6.5, 3.9), layout="constrained")
 for name, values in zip("IQU", found, strict=True):
     azimuth, seen = -table["raa"].to_numpy()[rows][order], table[name].to_numpy()[rows][order]
@@ -70,12 +74,14 @@ axis.set(
 )
 axis.set_title("Sky at 60° from the zenith, IPRT A1b (noise: 3 × 10⁻⁵)")
 axis.legend(frameon=False, ncols=3, fontsize=8, loc="center right", bbox_to_anchor=(1, 0.62))
+# sphinx_gallery_end_ignore
 
 # %%
-# Molecules that depolarize nothing, whose light is known to seven digits: fifesim as it comes, and with so many
-# directions and layers that nothing of either is left.
+# **Molecular scattering.** Differences from the tables of Natraj et al. (2009), which have seven digits, with the
+# default settings and with many directions and layers. With many layers, fifesim agrees to the last digit.
 
 table, found, converged = benchmarks.molecules()
+# sphinx_gallery_start_ignore
 figure, axes = plt.subplots(1, 2, figsize=(11, 3.9), layout="constrained")
 tau = table["tau"].to_numpy() * np.exp(np.linspace(-0.12, 0.12, len(table)))
 for axis, values, scale in ((axes[0], found, 1e2), (axes[1], converged, 1e7)):
@@ -87,27 +93,30 @@ for axis, values, scale in ((axes[0], found, 1e2), (axes[1], converged, 1e7)):
         xscale="log",
         xlabel="optical depth",
         xticks=[0.05, 0.1, 0.25, 0.5, 1],
-        xticklabels=[".05", ".1", ".25", ".5", "1"],
+        xticklabels=["0.05", "0.1", "0.25", "0.5", "1"],
     )
     axis.minorticks_off()
 band(axes[0], 0.01, "bound")
-axes[0].set(title="As it comes: 60 layers, 16 directions", ylabel="(fifesim − Natraj) / I [%]")
+axes[0].set(title="Default: 60 layers, 16 directions", ylabel="(fifesim − Natraj) / I [%]")
 band(axes[1], 1, "last digit of the table")
 axes[1].set(
     title="Many layers and directions", ylabel="fifesim − Natraj [10⁻⁷]", ylim=(-1.5, 1.5)
 )
 for axis in axes:
     axis.legend(frameon=False, ncols=4, fontsize=8, loc="upper left")
+# sphinx_gallery_end_ignore
 
 # %%
-# White ground below molecules, and dark ground below aerosol and gases, seen across the principal plane.
+# **Surface and atmosphere, RAMI4ATM.** White ground below molecules, and dark ground below aerosol and gases, in the
+# principal plane.
 
+# sphinx_gallery_start_ignore
 figure, axes = plt.subplots(
     2, 2, figsize=(11, 5.6), layout="constrained", sharex=True, height_ratios=(3, 2)
 )
 titles = {
     "white": "White ground, molecules",
-    "lambert": "Ground of .028, continental aerosol, gases",
+    "lambert": "Ground of 0.028, continental aerosol, gases",
 }
 for (upper, lower), case in zip(axes.T, titles, strict=True):
     table, found = benchmarks.rami(case)
@@ -132,7 +141,7 @@ for (upper, lower), case in zip(axes.T, titles, strict=True):
         "color": "#fdae61",
         "alpha": 0.35,
         "linewidth": 0,
-        "label": "three times the noise",
+        "label": "3 x noise",
     }
     lower.fill_between(
         vza.to_numpy()[order], -noise.to_numpy()[order], noise.to_numpy()[order], **shade
@@ -143,11 +152,14 @@ for (upper, lower), case in zip(axes.T, titles, strict=True):
         xlabel="view zenith [degree], positive toward the sun", ylabel="fifesim − Eradiate [%]"
     )
     lower.legend(frameon=False, fontsize=8, loc="lower right")
+# sphinx_gallery_end_ignore
 
 # %%
-# A canopy of discs of a leaf area index of 3, and SAIL with three sizes of the hot spot. On the right flat discs, whose
-# hot spot is known without any Monte Carlo.
+# **Canopy of discs.** SAIL with three hot spot sizes, compared with a Monte Carlo simulation of discs with an LAI of 3
+# (left) and an exact solution for flat discs (right). SAIL has a narrower peak, and is too bright for low views away
+# from the sun.
 
+# sphinx_gallery_start_ignore
 figure, axes = plt.subplots(
     2, 2, figsize=(11, 6), layout="constrained", sharex=True, height_ratios=(3, 2)
 )
@@ -170,7 +182,7 @@ axes[0, 0].plot(
     label="Eradiate, discs",
 )
 axes[0, 0].set(
-    title="HOM45: radius .025 of the height, any inclination", ylabel="reflectance, red"
+    title="HOM45: radius 0.025 of the height, random inclination", ylabel="reflectance, red"
 )
 vza = np.concatenate([np.arange(-75, 25), np.linspace(25, 35, 81), np.arange(36, 76)])
 angles = {"sza": 30.0, "vza": np.abs(vza), "raa": np.where(vza < 0, 180.0, 0.0)}
@@ -188,7 +200,7 @@ axes[0, 1].plot(
     vza, expected, color="#b2182b", linewidth=3, alpha=0.4, zorder=0, label="circles, exact"
 )
 axes[0, 1].set(
-    title="Flat discs of the same size", ylabel="scattered once, of what a leaf reflects"
+    title="Flat discs of the same size", ylabel="single scattering / leaf reflectance"
 )
 for axis in axes[1]:
     axis.axhline(0, color="0.5", linewidth=0.8)
@@ -199,3 +211,4 @@ for axis in axes[1]:
     )
 for axis in axes[0]:
     axis.legend(frameon=False, fontsize=8, loc="upper left")
+# sphinx_gallery_end_ignore

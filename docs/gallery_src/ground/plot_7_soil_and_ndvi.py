@@ -2,8 +2,8 @@
 Soil and NDVI
 =============
 
-Soils that are brighter or darker below the same leaves, and moist ones: what they do to red and near infrared light,
-and to a line of leaf area on NDVI.
+The first figure shows how brightness and moisture of the soil change red and near infrared reflectance. The second
+shows how variable soil brightness increases the scatter between NDVI and leaf area.
 """
 
 import matplotlib.pyplot as plt
@@ -16,8 +16,8 @@ bands = ["TM3", "TM4"]
 colors = plt.get_cmap("YlGn")(np.linspace(0.3, 1, 6))
 
 # %%
-# A small raster: leaf area from row to row, and soil from column to column. Bare ground, the lowest line, is the soil
-# line; leaves lift the others off it. Lines of one leaf area do not run through the origin as those of one NDVI do.
+# Each coloured line has a constant leaf area and a varying soil. The lowest line is bare ground (the soil line). Grey
+# lines have constant NDVI.
 
 grid = fifesim.fife_site(cell=30, window=((0, 6), (0, 41)))
 lai = fifesim.lai_scene(grid, seed=7).drop_attrs(deep=False)
@@ -28,9 +28,10 @@ across = xr.zeros_like(lai) + xr.DataArray(np.linspace(0, 1, 41), dims="x", coor
 case = {"bands": bands, "geometry": fifesim.fife_geometry(), "atmosphere": fifesim.Atmosphere()}
 changes = {
     "Brightness −0.1 to 0.15": fifesim.Canopy(soil=0.25 * across - 0.1),
-    "Moisture 0 to 1, of a brighter soil": fifesim.Canopy(soil=0.15, moisture=across),
+    "Moisture 0 to 1, brightness 0.15": fifesim.Canopy(soil=0.15, moisture=across),
 }
 
+# sphinx_gallery_start_ignore
 figure, axes = plt.subplots(
     1, 2, figsize=(11, 4.6), layout="constrained", sharex=True, sharey=True
 )
@@ -48,11 +49,15 @@ for axis, (title, canopy) in zip(axes, changes.items(), strict=True):
     axis.set(title=title, xlabel="red reflectance (TM3)", xlim=(0, 0.35), ylim=(0, 0.55))
 axes[0].set_ylabel("near infrared reflectance (TM4)")
 axes[0].legend(title="leaf area index", frameon=False, loc="lower right", ncols=2)
-axes[1].annotate("dots: the end, bright or wet", (0.2, 0.04), fontsize=9)
+axes[1].annotate("dots: brightest or wettest soil", (0.2, 0.04), fontsize=9)
+# sphinx_gallery_end_ignore
 
 # %%
-# The FIFE site's sparsest grass over soils whose brightness varies with a standard deviation of 0.04, as TM sees it.
-# Where the field of the soil is alike over as far as the leaf area's, pixels do not average it away.
+# Lines of constant leaf area do not pass through the origin, unlike lines of constant NDVI. A brighter soil therefore
+# lowers NDVI at low and medium leaf area. Moisture darkens the soil and therefore raises NDVI.
+#
+# The next figure shows simulated TM pixels of the sparsest FIFE treatment, with increasing standard deviation of soil
+# brightness. The soil varies over the same distances as leaf area.
 
 grid = fifesim.fife_site(cell=30 / 9, window=((0, 900), (0, 900)))
 lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.24, seed=7)
@@ -61,6 +66,7 @@ truth = lai.fifesim.aggregate(30)
 
 
 def ndvi_over(deviation):
+    """NDVI of a TM image over soil with a standard deviation of brightness."""
     soil = deviation * score if deviation else None
     return (
         lai.fifesim.surface_reflectance("TM", bands=bands, canopy=fifesim.Canopy(soil=soil))
@@ -71,27 +77,9 @@ def ndvi_over(deviation):
 
 
 images = {deviation: ndvi_over(deviation) for deviation in (0.0, 0.02, 0.04, 0.06)}
-figure, axes = plt.subplots(1, 3, figsize=(12, 4), layout="constrained")
-corner = {"y": slice(0, 40), "x": slice(0, 40)}
 soil = (0.04 * score).fifesim.aggregate(30)
-for axis, raster, title, style in (
-    (axes[0], truth, "Leaf area index", {"cmap": "YlGn"}),
-    (axes[1], soil, "Brightness of the soil", {"cmap": "cividis"}),
-    (
-        axes[2],
-        images[0.04] - images[0.0],
-        "Change of NDVI by the soil",
-        {"cmap": "RdBu", "vmin": -0.06, "vmax": 0.06},
-    ),
-):
-    drawn = axis.imshow(raster.isel(corner), extent=(0, 1.2, 0, 1.2), **style)
-    figure.colorbar(drawn, ax=axis, shrink=0.8)
-    axis.set(title=title, xlabel="easting [km]")
-axes[0].set_ylabel("northing [km]")
 
-# %%
-# More variance of the soil, more scatter. A bright soil looks like fewer leaves, where there are few leaves to hide it.
-
+# sphinx_gallery_start_ignore
 figure, axes = plt.subplots(
     1, 4, figsize=(10.5, 3.2), layout="constrained", sharex=True, sharey=True
 )
@@ -102,8 +90,11 @@ for axis, (deviation, ndvi) in zip(axes, images.items(), strict=True):
     )
     line = np.array([float(ndvi.min()), float(ndvi.max())])
     axis.plot(line, fit.intercept + fit.slope * line, color="black", linewidth=1)
-    axis.set(title=f"sd {deviation:g}: R² {fit.r2:.3f}", xlabel="NDVI")
-axes[0].set_ylabel("leaf area index of 30 m")
-figure.colorbar(points, ax=axes, label="brightness of the soil")
+    axis.set(title=f"soil sd {deviation:g}: R² = {fit.r2:.3f}", xlabel="NDVI")
+axes[0].set_ylabel("leaf area index, 30 m")
+figure.colorbar(points, ax=axes, label="soil brightness")
+# sphinx_gallery_end_ignore
 
-plt.show()
+# %%
+# R² decreases as the soil becomes more variable. Pixels with bright soil (yellow) have a low NDVI for their leaf area,
+# as if they had fewer leaves.

@@ -1,16 +1,16 @@
 """
-A swath, and what becomes of it on a map
-========================================
+Simulate a swath and map it
+===========================
 
-The AVHRR turns from side to side, and one sample after the other sees the ground at a larger angle. Light is computed
-in the directions of the scan; its image has lines and samples instead of rows and columns, and is then put onto a map.
+The first figure shows pixels of a simulated AVHRR scan at nadir and at the edge of the swath. The second shows the same
+pixels on a map grid of 2 km. Reflectance is computed for the view direction of each pixel.
 """
 
 import matplotlib.pyplot as plt
 
 import fifesim
 
-# Cells of 500 m, from below the track to 1000 km beside it.
+# Cells of 500 m, from the track to a distance of 1000 km.
 grid = fifesim.grid_at("EPSG:26914", 100e3, 4440e3, 1000e3, 60e3, 500.0)
 away = {"nadir_offset": 500e3, "heading": 0.0}
 lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.248, seed=7)
@@ -27,34 +27,40 @@ image = rho.fifesim.to_toa().fifesim.sense_swath("AVHRR", **away)
 ndvi = image.fifesim.ndvi()
 
 # %%
-# **Pixels where they lie**, in two parts of 60 km. At 55° a footprint is 2.8 times as wide as at nadir, and 1.6 times
-# as long: lines, which follow each other as at nadir, overlap.
+# Two windows of 60 km. At 55°, a footprint is 2.8 times as wide and 1.6 times as long as at nadir, so that scan lines
+# overlap.
 
 ends = (110, 1030)
+
+# sphinx_gallery_start_ignore
 figure, axes = plt.subplots(1, 2, figsize=(12, 4.6), layout="constrained")
 for axis, west in zip(axes, ends, strict=True):
     ndvi.fifesim.plot(axes=axis, limits=(0.1, 0.6))
     axis.set(xlim=(west, west + 60), ylim=(4385, 4435))
     near = ndvi["vza"].where(abs(ndvi["x"] / 1000 - west - 30) < 30)
     axis.set_title(
-        f"NDVI by lines and samples, seen at {float(near.mean()):.0f}°", fontsize="medium"
+        f"NDVI, lines and samples, view at {float(near.mean()):.0f}°", fontsize="medium"
     )
+# sphinx_gallery_end_ignore
 
 # %%
-# **On a map of 2 km**: the nearest pixel to each cell, or the mean of the pixels that lie on it, by area. Near the
-# track a cell is the mean of several pixels, at the end of one or two.
+# `grid_swath` takes the nearest pixel of each cell (top), or the area-weighted mean of the pixels in a cell (bottom).
 
 around = fifesim.grid_at("EPSG:26914", 100e3, 4436e3, 1000e3, 50e3, 2000.0)
+# sphinx_gallery_start_ignore
 figure, axes = plt.subplots(2, 2, figsize=(12, 8), layout="constrained")
 for row, method in zip(axes, ("nearest", "mean"), strict=True):
     on_map = ndvi.fifesim.grid_swath(around, method)
     for axis, west in zip(row, ends, strict=True):
         on_map.fifesim.plot(axes=axis, limits=(0.1, 0.6))
         axis.set(xlim=(west, west + 60), ylim=(4387, 4435))
-        axis.set_title(f"grid_swath(grid, {method!r})", fontsize="medium")
+        place = "near nadir" if west == ends[0] else "edge of the swath"
+        axis.set_title(f"{method} pixels on 2 km, {place}", fontsize="medium")
+# sphinx_gallery_end_ignore
 
 # %%
-# The view goes onto the map with the pixels, so that all that follows knows it.
+# Near nadir, the mean is smoother than the nearest pixel, because a cell has several pixels. At the edge of the swath
+# both are similar. The view angles are mapped too, so that later steps such as the atmospheric correction use them:
 
 surface = image.fifesim.grid_swath(around).fifesim.to_surface()
 print(surface["vza"].isel(y=10, x=slice(None, None, 100)).round(1).values, "degrees")

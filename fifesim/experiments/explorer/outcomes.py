@@ -1,4 +1,4 @@
-"""Results of every setting of a page: digital numbers, truth, lines and budgets."""
+"""Results for all settings of an interactive page: digital numbers, truth, regressions and budgets."""
 
 from dataclasses import dataclass, replace
 
@@ -15,7 +15,7 @@ from fifesim.scenario.ground import elevation, ground_scene, truth_of
 from fifesim.scenario.simulation import setup_of
 from fifesim.sensor.response import calibration
 
-# Of each line, in this order.
+# Statistics of each line, in this order.
 LINE_NUMBERS = ("slope", "intercept", "r2", "n")
 
 
@@ -44,11 +44,12 @@ class Outcomes:
     truths : list of array, shape (arp, sza, 2, rows, columns)
         LAI and FPAR of the ground of the pixels, by instrument.
     lines : array, shape (arp, haze, sza, instrument, offset, 2, 4)
-        Of LAI and of FPAR on NDVI: `LINE_NUMBERS`. Slope and intercept are NaN where all pixels have one NDVI.
+        Regression of LAI and FPAR on NDVI, in the order of `LINE_NUMBERS`. Slope and intercept are NaN if NDVI is
+        constant.
     shares : array, shape (arp, haze, sza, instrument, offset, 2, stages)
-        Shares of the variance that the lines do not explain. [1]
+        Shares of the stages in the unexplained variance. [1]
     curvature : array, shape (arp, haze, sza, instrument, offset, 2)
-        Share that remains with all stages ideal. [1]
+        Unexplained variance with all stages ideal. [1]
     """
 
     scenes: np.ndarray

@@ -1,4 +1,4 @@
-"""Page with sliders: its words, its packed arrays, and the file that it is written to."""
+"""Interactive page with sliders: texts, packed arrays, and writing to a file."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from fifesim.sensor.description.instruments import instrument
 # As a page reads them: bytes, pairs of bytes with all low ones first, and numbers of four or eight bytes.
 _KINDS = {np.dtype("u1"): "u1", np.dtype("u2"): "u2", np.dtype("f4"): "f4", np.dtype("f8"): "f8"}
 _ALIGNED = 8
-# Of steps: 0 is kept for what has no data.
+# Number of quantization steps; 0 is no data.
 _LEVELS = {"u1": 254, "u2": 65534}
 
 
@@ -45,7 +45,7 @@ def packed(arrays):
         kind = _KINDS[array.dtype]
         places[name] = {"kind": kind, "shape": list(array.shape), "start": len(whole)}
         little = np.ascontiguousarray(array).astype(f"<{kind}").tobytes()
-        # High bytes beside each other are nearly all alike.
+        # High bytes compress well when stored together.
         whole += little[::2] + little[1::2] if kind == "u2" else little
         whole += bytes(-len(whole) % _ALIGNED)
     return base64.b64encode(zlib.compress(bytes(whole), 9)).decode("ascii"), places
@@ -59,25 +59,25 @@ def stepped(values, kind):
     return codes.astype(kind), low, step
 
 
-# Beside the name of a stage: what it does.
+# Effect of each stage.
 STAGE_WORDS = {
-    CURVATURE: "LAI and FPAR go with NDVI along a curve, which no line follows",
-    "non-linearity": "bare and dense cells within a pixel do not average along that curve",
-    "NDVI scaling": "the NDVI of mean light is not the mean of NDVI",
-    "point spread": "a pixel sees its neighbours too",
-    "registration": "pixels lie beside the ground that they are compared with",
-    "quantisation": "light becomes whole numbers",
-    "noise": "the detectors' own",
-    "topography": "slopes face the sun, or turn away",
-    "atmosphere": "air veils the ground",
-    "soil": "soil is brighter here and darker there",
-    "dead leaves": "there are more of them here than there",
-    "cover": "plants and what lies below them differ from field to field",
+    CURVATURE: "the relation of LAI and FPAR with NDVI is curved, and a line cannot follow it",
+    "non-linearity": "averages of bare and dense cells within a pixel do not follow that curve",
+    "NDVI scaling": "the NDVI of mean reflectance differs from the mean NDVI",
+    "point spread": "a pixel receives light from its neighbours",
+    "registration": "pixels are displaced from the ground they are compared with",
+    "quantisation": "radiance is rounded to whole numbers",
+    "noise": "random errors of the detectors",
+    "topography": "slopes face the sun or turn away from it",
+    "atmosphere": "haze and gases reduce the contrast",
+    "soil": "soil brightness varies",
+    "dead leaves": "their fraction varies",
+    "cover": "plants and background differ between fields",
     "clumping": "leaves stand in crowns, with gaps between",
-    "covariance": "leaf area goes with the lie of the land and with the soil",
+    "covariance": "leaf area is correlated with terrain and soil",
 }
 
-# What an image is shown in: a quantity, and one of its bands.
+# Views of an image: quantity and band.
 VIEWS = {"ndvi": ("ndvi", ""), "red": ("toa_reflectance", "red"), "nir": ("toa_reflectance", "near infrared")}
 
 
@@ -97,14 +97,14 @@ def slider_words(sweep):
     own = sweep.scenario
     haze = {"visibility": "Visibility", "aot": "Haze"}[sweep.haze]
     return [
-        _slider("arp", "Ground patches", "how far leaf area resembles that beside it", sweep.arps,
+        _slider("arp", "Ground patches", "distance over which leaf area is correlated", sweep.arps,
                 own.ground.arp, lambda arp: _patches(arp, own.grid.cell)),
-        _slider("haze", haze, "how far one can see, or how thick the haze is", sweep.hazes,
+        _slider("haze", haze, "visibility, or aerosol optical thickness", sweep.hazes,
                 getattr(own.atmosphere, sweep.haze), lambda amount: _air(sweep.haze, amount)),
-        _slider("sza", "Solar zenith", "of the sun, from overhead", sweep.szas, own.sun_and_view().sza, _sun),
-        _slider("instrument", "Instrument", "from small pixels to large", sweep.instruments, own.sensor.instrument,
+        _slider("sza", "Solar zenith", "solar zenith angle", sweep.szas, own.sun_and_view().sza, _sun),
+        _slider("instrument", "Instrument", "from small to large pixels", sweep.instruments, own.sensor.instrument,
                 lambda name: _instrument_title(sweep, name)),
-        _slider("registration", "Registration error", "how far pixels lie beside the ground they are compared with",
+        _slider("registration", "Registration error", "distance of pixels from the ground they are compared with",
                 sweep.offsets, tuple(own.sensor.offset), _displacement),
     ]  # fmt: skip
 
@@ -117,9 +117,9 @@ def _slider(key, name, hint, values, own, mark_and_text):
 
 def _patches(arp, cell):
     if arp is None:
-        return "map", "as the map has them"
+        return "map", "as in the map"
     length = correlation_length(arp, cell)
-    return f"{length:.0f} m", f"leaves are alike up to {length:.0f} m, arp {arp:g}"
+    return f"{length:.0f} m", f"leaf area is correlated up to {length:.0f} m, arp {arp:g}"
 
 
 def _air(key, amount):
@@ -127,7 +127,7 @@ def _air(key, amount):
         return "none", "without haze"
     if key == "aot":
         return f"{amount:g}", f"aerosol optical thickness {amount:g}"
-    return f"{amount:g} km", f"one sees {amount:g} km far"
+    return f"{amount:g} km", f"visibility {amount:g} km"
 
 
 def _sun(sza):
@@ -149,7 +149,7 @@ def _displacement(offset):
 
 _TEMPLATE = Path(__file__).with_name("explore.html.j2")
 _SCRIPTS = ("explore_data.js", "explore_drawing.js", "explore.js")
-# So many pixels of each image say where colours end.
+# Pixels per image from which colour limits are computed.
 _SAMPLE = 50
 
 
@@ -212,7 +212,7 @@ def _arrays(outcomes):
     for k, (image, truth, camera) in enumerate(zip(outcomes.images, outcomes.truths, outcomes.cameras, strict=True)):
         arrays[f"image{k}"] = image
         arrays[f"reflectance{k}"] = camera.reflectance
-        # Leaf area does not go with the sun.
+        # Leaf area does not depend on the sun.
         arrays[f"lai{k}"], *steps[f"lai{k}"] = stepped(truth[:, 0, 0], "u2")
         arrays[f"fpar{k}"], *steps[f"fpar{k}"] = stepped(truth[:, :, 1], "u2")
     return arrays, steps
@@ -268,20 +268,20 @@ def _keys(sweep):
 
 def explore(scenario: Scenario | None = None, path: FilePath = "explore.html", *, overwrite: bool = False) -> Path:
     """
-    A page to play with: sliders over simulations of a scenario; computes.
+    Write an interactive page with sliders over simulations of a scenario; computes.
 
-    Scene, image, scatter plot and budget of the scatter, for every setting of leaf area's patches, haze, sun,
-    instrument and registration error. The page needs nothing but a browser.
+    The page shows scene, image, scatter plot and scatter budget for each combination of patch size, haze, sun,
+    instrument and registration error. It works offline in a browser.
 
     Parameters
     ----------
     scenario : fifesim.scenario.scenario.Scenario, optional
-        Sliders begin at its values, on the ground in the middle of its grid. By default the paper's case with patches
-        of 32 m, on level ground.
+        Initial values of the sliders; the page shows the centre of its grid. By default the case of the paper with
+        patches of 32 m, on level ground.
     path : str or path, optional
-        Of the HTML file.
+        Path of the HTML file.
     overwrite : bool, optional
-        Replace a file of that name.
+        Replace an existing file.
 
     Returns
     -------
@@ -290,7 +290,7 @@ def explore(scenario: Scenario | None = None, path: FilePath = "explore.html", *
     Raises
     ------
     ValueError
-        If the file exists, or the scenario cannot be shown; nothing is written then.
+        If the file exists, or the scenario cannot be shown. Nothing is written in this case.
 
     See Also
     --------
@@ -304,7 +304,7 @@ def explore(scenario: Scenario | None = None, path: FilePath = "explore.html", *
     >>> fifesim.explore(fifesim.Scenario(), "mine.html")  # doctest: +SKIP
     """
     if scenario is not None and not isinstance(scenario, Scenario):
-        raise TypeError(f"explore takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+        raise TypeError(f"explore needs a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     path = Path(path)
     check_file(path, overwrite)
     sweep = sweep_of(scenario)

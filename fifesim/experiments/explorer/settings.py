@@ -11,7 +11,7 @@ from fifesim.grids import grid as grids
 from fifesim.scenario.scenario import Scenario, grid_keys, parse_scenario
 from fifesim.sensor.description.instruments import instrument
 
-# Where a scenario's own value is none of these, it takes the place of the nearest.
+# The value of the scenario replaces the nearest of these.
 _VALUES = {
     "arp": (0.15, 0.24, 0.249),
     "visibility": (10.0, 23.0, 45.0),
@@ -19,30 +19,30 @@ _VALUES = {
     "sza": (20.0, 40.0, 60.0),
 }
 _INSTRUMENTS = ("MSI", "HRV", "TM", "MSS")
-# Eastward, so that pixels see the ground beside them. [pixel]
+# Eastward displacement of the footprints. [pixel]
 _DISPLACEMENTS = (0.0, 0.25, 0.5, 1.0)
 
-# Edge of the ground that a page shows. [m]
+# Edge length of the ground on a page. [m]
 _SIDE = 900.0
-# Pixels along it: a line needs some, and a page holds only so many.
+# Pixels along the edge: enough for a regression, and few enough for the size of the page.
 _FEWEST, _WANTED, _MOST = 12, 30, 100
-# With more stages of the scatter, whose sets double with each, sliders have fewer values.
+# The number of simulations doubles with each stage. Beyond this number of stages, sliders have fewer values.
 _MANY = 8
-# Cells along it, where that leaves enough pixels.
+# Cells along the edge, if this leaves enough pixels.
 _MOST_CELLS = 400
 
 
 @dataclass(frozen=True)
 class Setting:
     """
-    Values that every slider but registration has.
+    Values of all sliders except registration.
 
     Attributes
     ----------
     arp : float or None
         None for a map of leaf area. [1]
     haze : float or None
-        Visibility [km] or optical thickness; None where the scenario has no aerosol.
+        Visibility [km] or optical thickness; None if the scenario has no aerosol.
     sza : float
         [degree]
     instrument : str
@@ -62,9 +62,9 @@ class Sweep:
     Attributes
     ----------
     scenario : fifesim.scenario.scenario.Scenario
-        On the ground that the page shows.
+        Scenario of the ground on the page.
     haze : str
-        The key that haze is given by: visibility, or aot.
+        Key of the haze: visibility or aot.
     arps, hazes, szas, instruments : tuple
         Values of the sliders, one at least.
     offsets : tuple of (float, float)
@@ -86,7 +86,7 @@ class Sweep:
 
     @property
     def settings(self):
-        """Every `Setting`, the last slider changing fastest."""
+        """All settings; the last slider changes fastest."""
         return [Setting(*values) for values in product(self.arps, self.hazes, self.szas, self.instruments)]
 
     def at(self, setting, offset=(0.0, 0.0)):

@@ -1,4 +1,4 @@
-"""Experiment of Friedl et al. (1995): nine scenarios, readings of Table 1, and inputs that a user replaces."""
+"""Experiment of Friedl et al. (1995): nine scenarios, readings of Table 1, and user-supplied inputs."""
 
 import os
 import re
@@ -132,7 +132,7 @@ def _shares(text):
 # Nine cells across a pixel of 30 m.
 CELL = 30 / 9
 
-# The instrument of Table 1, from whose file those of other responses are made.
+# Instrument of Table 1, from which variants with other responses are derived.
 TABLE_1 = "TM"
 _FILE = "instruments/tm.toml"
 
@@ -147,7 +147,7 @@ _BLUR = (
 @dataclass(frozen=True)
 class Reading:
     """
-    Position and spatial response of the pixels of Table 1 relative to the blocks of ground.
+    Interpretation of Table 1: position and spatial response of the pixels relative to the blocks of ground.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ class Reading:
     count : int, optional
         Number of angles of the line spread function, instead of Table 1's.
     eifov : float, optional
-        Effective field of view of a Gaussian in the place of Table 1's line spread function. [m]
+        Effective field of view of a Gaussian that replaces the line spread function of Table 1. [m]
     offset : float
         Constant displacement of the image, southward and eastward. [cell]
     """
@@ -208,7 +208,7 @@ class Reading:
         )
 
 
-# The paper's text on cells and pixels, by section. It speaks for the aligned reading.
+# Statements of the paper on cells and pixels, by section. They support the aligned reading.
 PASSAGES = {
     "Ground Scene Model": "9² ground cells per simulated sensor pixel",
     "Analyses": "81 (9²) ground scene elements per 30-m TM pixel",
@@ -240,51 +240,51 @@ def reading_of(name, sensor):
     found = READINGS[name]
     if found.other_response and sensor != TABLE_1:
         rest = ", ".join(each.name for each in READINGS.values() if not each.other_response)
-        raise ValueError(f"the reading {name!r} is one of Table 1, of TM: for {sensor} type {rest}")
+        raise ValueError(f"the reading {name!r} of Table 1 applies to TM only: for {sensor} use {rest}")
     return found
 
 
 def beside(reading):
-    """Reading asked for, and a second one for comparison: the aligned reading, or the native one for the aligned."""
+    """Requested reading, and a second one for comparison: aligned, or native if the first is aligned."""
     return [reading, NATIVE if reading == ALIGNED else ALIGNED]
 
 
 ARPS = (0.05, 0.15, 0.24)
 VARIABLES = ("lai", "fpar")
 
-# Along the edge of a scene. The paper states no size; the report shows what others give.
+# Cells along the edge of a scene. The paper states no size; the report shows results for other sizes.
 CELLS = 333
-# With fewer pixels along an edge increments hold too few for a deviation.
+# With fewer pixels along an edge, increments have too few pixels for a standard deviation.
 _FEWEST_PIXELS = 10
 _COARSE_PIXELS = 12
 
-# Where in the FIFE site the scene lies, in cells from its corner: only the relief depends on it.
+# Position of the scene on the FIFE site, in cells from its corner. It only affects the relief.
 _CORNER = 1000
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
     """
-    Description that the nine scenes share.
+    Common description of the nine scenes.
 
     Parameters
     ----------
     reading : Reading
-        Of Table 1.
+        Interpretation of Table 1.
     dem : str
         "flat", "flint-hills" or a raster file of elevation.
     densities : mapping of str
-        By treatment, what `fifesim.lai_distribution` takes.
+        LAI distribution of each treatment, as in `fifesim.lai_distribution`.
     optics : mapping of str to (float, float), optional
-        Leaf reflectance and transmittance by band; by default fifesim's own. [1]
+        Leaf reflectance and transmittance by band; by default the fitted values. [1]
     background : mapping of str to float, optional
-        By band, or shares of spectra; by default fifesim's own. [1]
+        Background by band, or fractions of spectra; by default the fitted values. [1]
     sensor : str
         Name of an instrument, or its file.
     cells : int, optional
-        Along the edge of a scene; 333, or 12 pixels of a coarse sensor, by default.
+        Cells along the edge of a scene; by default 333, or 12 pixels of a coarse sensor.
     bits : int, optional
-        Number of bits of digital numbers, by default the instrument's.
+        Number of bits; by default from the instrument.
     west, north : float, optional
         Upper left corner of the scenes in EPSG:26914, for the relief; by default 3.33 km from the corner of the
         site, which the paper does not give. [m]
@@ -333,7 +333,7 @@ class Case:
 
     @property
     def own_densities(self):
-        """Whether the densities are those of fifesim."""
+        """Whether the densities are the defaults."""
         return dict(self.densities) == densities_of(None)
 
     @property
@@ -356,8 +356,8 @@ class Case:
 
     def scenario(self, treatment, arp, seed):
         """Scenario of one of the nine scenes."""
-        # All keys that matter to the ground are explicit, whatever the defaults are. A response of the reading, other
-        # bits and a density without a name have no key.
+        # All keys of the ground are explicit, so that the scenario does not depend on defaults. The response of the
+        # reading, the number of bits and unnamed densities have no key.
         crs, west, north = times.CORNERS["NAD83"]
         edge = self.cells * CELL
         first = min(_CORNER * CELL, max(times.SIZE - edge, 0.0))
@@ -423,7 +423,7 @@ def case_of(
     )
     if case.dem not in ("flat", "flint-hills") and not os.path.isfile(case.dem):
         raise ValueError(f'dem = {shown(case.dem)}: type "flat", "flint-hills", or a raster file of elevation')
-    # Physics refuses what cannot be before anything is computed.
+    # Raises an error for invalid physics before anything is computed.
     case.common.complete()
     return case
 

@@ -152,9 +152,9 @@ def _background_changes(case):
 
 FITTED = "fitted to Table 2"
 
-# Wanted largest differences: their words, and the limits for LAI and for FPAR. They were set after trials with nearly
-# the present inputs and reading, before the nine scenes were first run, in view of how samples of 200 pixels scatter;
-# `limits` states how many of their standard deviations each is.
+# Tolerances: description, and limits for LAI and for FPAR. They were set after trials with nearly the present inputs
+# and reading, before the nine scenes were first run, in view of how samples of 200 pixels scatter; `limits` states how
+# many of their standard deviations each is.
 _WANTED = {
     "r2_largest": ("R² of {}, largest difference of nine rows", 0.12, 0.12),
     "r2_largest_long": ("R² of {}, largest difference at arp 0.24", 0.08, 0.08),

@@ -1,4 +1,4 @@
-"""Figures 3 to 9 of Friedl et al. (1995) and the numbers in their captions, from what `fifesim.reproduce` returns."""
+"""Figures 3 to 9 of Friedl et al. (1995) and the numbers in their captions, from `fifesim.reproduce`."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ Reproduced: TypeAlias = Annotated[
 ]
 
 FIGURE_NUMBERS = range(3, 10)
-"""Of the figures that are drawn."""
+"""Numbers of the available figures."""
 
 BY_READING = (5, 6, 7, 9)
-"""Of those that differ with the reading of Table 1."""
+"""Numbers of the figures that depend on the reading of Table 1."""
 
 
 def plot_reproduction(number: int, found: Reproduced, *, reading: str | None = None) -> Figure:
     """
-    A figure of Friedl et al. (1995), drawn from a repetition of the experiment.
+    Plot a figure of Friedl et al. (1995) from the reproduced experiment.
 
     Parameters
     ----------
@@ -49,9 +49,9 @@ def plot_reproduction(number: int, found: Reproduced, *, reading: str | None = N
         3, densities of LAI; 4, LAI of the ground; 5, LAI and FPAR against NDVI; 6, densities of cells and pixels;
         7, relative equivalent noise; 8, scaling of NDVI; 9, reflectance of image and ground.
     found : dataset
-        From `reproduce`.
+        Result of `reproduce`.
     reading : str, optional
-        One of those in ``found``, by default the one that was asked for.
+        Reading of Table 1 in ``found``; by default the first.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def plot_reproduction(number: int, found: Reproduced, *, reading: str | None = N
     Raises
     ------
     ValueError
-        If there is no such figure or reading.
+        If the figure or reading is unknown.
 
     See Also
     --------
@@ -99,7 +99,7 @@ def _figure3(found, reading):
     for (name, each), color, dash in zip(found["density"].groupby("distribution"), _COLORS, _DASHES, strict=True):
         known = each.squeeze().dropna("leaf_area")
         at, low = known["leaf_area"].values, known.values[0]
-        # Down to zero where the density is cut off.
+        # Draw the density down to zero at its cutoff.
         axis.plot([at[0], *at, at[-1]], [0 if at[0] > 0 or low else low, *known.values, 0], dash, color=color,
                   label=str(name).replace("-", ", "))  # fmt: skip
     _finish(axis, xlabel=_LABELS["lai"], ylabel="density [m² m⁻²]⁻¹", xlim=(0, None), ylim=(0, None))
@@ -115,7 +115,7 @@ def _figure4(found, reading):
     for axis, arp in zip(axes, found["arp"].values, strict=True):
         shown = found["cell_lai"].sel(arp=arp).values[:120, :120]
         extent = np.array([0, shown.shape[1], shown.shape[0], 0]) * size
-        drawn = axis.imshow(shown, cmap="viridis", vmin=0, vmax=high, extent=extent, interpolation="nearest")
+        drawn = axis.imshow(shown, cmap="YlGn", vmin=0, vmax=high, extent=extent, interpolation="nearest")
         axis.set(xlabel="east [m]", title=f"arp {arp:g}")
         axis.title.set_fontsize(9)
         axis.xaxis.set_major_locator(MaxNLocator(4))
@@ -156,7 +156,7 @@ def _figure6(found, reading):
     first = found["arp"].values[0]
     for axis, variable in zip(figure.subplots(1, 3), (*VARIABLES, "ndvi"), strict=True):
         cells = found[f"cell_{variable}"].isel(arp=-1).values.ravel()
-        # Neither leaf area nor FPAR is below zero, where both are dense.
+        # Leaf area and FPAR are not negative, and dense near zero.
         options = {"reflect": variable != "ndvi"}
         at = np.linspace(cells.min(), cells.max(), 500)
         counts, edges = np.histogram(cells, bins=400)
@@ -225,7 +225,7 @@ def _figure9(found, reading):
     for row, name, words in zip(axes, ("red", "nir"), ("red", "near infrared"), strict=True):
         for axis, arp in zip(row, found["arp"].values, strict=True):
             values = sample(found, reading, arp)
-            # What the atmosphere alone makes of the mean reflectance of the ground is clear.
+            # Effect of the atmosphere alone on the mean surface reflectance.
             boa, toa, clear = (values[f"{kind}_{name}"] for kind in ("boa", "toa", "clear"))
             axis.scatter(boa, toa, color=_COLORS[1], label="simulated image", **_DOT)
             at, order = np.array([boa.min(), boa.max()]), np.argsort(boa)
@@ -258,7 +258,7 @@ def _finish(axis, **properties):
     axis.spines[["top", "right"]].set_visible(False)
 
 
-# A rise of a density is a peak where it reaches this share of the highest.
+# Minimum height of a peak relative to the highest.
 _PEAK = 0.05
 
 

@@ -18,10 +18,10 @@ from fifesim.output.folders import check_folder, results
 from fifesim.output.progress import steps
 from fifesim.output.run.workers import check_memory_of_cells
 
-# Root mean squares of R2 that differ by less are alike: two realisations leave about so much. [1]
+# Smaller differences in rms R2 are not significant, given the variation between two realisations. [1]
 _ALIKE = 0.02
 
-# Standard deviations over fewer realisations are too uncertain to divide by.
+# With fewer realisations, standard deviations are too uncertain to divide by.
 _FEWEST = 10
 
 _GROUND = {"flat": "level", "flint-hills": "the synthetic Flint Hills"}
@@ -90,10 +90,10 @@ def _of_case(readings):
     return {row["name"]: row for row in readings.to_dict("records") if row["dem"] == readings["dem"].iloc[0]}
 
 
-# Tables of effects, and the label of the progress of each.
+# Tables of effects, with labels for the progress bar.
 _TABLES = {"readings": "readings of Table 1", "sizes": "sizes of the scene", "sensitivity": "numbers chosen"}
 
-# Differences between cases share their random numbers, and need few realisations.
+# Cases use the same random numbers, so their differences need few realisations.
 _EFFECT_REALISATIONS = 2
 _DPI = 200
 

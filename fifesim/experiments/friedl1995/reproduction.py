@@ -1,4 +1,4 @@
-"""Reproduction of Friedl et al. (1995) as one call: its numbers, its scenes, and its scenarios as files."""
+"""Reproduction of Friedl et al. (1995): statistics, scenes, and scenarios as files."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def shown_scenes(case, readings, seed, each=iter):
 def densities(case):
     """Densities of leaf area of the three treatments, dims (distribution, leaf_area), NaN outside of the support."""
     known = {name: lai_distribution(case.densities[name]) for name in treatments()}
-    # What lies beyond has a ten-thousandth of the cells.
+    # Quantiles beyond have a ten-thousandth of the cells.
     high = max(float(each.ppf(1 - 1e-4)) for each in known.values())
     at = np.linspace(0.0, high * 1.02, _POINTS)
     values = [np.where((at >= each.support()[0]) & (at <= each.support()[1]), each.pdf(at), np.nan)
@@ -123,50 +123,50 @@ def reproduce(
     north: float | None = None,
 ) -> xr.Dataset:
     """
-    Repeat the experiment of Friedl et al. (1995): Table 2 over realisations, and what Figures 3 to 9 show.
+    Reproduce the experiment of Friedl et al. (1995): Table 2 over realisations, and the data of Figures 3 to 9.
 
-    Without arguments the ground is level, pixels drift from the blocks of the truth as Table 1's interval has it, and
-    densities, optics and background are those that were inferred from the paper's own Table 2. The paper's text speaks
-    for pixels that are aligned with the blocks, the reading "aligned".
+    By default, the ground is level, pixels are spaced by the sampling interval of Table 1 and therefore drift from the
+    blocks of the truth, and LAI densities, optics and background are fitted to Table 2 of the paper. The text of the
+    paper suggests pixels aligned with the blocks, which is the reading "aligned".
 
     Parameters
     ----------
     reading : {"native", "aligned", "narrow", "offset", "blur-40.8", "blur-48.6"}, optional
-        Of Table 1: where pixels lie, and how wide they see.
+        Interpretation of Table 1: position and spatial response of the pixels.
     dem : str or path, optional
-        "flat", "flint-hills", which is synthetic, or a raster file of elevation below the scene.
+        "flat", "flint-hills" (synthetic), or a raster file of elevation.
     densities : str, path or mapping of str, optional
-        Folder of ``burned-grazed.csv``, ``burned-ungrazed.csv`` and ``unburned-ungrazed.csv``, samples of LAI; or by
-        treatment what `lai_distribution` takes.
+        Folder with LAI samples ``burned-grazed.csv``, ``burned-ungrazed.csv`` and ``unburned-ungrazed.csv``; or
+        distributions by treatment, as in `lai_distribution`.
     optics : str, path or mapping of str, optional
-        CSV file with columns ``band``, ``leaf_reflectance`` and ``leaf_transmittance``; or by band a pair. [1]
+        CSV file with columns ``band``, ``leaf_reflectance`` and ``leaf_transmittance``; or pairs by band. [1]
     background : str, path or mapping of str, optional
-        CSV file with columns ``band`` and ``background``; by band a number; or shares of spectra, such as
+        CSV file with columns ``band`` and ``background``; numbers by band; or fractions of spectra, such as
         ``"soil_dry:0.475+shade:0.525"``. [1]
     sensor : str or path, optional
         Name of an instrument, or its file.
     realisations : int, optional
-        Of each of the nine scenes.
+        Number of realisations of each of the nine scenes.
     cells : int, optional
-        Along the edge of a scene, of 3.33 m each; 333, or 12 pixels of a coarse sensor, by default.
+        Cells of 3.33 m along the edge of a scene; by default 333, or 12 pixels of a coarse sensor.
     seed : int, optional
-        Of the first realisation, whose scenes the figures show; the others follow.
+        Seed of the first realisation, which the figures show; the others count up.
     west, north : float, optional
-        Upper left corner of the scenes, easting and northing in EPSG:26914: the relief depends on it. [m]
+        Easting and northing of the upper left corner of the scenes in EPSG:26914, which determine the relief. [m]
 
     Returns
     -------
     found : xarray.Dataset
-        ``intercept``, ``slope`` and ``r2`` over (reading, realisation, distribution, arp, variable), the paper's as
-        ``paper_slope`` and so on; those of samples of 200 pixels, ``slope_200``, along ``draw`` too; ``ren`` and
-        ``range_kept``. ``density`` of LAI over (distribution, leaf_area). Cells and pixels of the burned, grazed
-        scenes of the first realisation, ``cell_...`` and ``pixel_...``. The first of ``reading`` is the one asked for;
-        beside it stands the aligned one, or the native one beside that.
+        ``intercept``, ``slope`` and ``r2`` over (reading, realisation, distribution, arp, variable), with published
+        values as ``paper_slope`` and so on, and samples of 200 pixels as ``slope_200`` with a dimension ``draw``;
+        ``ren`` and ``range_kept``; ``density`` of LAI over (distribution, leaf_area); ``cell_...`` and ``pixel_...``
+        for the burned, grazed scenes of the first realisation. The first ``reading`` is the requested one; the second
+        is "aligned", or "native" if the first is "aligned".
 
     Raises
     ------
     ValueError
-        If an argument is none of these, a treatment has no density, a band no optics, or the sensor no red or near
+        If an argument is invalid, a treatment has no density, a band has no optics, or the sensor has no red or near
         infrared band.
 
     References
@@ -246,17 +246,17 @@ def scenario_text(case, own, treatment, arp, seed):
     (own / name).write_text(case.reading.instrument_file(case.instrument.altitude), encoding="utf-8")
     sensor = scenario.sensor.model_copy(update={"instrument": str(own / name)})
     complete = scenario.model_copy(update={"sensor": sensor}).complete()
-    # Beside the scenario, wherever both are moved.
+    # Relative path, so that both files can be moved together.
     beside = complete.sensor.model_copy(update={"instrument": name})
     return write_scenario(complete.model_copy(update={"sensor": beside}))
 
 
 def check_named(case):
-    """Raise ValueError for densities that are not files, which a scenario cannot name."""
+    """Raise ValueError for densities that are not files, because a scenario can only refer to files."""
     for treatment, source in case.densities.items():
         if not is_path(source):
             raise ValueError(
-                f"densities: that of {treatment} is no file, and a scenario names one: write samples of it as a CSV "
+                f"densities: the density of {treatment} is not a file, as a scenario needs: write its samples to a CSV "
                 "file, or call fifesim.reproduce"
             )
 

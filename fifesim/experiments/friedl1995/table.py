@@ -28,10 +28,10 @@ class SceneGround:
     Parameters
     ----------
     setup : fifesim.chain.setup.Setup
-        With the elevation.
+        Setup with elevation.
     lai, fpar : xarray.DataArray, dims (y, x)
     reflectance : xarray.DataArray, dims (band, y, x)
-        At the ground. [1]
+        Surface reflectance. [1]
     """
 
     setup: Setup
@@ -66,7 +66,7 @@ def paired(*arrays):
     return values[:, np.isfinite(values).all(axis=0)]
 
 
-# Larger fields are not kept. [cell]
+# Larger fields are not cached. [cell]
 _FEW = 2**18
 
 
@@ -79,7 +79,7 @@ class Cells(NamedTuple):
 
 
 def cells_of(case, treatment, arp, seed, land=(None, None), driver=None):
-    """Cells of a scene, with the bits of `ground_of`."""
+    """Cells of a scene, identical to `ground_of`."""
     if land[0] is not None:
         ground = ground_of(case, treatment, arp, seed, land)
         return Cells(ground.lai.values, ground.fpar.values, ground.reflectance.values)
@@ -101,21 +101,21 @@ def _order(seed, arp, shape):
     return np.argsort(periodic_field(seed, arp, shape), axis=None, kind="stable")
 
 
-# The three treatments of a seed lie on one field, and so do the cases that change one number.
+# The three treatments of a seed, and cases that change one number, share the same field.
 _kept_order = cached(8, "order of cells")(_order)
 
 
 SAMPLE = 200
 COEFFICIENTS = ("intercept", "slope", "r2")
 
-# Samples of 200 pixels that are drawn from each realisation.
+# Number of samples of 200 pixels per realisation.
 _DRAWS = 25
 
-# Widths of the increments in which noise is counted: the paper does not state them. At arp 0.05 they leave LAI four.
+# Widths of the increments for REN, not stated in the paper. At arp 0.05 LAI has four increments.
 INCREMENTS = {"lai": 0.1, "fpar": 0.05}
 _FEWEST = 3
 
-# What one scene gives, and along what.
+# Results of one scene and their dimensions.
 _DIMS = {
     **dict.fromkeys(COEFFICIENTS, ("variable",)),
     **{f"{name}_200": ("variable", "draw") for name in COEFFICIENTS},
@@ -223,7 +223,7 @@ def draw(pixels, count, seed, draws):
     return pixels[:, _drawn(tuple(seed), pixels.shape[1], count, draws)]
 
 
-# Readings of a scene, and scenes that differ in one number, have samples of the same places.
+# Readings of a scene, and scenes that differ in one number, are sampled at the same pixels.
 @cached(256, "drawn pixels")
 def _drawn(seed, pixels, count, draws):
     order = np.random.default_rng(seed).random((draws, pixels)).argsort(axis=1)

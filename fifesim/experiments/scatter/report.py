@@ -22,15 +22,15 @@ _TEMPLATE = Path(__file__).with_name("report.html.j2")
 # Okabe and Ito's colours, which the colour-blind tell apart; hatches tell them apart in grey.
 _STYLES = {"lai": ("#0072B2", ""), "fpar": ("#E69F00", "////")}
 
-# The three mechanisms of the paper's discussion, and what it does not name.
+# The three mechanisms discussed in the paper, and further ones.
 MECHANISMS = {
     "i. Non-linearity of the relation between NDVI and the variable": ("non-linearity", CURVATURE),
     "ii. NDVI is not scale invariant": ("NDVI scaling",),
     "iii. Regularization by the sensor": ("point spread",),
-    "Place of the pixels, which the paper does not name": ("registration",),
+    "Registration of the pixels (not discussed in the paper)": ("registration",),
     "Digital numbers and noise": ("quantisation", "noise"),
     "Terrain and atmosphere": ("topography", "atmosphere"),
-    "Ground that varies beside its leaf area": tuple(IDEAL_PROPERTIES),
+    "Variation of ground properties other than leaf area": tuple(IDEAL_PROPERTIES),
 }
 
 
@@ -43,38 +43,38 @@ def bar_chart(table):
         rows = table[table["variable"] == variable].set_index("stage")
         total = 100 * rows.loc[TOTAL]
         color, hatch = _STYLES[variable]
-        label = f"{variable.upper()}: {fixed(total['share'], 1)}{plus_minus(total['share_error'], 1)} % in all"
+        label = f"{variable.upper()}: {fixed(total['share'], 1)}{plus_minus(total['share_error'], 1)} % in total"
         at = np.arange(len(names)) + 0.2 * (2 * k - 1)
         share, error = (100 * rows.loc[list(names), name].to_numpy(float) for name in ("share", "share_error"))
         axis.barh(at, share, 0.38, color=color, hatch=hatch, edgecolor="white", linewidth=0, label=label)
         axis.errorbar(share, at, xerr=np.nan_to_num(error), fmt="none", ecolor="#222222", elinewidth=1, capsize=2.5)
         for y, value, spread in zip(at, share, np.nan_to_num(error), strict=True):
-            # Exactly nothing is a stage that is ideal already.
+            # A stage without any effect is already ideal.
             text = "0" if value == 0 else fixed(value, 1)
-            # Beyond whatever of bar and whisker reaches furthest.
+            # Beyond the end of bar and whisker.
             end = max(value + spread, 0), y
             axis.annotate(text, end, (5, 0), textcoords="offset points", va="center", fontsize=7)
     axis.axvline(0, color="#222222", linewidth=0.8)
     axis.set_yticks(np.arange(len(names)), names)
     axis.invert_yaxis()
     axis.margins(x=0.08)
-    axis.set_xlabel("share of the variance that a line on NDVI does not explain [%]", fontsize=9)
+    axis.set_xlabel("share of the variance not explained by a line on NDVI [%]", fontsize=9)
     axis.tick_params(labelsize=8.5)
     axis.tick_params(axis="y", length=0)
     axis.spines[["top", "right", "left"]].set_visible(False)
-    # Above the bars, wherever the long ones are.
+    # Above the axes, clear of long bars.
     figure.legend(frameon=False, fontsize=8.5, loc="outside upper center", ncols=2)
     return figure
 
 
 def _shown(table):
-    """Stages with their ideals; stages of the ground only where it has them."""
+    """Stages with their ideal states; stages of the ground only if it has them."""
     shares = table.groupby("stage")["share"].apply(lambda values: values.any())
     return {stage: ideal for stage, ideal in STAGES.items() if stage not in IDEAL_PROPERTIES or shares[stage]}
 
 
 def mechanisms(budget):
-    """Shares of the mechanisms of the discussion of the paper. [1]"""
+    """Shares of the mechanisms discussed in the paper. [1]"""
     rows = []
     for name, parts in MECHANISMS.items():
         row = {"name": name, "parts": " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))}

@@ -24,14 +24,14 @@ from fifesim.scenario.ground import ground_scene
 from fifesim.scenario.scenario import Scenario, grid_keys
 from fifesim.sensor.description.instruments import instrument
 
-# Rows of the table beside the stages: what is left when all of them are ideal, and all together.
+# Further rows of the table: the remainder with all stages ideal, and the total.
 CURVATURE, TOTAL = "curvature", "total"
-# What the ground itself brings, in the shares of several stages.
+# Contribution of the ground, which is part of the shares of several stages.
 VARIATION = "sub-pixel variation"
 
-# With fewer pixels along an edge a line through them says little.
+# With fewer pixels along an edge, a regression is too uncertain.
 _FEWEST = 10
-# Share of a window of a LAI map that must have data.
+# Minimum fraction of a window of a LAI map with data.
 _FILLED = 0.5
 
 
@@ -44,40 +44,39 @@ def budget(
     each: Callable[[Sequence[Any]], Iterable[Any]] | None = None,
 ) -> xr.Dataset:
     r"""
-    Shares of the stages of a scenario in the scatter of LAI and FPAR about their lines on NDVI.
+    Attribute the scatter of LAI and FPAR about their regression lines on NDVI to the stages of a scenario.
 
-    Scatter is :math:`v = 1 - R^2`, the share of the variance of the truth that a line on NDVI does not explain. It is
-    found for every set of stages at work while the others are ideal, from the same random numbers. A stage's share is
-    its Shapley value, the mean of what it adds over all orders; shares and the curvature add up to the scatter. It is
-    negative where the stage makes the relation straighter.
+    Scatter is :math:`v = 1 - R^2`, the variance of the truth not explained by a line on NDVI. It is computed for each
+    subset of stages, with the other stages ideal, from the same random numbers. The share of a stage is its Shapley
+    value: its contribution averaged over all orders of adding the stages. Shares and curvature sum to the scatter. A
+    share is negative if the stage makes the relation more linear.
 
     Parameters
     ----------
     scenario : fifesim.scenario.scenario.Scenario, optional
-        By default the paper's case, with pixels at the interval of Table 1.
+        By default the case of the paper, with pixels at the interval of Table 1.
     realisations : int, optional
-        Each lies in another window of the scenario's grid as far as there are, and has seeds of its own; a LAI map has
-        as many as windows.
+        Number of realisations. Each has its own seeds and, if possible, its own window of the grid. For a LAI map, the
+        number of windows is the maximum.
     cells : int, optional
-        Along the edge of a window; the whole grid where that is smaller.
+        Cells along the edge of a window; the whole grid if it is smaller.
     seed : int, optional
-        Of the first random field; the others follow, and so do those of the noise. By default the scenario's.
+        Seed of the first random field; the others count up, as do the seeds of the noise. By default from the scenario.
     each : callable, optional
-        Wraps the sequence of realisations, to show how far it is; by default a bar on a terminal or in a notebook.
+        Wrapper of the sequence of realisations to show progress; by default a bar on a terminal or in a notebook.
 
     Returns
     -------
     budget : xarray.Dataset
-        Over (realisation, variable, stage): ``share``, which adds up; ``alone``, by how much the scatter falls where
-        the stage alone becomes ideal; ``first``, the scatter where it alone is at work, less curvature. Over
-        (realisation, variable): ``total``; ``curvature``, what is left where all stages are ideal: the curve of the
-        truth against NDVI beside a line; ``variation``, by how much the total falls over ground that is uniform within
-        each pixel. [1]
+        Over (realisation, variable, stage): ``share``, which sums to the total; ``alone``, the decrease of the scatter
+        if only this stage is ideal; ``first``, the scatter with only this stage active, minus curvature. Over
+        (realisation, variable): ``total``; ``curvature``, the scatter with all stages ideal, because the relation with
+        NDVI is curved; ``variation``, the decrease of the total if the ground is uniform within each pixel. [1]
 
     Raises
     ------
     ValueError
-        If a number is not allowed, the bands have no red or near infrared, or a window holds fewer than 10 pixels
+        If a number is out of range, the red or near infrared band is missing, or a window has fewer than 10 pixels
         along an edge.
 
     References
@@ -98,7 +97,7 @@ def budget(
     """
     scenario = budget_scenario() if scenario is None else scenario
     if not isinstance(scenario, Scenario):
-        raise TypeError(f"budget takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+        raise TypeError(f"budget needs a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     _check_map(scenario)
     cases = budget_cases(scenario, realisations=realisations, cells=cells, seed=seed)
     found = [_one(case) for case in (_shown if each is None else each)(cases)]
@@ -110,7 +109,7 @@ def budget(
 
 
 def _check_map(scenario):
-    """Raise ValueError for a map of coarse pixels, which is smooth below the scale of the budget."""
+    """Raise ValueError for a map of coarse pixels, which is smooth at the scale of the budget."""
     if not scenario.ground.lai_file:
         return
     cell = scenario.grid.cell
@@ -119,8 +118,8 @@ def _check_map(scenario):
     if source.crs and source.crs.is_projected and size > 1.5 * cell:
         warn(
             f"{Path(scenario.ground.lai_file).name} has pixels of {size:.3g} m, and cells of {cell:.3g} m "
-            "are interpolated between them: nothing varies below its pixels, so that non-linearity and NDVI scaling "
-            "come out as nothing. fifesim.downscale makes a map of cells that vary"
+            "are interpolated between them: nothing varies within its pixels, so that non-linearity and NDVI scaling "
+            "would be 0. Use fifesim.downscale to make a map with variation"
         )
 
 
@@ -139,7 +138,7 @@ def budget_cases(scenario, *, realisations, cells, seed=None):
     first = land.seed if seed is None else seed
     check_seed(first)
     if land.lai_file:
-        # A map has no seed: another realisation is another place.
+        # A map has no seed; realisations differ in position.
         realisations = min(realisations, len(windows))
     places = np.linspace(0, len(windows) - 1, min(realisations, len(windows))).round().astype(int)
     found = []
@@ -184,7 +183,7 @@ def unexplained(truth, ndvi):
     of_truth, of_ndvi = (truth**2).sum(axis=-1), (ndvi**2).sum(axis=-1)
     if not np.all(of_truth > 0):
         raise ValueError("LAI or FPAR does not vary over the pixels: there is no scatter to share")
-    # Of NDVI that is one number, as counts of six bits may be, a line explains nothing.
+    # Constant NDVI, which is possible with 6 bits, explains no variance.
     explained = (truth * ndvi).sum(axis=-1) ** 2 / np.where(of_ndvi > 0, of_truth * of_ndvi, np.inf)
     return 1 - explained
 
@@ -204,7 +203,7 @@ def _one(scenario):
         uniform = unexplained(seen.homogeneous_truth[variable], seen.homogeneous_ndvi)
         one = {"total": total, "curvature": curvature, "variation": total - uniform}
         for name, attribute in (("share", shapley), ("alone", taken_away), ("first", by_itself)):
-            # A stage that is ideal already changes nothing.
+            # A stage that is already ideal has no effect.
             one[name] = np.zeros(len(STAGES))
             one[name][place] = attribute(values, count)
         for name, value in one.items():
@@ -220,7 +219,7 @@ def _windows(scenario, cells):
     held = tuple(int(count * cell / pixel + 1e-6) for count, cell in zip(size, grids.cell_size(box), strict=True))
     if min(held) < _FEWEST:
         raise ValueError(
-            f"a scene of {size[0]} x {size[1]} cells holds {held[0]} x {held[1]} pixels of {pixel:g} m, and a budget "
+            f"a scene of {size[0]} x {size[1]} cells holds {held[0]} x {held[1]} pixels of {pixel:g} m, but a budget "
             f"needs {_FEWEST} x {_FEWEST}: take more cells, a larger grid, or a larger grid.cell"
         )
     height, width = size
@@ -231,15 +230,15 @@ def _windows(scenario, cells):
     ]
     if not scenario.ground.lai_file:
         return found
-    # A map may be empty in its corners.
+    # A map may have no data in its corners.
     filled = [window for window in found if float(ground_scene(scenario, window)["lai"].notnull().mean()) > _FILLED]
     if not filled:
         raise ValueError(f"no scene of {size[0]} x {size[1]} cells of the LAI map holds enough data: take fewer cells")
     return filled
 
 
-_PIXELS = 12  # along a window of a coarse instrument, at least
-_CELLS = 333  # along a window of any
+_PIXELS = 12  # minimum along a window, for coarse instruments
+_CELLS = 333  # minimum along a window
 
 
 def instrument_scenario(name, *, arp=0.15):

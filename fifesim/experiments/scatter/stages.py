@@ -62,11 +62,11 @@ def _places(cells, blocks):
 
 # In this order along the axes of what `stages.pixels` gives.
 IDEAL_PROPERTIES = {
-    "soil": "as bright and as moist everywhere",
-    "dead leaves": "the same share of dead leaves everywhere",
-    "cover": "leaves and what lies below them are those of the first class",
-    "clumping": "leaves stand evenly, without gaps between crowns",
-    "covariance": "leaf area goes with nothing else",
+    "soil": "uniform brightness and moisture",
+    "dead leaves": "uniform fraction of dead leaves",
+    "cover": "leaves and background of the first class everywhere",
+    "clumping": "evenly distributed leaves, without gaps between crowns",
+    "covariance": "leaf area is not correlated with other properties",
 }
 
 
@@ -91,7 +91,7 @@ def ground_with(scenario, grid, at_work, dem=None):
         ideal["covary"] = {}
     land = ground_scene(scenario.model_copy(update={"landscape": own.model_copy(update=ideal)}), grid, dem=dem)
     for name, known in DRAWN.items():
-        # Without clumping there are no gaps between crowns; what else is not at work has its mean.
+        # Without clumping there are no gaps between crowns; other ideal properties have their means.
         if known.effect == "clumping" and known.effect in varying_ground(scenario) and known.effect not in at_work:
             land = land.assign({name: known.default})
         elif known.effect not in at_work and name in land:
@@ -113,7 +113,7 @@ def images_of(scene, cells, switches):
         for (k, counts), (m, grains) in product(enumerate(quantisation), enumerate(noise)):
             recorded = _recorded(scene, means[:2], counts, grains)
             for n, of_reflectance in enumerate(scaling):
-                # What the detector did stays as it is.
+                # Effects of the detector remain.
                 found[n, i, j, k, m] = recorded if of_reflectance else of_cells + (recorded - of_means)
     return found
 
@@ -145,16 +145,16 @@ def _recorded(scene, means, counts, grains):
 
 # In this order along the axes of what `pixels` gives.
 STAGES = {
-    "non-linearity": "reflectance and FPAR of a cell go with its LAI along the tangent at the mean LAI of its pixel",
+    "non-linearity": "reflectance and FPAR are linear in LAI, along the tangent at the mean LAI of the pixel",
     "NDVI scaling": "mean of the NDVI of the cells instead of the NDVI of their mean reflectance",
-    "point spread": "all cells of a pixel count the same",
-    "registration": "pixels lie on the blocks of the truth",
+    "point spread": "all cells of a pixel have equal weight",
+    "registration": "pixels coincide with the blocks of the truth",
     "quantisation": "radiance instead of digital numbers",
     "noise": "none",
     "topography": "level ground",
     "atmosphere": "reflectance at the ground",
 } | IDEAL_PROPERTIES
-# What of the ground changes its leaf area, or the light that that absorbs, in their order.
+# Ground properties that affect leaf area or absorbed light, in order.
 _TRUE = ("cover", "clumping", "covariance")
 _SENSED = ("NDVI scaling", "point spread", "registration", "quantisation", "noise")
 VARIABLES = ("lai", "fpar")
@@ -170,13 +170,13 @@ class Pixels:
     Parameters
     ----------
     stages : tuple of str
-        Those that are not ideal already, in the order of `STAGES`.
+        Stages that are not already ideal, in the order of `STAGES`.
     ndvi : array, shape (2,) * len(stages) + (n,)
-        Index 1 where the stage is at work, 0 where it is ideal. [1]
+        Index 1 if the stage is active, 0 if it is ideal. [1]
     truth : dict of str to array, shape as ``ndvi`` or 1 along its axes
         True LAI and FPAR.
     homogeneous_ndvi : array, shape (n,)
-        With all stages, over ground that is uniform within each pixel.
+        NDVI with all stages active, for ground that is uniform within each pixel. [1]
     homogeneous_truth : dict of str to array, shape (n,)
     """
 
@@ -213,7 +213,7 @@ def displaced_pixels(scenario, offsets):
     stages = [working_stages(scenario.model_copy(update={"sensor": sensor})) for sensor in sensors]
     scene = _scene(scenario)
     scenes = [replace(scene, setup=replace(scene.setup, offset=tuple(offset))) for offset in offsets]
-    # False is ideal, True at work.
+    # False is ideal, True is active.
     switches = [{name: (False, True) if name in each else (False,) for name in STAGES} for each in stages]
     lit, images = [name for name in STAGES if name not in _SENSED], [[] for _ in scenes]
     for states in product(*(switches[0][name] for name in lit)):
@@ -244,7 +244,7 @@ class _Ground:
     land: xr.Dataset
     middle: np.ndarray
     known: dict = field(default_factory=dict)
-    """Reflectance by the stages of the ground that are at work."""
+    """Reflectance by active stages of the ground."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,7 +254,7 @@ class _Scene:
     scenario: Scenario
     setup: Setup
     driver: Driver
-    """Of the red and the near infrared band, on level ground."""
+    """Driver of the red and the near infrared band, on level ground."""
     grid: GeoBox
     blocks: GeoBox
     image: GeoBox
@@ -262,7 +262,7 @@ class _Scene:
 
     @property
     def shape(self):
-        """Rows and columns that the image and the blocks of the truth share."""
+        """Common rows and columns of the image and the blocks of the truth."""
         return tuple(min(pair) for pair in zip(self.blocks.shape, self.image.shape, strict=True))
 
     def ground(self, at_work):
@@ -295,7 +295,7 @@ def _scene(scenario):
     bands = _red_and_nir(setup.instrument.select(setup.bands))
     blocks = grids.aligned_grid(grid, scenario.sensor.size)
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
-    # In memory: every set of stages with topography asks for them.
+    # In memory, because every set of stages with topography needs them.
     dem, horizon = in_memory(*elevation(scenario, grid)[:2])
     driver = Driver(replace(setup, bands=tuple(band.name for band in bands)))
     return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), driver, grid, blocks, image)
@@ -395,7 +395,9 @@ def _with_data(stages, images, truth, even, even_truth):
     rasters = (images, truth, even, np.array(even_truth))
     found = np.logical_and.reduce([np.isfinite(each).reshape(-1, *even.shape).all(axis=0) for each in rasters])
     if found.sum() < 3:
-        raise ValueError(f"{found.sum()} pixels have data in every image, and a line needs 3: simulate a larger scene")
+        raise ValueError(
+            f"{found.sum()} pixels have data in every image, a regression needs 3: simulate a larger scene"
+        )
     # Stages that are ideal already have an axis of one.
     kept = [axis for axis, stage in enumerate(STAGES) if stage in stages]
     ndvi = images[..., found].reshape(*(images.shape[axis] for axis in kept), -1)

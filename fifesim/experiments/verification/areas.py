@@ -33,13 +33,13 @@ def verify() -> list[Deviation]:
     Returns
     -------
     deviations : list of Deviation
-        Of each check its ``area``, ``what`` was compared, the largest ``deviation`` with its ``bound`` and ``unit``,
-        the ``source`` of the independent result, and whether it lies ``within`` the bound.
+        For each check, the ``area``, ``what`` was compared, the largest ``deviation`` with its ``bound`` and ``unit``,
+        the ``source`` of the independent result, and whether the deviation is ``within`` the bound.
 
     Notes
     -----
-    The results are limits that theory knows, quadratures, and tables by other codes in ``data/verification``. Half a
-    minute at most; ``fifesim verify`` prints the same, stage by stage.
+    References are theoretical limits, quadratures, and tables from other codes in ``data/verification``. The checks
+    take up to half a minute. ``fifesim verify`` prints them by stage.
 
     References
     ----------

@@ -31,7 +31,7 @@ _VISIBLE = ("TM1", "TM2", "TM3", "TM4")
 _BANDS = (*_VISIBLE, "TM5", "TM7")
 _CASE = ["profile", "aerosol", "visibility", "altitude", "sza", "vza", "raa"]
 
-# What closed forms reach: blue lacks polarization, and what molecules and aerosol scatter together.
+# Accuracy of the closed forms, which lack polarization and joint scattering by molecules and aerosol (in the blue).
 _FIFE_BOUNDS = (0.007, 0.004, 0.0025, 0.002, 0.001, 0.001)
 _CLEAR_BOUNDS = (1.8, 1.2, 0.9, 0.8, 0.6, 0.5)
 _ALL_BOUND = 3.2
@@ -181,12 +181,12 @@ def _varying():
         found = varying_reflectance(cells, *places, atmosphere=air, bands=bands).T
         back = varying_reflectance(found, *places, atmosphere=air, bands=bands, to_surface=True).T
         worst = largest(found, [_one_cell(air, bands, *cell) for cell in zip(cells, *places, strict=True)])
-        yield _deviation(what, worst, bound, "1", source="each cell's own terms")
+        yield _deviation(what, worst, bound, "1", source="terms of each cell")
         yield _deviation(f"{what}, there and back", largest(back, cells), 1e-12, "1", source="theory")
     suns = np.array([3.3, 28.7, 51.1, 74.0])
     expected = [band_terms(air, bands, sun, 0.0, 0.0).diffuse_fraction for sun in suns]
     worst = largest(varying_diffuse_fraction(suns, atmosphere=air, bands=bands).T, expected)
-    yield _deviation("share of skylight by cell", worst, 1e-4, "1", source="each cell's own terms")
+    yield _deviation("share of skylight by cell", worst, 1e-4, "1", source="terms of each cell")
 
 
 def _one_cell(air, bands, reflectance, altitude, sza, saa, vza, vaa):

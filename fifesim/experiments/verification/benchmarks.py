@@ -82,11 +82,11 @@ def flat_discs(radius, lai, vza, *, sza=30.0, depths=4001):
     Parameters
     ----------
     radius : float
-        Over the height of the canopy, :math:`r`. [1]
+        Disc radius relative to the canopy height, :math:`r`. [1]
     lai : float
         :math:`L`. [m2 m-2]
     vza : array, shape (views,)
-        In the plane of the sun, positive on its side. [degree]
+        View zenith angle in the principal plane, positive toward the sun. [degree]
     sza : float, optional
         [degree]
     depths : int, optional
@@ -95,7 +95,7 @@ def flat_discs(radius, lai, vza, *, sza=30.0, depths=4001):
     Returns
     -------
     share : array, shape (views,)
-        Share of the light that a leaf reflects. [1]
+        Single-scattering reflectance relative to the leaf reflectance. [1]
 
     Notes
     -----
@@ -191,7 +191,7 @@ def _molecules():
     what, source = "I, Q and U of molecules", "Natraj et al. (2009)"
     yield _deviation(f"{what}, many layers", largest(converged, expected), 1e-7, "1", source)
     worst = 100 * largest((found - expected) / expected[0], 0.0)
-    yield _deviation(f"{what}, as they come", worst, 0.01, "%", source)
+    yield _deviation(f"{what}, default layers", worst, 0.01, "%", source)
 
 
 def _rami():
@@ -216,7 +216,7 @@ def _canopy():
     parts = (
         ("away from the sun, 35 to 75 degrees", vza < -30, 5.0),
         ("from -30 to 60 degrees", (vza >= -30) & (vza <= 60) & ~beside, 3.0),
-        ("beside the hot spot", beside, 5.0),
+        ("near the hot spot", beside, 5.0),
         ("toward the sun, 65 to 75 degrees", vza > 60, 3.0),
     )
     for what, rows, bound in parts:
@@ -232,7 +232,7 @@ def _flat_discs():
         once = sail(lai, 1e-6, 0.0, **angles, leaf_angles="0: 1", hotspot=radius).rso / 1e-6
         percent.append(100 * (once / flat_discs(radius, lai, vza) - 1))
     beside = _beside_the_hot_spot(vza)
-    for what, rows, bound in (("flat discs", ~beside, 3.0), ("flat discs, beside the hot spot", beside, 5.0)):
+    for what, rows, bound in (("flat discs", ~beside, 3.0), ("flat discs, near the hot spot", beside, 5.0)):
         worst = largest(np.array(percent)[:, rows], 0)
         yield Deviation("canopy", what, worst, bound, "%", "overlap of circles, quadrature")
 

@@ -41,7 +41,7 @@ def integral(function, kinks):
 
 HEADING = f"{'':13}{'compared':<48}{'largest':>10}{'bound':>10} {'unit':<8}with"
 
-# The stages of Figure 1 that the areas are of, in the order of the way of a pixel.
+# Stage of Figure 1 of each area, in processing order.
 AREA_STAGES = dict.fromkeys(("random field", "canopy", "terrain"), "Ground")
 AREA_STAGES |= {"atmosphere": "Atmosphere", "sensor": "Sensor", "analysis": "Analysis"}
 

@@ -1,4 +1,4 @@
-"""Description of a canopy: its leaves, their arrangement, and the ground below them."""
+"""Description of a canopy: leaves, structure and background."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -50,16 +50,16 @@ NumberByCell: TypeAlias = Annotated[
 ]
 
 
-# Below it the hot spot is narrower than the sun. [1]
+# A smaller hot spot is narrower than the solar disc. [1]
 LEAST_HOTSPOT = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Canopy:
     """
-    A canopy: its leaves, their arrangement, and the ground below them.
+    A canopy: leaves, structure and background.
 
-    A field that is not given has its default; in a class of cover it has the value of the scene.
+    Missing fields have their defaults; in a land cover class they have the values of the scene.
 
     Parameters
     ----------
@@ -72,16 +72,16 @@ class Canopy:
         A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions; by
         default ``"spherical"``.
     hotspot : float, optional
-        Leaf size over canopy height, in [0, 10]; 0, the default, is no hot spot. [1]
+        Leaf size over canopy height, in [0, 10]; the default 0 means no hot spot. [1]
     brown : float or xarray.DataArray, dims (y, x), optional
-        Dead share of the leaf area, in [0, 1]; by default 0. [1]
+        Dead fraction of the leaf area, in [0, 1]; by default 0. [1]
     dissociation : float or xarray.DataArray, dims (y, x), optional
         Position of dead leaves: 0 among the green ones (default), 1 below them. If it is a raster, SAIL is evaluated at
         every cell. [1]
     brown_leaf : optional
         Optics of dead leaves, like ``leaf_optics``; by default dead tallgrass.
     crown_cover : float or xarray.DataArray, dims (y, x), optional
-        Share of the ground below crowns, which hold all leaves; 0 is bare ground, 1 (default) has no gaps. [1]
+        Ground fraction covered by crowns, which contain all leaves; 0 is bare ground, 1 (default) has no gaps. [1]
     crown_shape : float, optional
         Crown diameter over the height of its middle, in [0, 10]; by default 1. [1]
     background : optional
@@ -106,7 +106,7 @@ class Canopy:
     ValueError
         If a number is out of its range, or the leaf angles are unknown.
     TypeError
-        If a value is of another kind.
+        If a value has the wrong type.
 
     Examples
     --------
@@ -153,12 +153,12 @@ class Canopy:
 
     def replace(self, **changes: Any) -> Self:
         """
-        Canopy with other values of some fields; other fields that were not given stay so.
+        Canopy with new values of some fields. Other missing fields remain missing.
 
         Parameters
         ----------
         **changes
-            New values by name; None for a field that is no longer given.
+            New values by name; None removes a field.
 
         Returns
         -------
@@ -168,7 +168,7 @@ class Canopy:
 
     def over(self, other: "Canopy") -> "Canopy":
         """
-        This canopy, with the fields that were not given taken from another one.
+        This canopy, with missing fields taken from another canopy.
 
         Parameters
         ----------
@@ -182,7 +182,7 @@ class Canopy:
 
     def check_lai(self, largest: float) -> None:
         """
-        Check that the crowns can hold the leaves of the ground.
+        Check that the leaf area within crowns is allowed.
 
         Parameters
         ----------
@@ -192,7 +192,7 @@ class Canopy:
         Raises
         ------
         ValueError
-            If the leaf area index within the crowns would exceed the largest that SAIL is evaluated for.
+            If the leaf area index within the crowns exceeds the limit of SAIL.
         """
         if is_raster(self.crown_cover):
             return

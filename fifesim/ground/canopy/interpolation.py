@@ -102,7 +102,7 @@ def value_at(table, interval, column, share):
     return c[0] + share * (c[1] + share * (c[2] + share * c[3]))
 
 
-# No divisor is 0: without that being asked, cells are done several at once.
+# No divisor is 0; without this check the loop is vectorized.
 @njit(nogil=True, cache=True, error_model="numpy")
 def _interpolate(lai, table, values):
     interval, share = np.empty(RUN, np.int64), np.empty(RUN)
@@ -284,8 +284,8 @@ def _place(position, nodes):
     return interval, position - interval
 
 
-# The three below are loops without branches, so that cells are done several at once. What is wrong is counted beside
-# divisions, which take as long without.
+# The next three are loops without branches, which are vectorized. Invalid values are counted separately, divisions,
+# which take as long without.
 @register_jitable
 def _places(table, lai, brown, starts, leaves, dead):
     """Fill in first coefficients of cells, -1 outside of the table, and places; count the invalid cells."""
@@ -361,7 +361,7 @@ def _single(weights):
     return np.float32(w0), np.float32(w1), np.float32(w2), np.float32(w3)
 
 
-# No divisor is 0: without that being asked, cells are done several at once.
+# No divisor is 0; without this check the loop is vectorized.
 @njit(nogil=True, cache=True, error_model="numpy")
 def _foliage(lai, brown, background, table, values):
     columns = table.coefficients.shape[2]

@@ -30,7 +30,7 @@ from fifesim.ground.canopy.reflectance_table import (
 )
 
 CELL_SHARES = ("brown", "dissociation", "crown_cover")
-"""Properties that SAIL takes by cell."""
+"""Properties that may vary by cell in SAIL."""
 
 
 class BandCanopy(NamedTuple):
@@ -298,9 +298,9 @@ def checked_scene(lai):
     if lai.chunks is None and lai.size:
         if not np.isfinite(lai.values).any():
             raise ValueError(
-                "all cells of the leaf area index are NaN: look at the nodata value and the place of its map"
+                "all cells of the leaf area index are NaN: check the nodata value and the extent of the map"
             )
-        # Scenes and maps of fifesim carry their distribution, and were looked at when they were made.
+        # Scenes and maps made by fifesim have this attribute and were checked when they were made.
         if "lai_distribution" not in lai.attrs:
             warn_of_large(lai.values)
     return lai

@@ -183,7 +183,7 @@ def added(top, bottom):
     back_and_forth = 1 / (1 - top.rdd_below * bottom.rdd)
     up = (top.tss * bottom.rsd + top.tsd * bottom.rdd) * back_and_forth
     down = top.tsd + top.rdd_below * up
-    # Diffuse light that the observer gets of what comes up between the layers, and of what goes down there.
+    # Diffuse light toward the observer from the upward and downward fluxes between the layers.
     seen_up = (top.tdo + top.rdd_below * bottom.rdo * top.too) * back_and_forth
     sky_up = top.tdd * bottom.rdd * back_and_forth
     sky_down = top.tdd * back_and_forth

@@ -19,7 +19,7 @@ def within(values, lowest, highest):
 @njit(nogil=True, cache=True)
 def outside(values, lowest, highest):
     """Number of values outside a range; NaN is ignored."""
-    # A sum without branches, so that several values are compared at once.
+    # A sum without branches is vectorized.
     count = 0
     for i in range(values.size):
         count += (values[i] < lowest) | (values[i] > highest)
@@ -52,10 +52,10 @@ def check_share(name, values):
 
 
 LARGEST_LAI = 100.0
-"""Largest leaf area index that is taken for one [m2 m-2]; the densest canopies have about 20."""
+"""Largest accepted leaf area index [m2 m-2]; the densest canopies have about 20."""
 
 LARGEST_OF_MAPS = 20.0
-"""Of measured canopies, and a little more: a map beyond is in another scale [m2 m-2]."""
+"""Largest accepted leaf area index of maps, just above measured canopies; larger values indicate scaling [m2 m-2]."""
 
 LARGEST_MEAN = 8.0
 """Mean leaf area index of the densest scenes; a larger mean is a warning [m2 m-2]."""

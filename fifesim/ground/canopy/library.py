@@ -13,7 +13,7 @@ from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_back
 LEAVES = 600
 SPECTRA = 8
 
-# Every so many of PROSPECT's wavelengths, which are 1 nm apart: band means differ by 1e-4 at most.
+# Step through PROSPECT's wavelengths (1 nm); band means change by at most 1e-4.
 _STRIDE = 5
 
 # Uniform ranges of leaves: wide, and fitted to nothing. Units as in `Leaf`.

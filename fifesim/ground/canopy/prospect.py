@@ -23,12 +23,12 @@ CONTENTS = {
     "water": ("cm", 0.2),
     "dry_matter": ("g cm-2", 0.1),
 }
-"""What absorbs in a leaf: its unit and the largest content that is taken for one."""
+"""Absorbing constituents of a leaf: unit and largest plausible content."""
 
 LARGEST_STRUCTURE = 10.0
 """Most layers of a leaf [1]; measured leaves have 1 to 3.5."""
 
-# Light from outside comes within a cone about the normal of the rough surface. [degree]
+# Half opening of the cone of incident light around the normal of the rough surface. [degree]
 _INCIDENCE = 40.0
 
 # Fresnel's equations are analytic in the cosine: 32 nodes integrate them to rounding.
@@ -38,7 +38,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 @dataclass(frozen=True)
 class Leaf:
     """
-    A leaf, by what it is made of; the defaults are the green tallgrass of ``data/README.md``.
+    A leaf described by its contents. The defaults are the green tallgrass of ``data/README.md``.
 
     Parameters
     ----------
@@ -56,9 +56,9 @@ class Leaf:
     Raises
     ------
     ValueError
-        If a number is outside the range of leaves; of a raster when it is used.
+        If a number is outside the range of leaves. A raster is checked when it is used.
     TypeError
-        If it is no number.
+        If a value is not a number.
 
     References
     ----------
@@ -88,7 +88,7 @@ class Leaf:
             value = getattr(self, name)
             if not hasattr(value, "ndim") or not value.ndim:
                 value = _number(name, value)
-            # Lazy arrays are looked at when they compute.
+            # Lazy arrays are checked when they are computed.
             if isinstance(value, float | np.ndarray):
                 outside = np.atleast_1d(value)[np.atleast_1d((value < low) | (value > high))]
                 if outside.size or (isinstance(value, float) and np.isnan(value)):
@@ -102,7 +102,7 @@ class Leaf:
         return [getattr(self, name) for name in ("structure", *CONTENTS)]
 
     def varying(self) -> dict[str, Array]:
-        """What differs from leaf to leaf, a dict of str to array."""
+        """Contents that vary between leaves, a dict of str to array."""
         values = {name: getattr(self, name) for name in ("structure", *CONTENTS)}
         return {name: value for name, value in values.items() if not isinstance(value, float)}
 
@@ -419,7 +419,7 @@ def _pile(r, t, layers):
     d = np.sqrt(square) if square.real > 0 else 0 * square
     a = (1 + r * r - t * t + d) / (2 * r)
     if (a * a - 1).real < 1e-7:
-        # Without absorption the limit is that of a random walk.
+        # Without absorption, the limit is a random walk.
         passed = t / (t + (1 - t) * layers) if t.real > 0 else t
         return 1 - passed, passed
     # The inverse of Stokes' b: it is 0, not infinite, where a layer is opaque.

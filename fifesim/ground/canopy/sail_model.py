@@ -544,7 +544,7 @@ def leaf_angle_sums(sza, vza, raa, leaf_angles):
     reflected, transmitted = volume_scattering(inclination, sun, view, azimuth)
     terms = leaf_projection(inclination, sun) / mu_s, leaf_projection(inclination, view) / mu_v
     terms += np.pi * (reflected / (mu_s * mu_v)), np.pi * (transmitted / (mu_s * mu_v))
-    # The last bits of these sums, unlike those of a matrix product, do not depend on the number of cells.
+    # Rounding of these sums, unlike a matrix product, does not depend on the number of cells.
     sums = (np.sum(term * fraction, axis=-1) for term in terms)
     ks, ko, *scattered = (each[kind].reshape(shape) if shape else each[0] for each in sums)
     return LeafAngleSums(ks, ko, bf, *scattered)

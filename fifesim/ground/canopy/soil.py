@@ -1,4 +1,4 @@
-"""Soil below a canopy: its brightness along the soil line, and its darkening by water."""
+"""Soil below a canopy: brightness along the soil line, and darkening by water."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from fifesim.ground.canopy.leaf_area import outside, read_only, within
 from fifesim.ground.canopy.prospect import interface_transmissivity
 from fifesim.ground.canopy.spectra import band_means
 
-# Where the reflectance of a soil is its brightness: in the midst of visible light, as for aerosol and visibility. [um]
+# Reference wavelength of the soil brightness, in the middle of visible light as for aerosol and visibility. [um]
 GREEN_WAVELENGTH = 0.55
 
 # Cells that are done together, so that they stay in the nearest cache.
@@ -121,9 +121,8 @@ def check_range(bands, wavelength):
             )
 
 
-# Of the brightness-shape-moisture model, Yang et al. (2020): the water of the driest and of the wettest soil that it is
-# for, and what a soil holds in its first film, in percent of the volume; the thickness of a film [cm]; and the index of
-# refraction of what soils are made of.
+# Constants of the brightness-shape-moisture model, Yang et al. (2020): water content of the driest and the wettest
+# valid soil and of the first film [% of volume]; thickness of a film [cm]; refractive index of soil grains.
 DRIEST, WETTEST = 5.0, 55.0
 CAPACITY = 25.0
 FILM = 0.015
@@ -135,7 +134,7 @@ _CONE = 40.0
 # Films on average of a soil that is saturated.
 _PER_MOISTURE = (WETTEST - DRIEST) / CAPACITY
 
-# Deeper than so many films is less than 2 % of the wettest soil, which counts as so many.
+# Less than 2 % of the wettest soil has more films; this part is treated as having this number.
 _FILMS = 6
 
 # Cells that are done together, so that they stay in the nearest cache, and in the next.
@@ -148,7 +147,7 @@ class WaterFilms(NamedTuple):
     surface: np.ndarray
     """Reflectance of the upper side of the water for light from the air, shape (band,). [1]"""
     inside: np.ndarray
-    """The same of its lower side, for diffuse light from below, shape (band,). [1]"""
+    """Reflectance of the lower side for diffuse light from below, shape (band,). [1]"""
     entrance: np.ndarray
     """Light that enters the soil's grains from water over that from air, shape (band,). [1]"""
     passed: np.ndarray
@@ -179,8 +178,7 @@ def below_film(below, passed, inside):
 
 @register_jitable
 def grains_in_water(dry, entrance):
-    r"""
-    Reflectance of a soil whose grains are in water, which refracts light into them less than air does.
+    r"""Reflectance of a soil with grains in water, which refracts light less than air does.
 
     .. math:: r_b = 1 - (1 - r) \, (r e + 1 - r)
 
@@ -261,7 +259,7 @@ def _moisten(dry, moisture, surface, inside, entrance, passed, out):
     return wrong
 
 
-# No divisor is 0: without that being asked, cells are done several at once.
+# No divisor is 0; without this check the loop is vectorized.
 @njit(nogil=True, cache=True, error_model="numpy")
 def _films(dry, moisture, start, bare, surface, inside, entrance, passed, out):
     covered, by_cell, wrong = np.empty((_FILMS, _WATER_RUN)), dry.shape[1] > 1, 0

@@ -119,21 +119,20 @@ def read_spectrum(path, kind=Spectrum):
 SHADE = "shade"
 """Part of a mixture that reflects nothing."""
 
-# Decimal fractions may miss 1 by rounding.
+# Tolerance for the sum of fractions. [1]
 _WHOLE = 1e-6
 
 
 @dataclass(frozen=True)
 class Background:
     """
-    What lies below a canopy, a mixture of spectra.
+    Background of a canopy as a mixture of spectra.
 
     Parameters
     ----------
     fractions : mapping of str to float
-        Share of the ground of each spectrum, by its name in ``data/ground_spectra.csv``, or by the path of a CSV file
-        of your own with columns ``wavelength`` [um] and ``reflectance`` [1]; ``"shade"`` reflects nothing. They add up
-        to 1. [1]
+        Ground fraction of each spectrum, which sum to 1. Keys are names in ``data/ground_spectra.csv``, paths of CSV
+        files with columns ``wavelength`` [um] and ``reflectance`` [1], or ``"shade"``, which reflects nothing. [1]
 
     Raises
     ------
@@ -182,7 +181,7 @@ def check_shares(names, shares):
     wrong = total[np.abs(total - 1) > _WHOLE]
     if wrong.size:
         raise ValueError(
-            f"Background: the fractions must add up to 1, got {wrong[0]:g}: what reflects nothing is {SHADE!r}"
+            f"Background: the fractions must add up to 1, got {wrong[0]:g}: the part without reflection is {SHADE!r}"
         )
 
 

@@ -208,7 +208,7 @@ def arp_for_length(length: float, cell: float = 1.0) -> float:
     Raises
     ------
     ValueError
-        If the length is negative or longer than that of the largest streaming arp.
+        If the length is negative or exceeds the length of the largest streaming arp.
 
     Examples
     --------
@@ -337,7 +337,7 @@ def _fill(seed, row, first, out):
                 out[i, 4 * g + k] = normals[k, g]
 
 
-# No divisor is 0: without that being asked, cells are done several at once.
+# No divisor is 0; without this check the loop is vectorized.
 @njit(nogil=True, cache=True, error_model="numpy")
 def _box_muller(one, other, cosines, sines):
     """Two normal deviates from two 32-bit words."""
@@ -478,7 +478,7 @@ def periodic_field(seed, arp, shape):
     return _filter(generator(seed, _PERIODIC).standard_normal(shape), _half_response(arp, tuple(shape), float))
 
 
-# In single precision cells lie within 2e-6 standard deviations of what double precision makes of the same noise, 3e-7
+# In single precision, cells are within 2e-6 standard deviations of the double-precision result for the same noise, 3e-7
 # rms, and reflectances within 6e-8: a tile of four seeds, for each of the paper's three distributions and arp from 0.05
 # to 0.2498.
 def _filtered_tile(size, weights, arp, tile_row, tile_column):

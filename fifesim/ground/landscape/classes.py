@@ -1,4 +1,4 @@
-"""Classes of cover with their properties, as objects and as text in files."""
+"""Land cover classes with their properties, as objects and as text in files."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SHARES = tuple(name for name, known in DRAWN.items() if (known.lowest, known.hig
 @dataclass(frozen=True)
 class Field:
     """
-    A property of a landscape that varies in a field.
+    A ground property that varies as a random field.
 
     Parameters
     ----------
@@ -40,15 +40,15 @@ class Field:
     arp : float, optional
         Autoregressive parameter of the field, in [0, 0.2498]. [1]
     coarser : int, optional
-        Ground cells along a side of a cell of the field's own lattice, which `arp` counts in: with 4 a field varies
-        over 27 m and more on ground cells of 3.3 m, and takes a tenth of the time. By default it has the ground's.
+        Ground cells per lattice cell along each side. `arp` refers to lattice cells. With 4 and ground cells of 3.3 m,
+        the field varies over 27 m or more, and takes a tenth of the time. By default the lattice is the ground grid.
 
     Raises
     ------
     ValueError
-        If a number is out of its range.
+        If a number is out of range.
     TypeError
-        If one is no number.
+        If a value is not a number.
 
     Examples
     --------
@@ -78,12 +78,12 @@ class Field:
 
     def distribution(self, name: str) -> FrozenDistribution:
         """
-        Distribution of a share: the beta distribution of its mean and standard deviation.
+        Beta distribution of a fraction, from its mean and standard deviation.
 
         Parameters
         ----------
         name : str
-            Of the property, ``"moisture"``, ``"brown"`` or ``"crown_cover"``.
+            Name of the property, ``"moisture"``, ``"brown"`` or ``"crown_cover"``.
 
         Returns
         -------
@@ -93,7 +93,7 @@ class Field:
         Raises
         ------
         ValueError
-            If nothing between 0 and 1 has this mean and standard deviation.
+            If no distribution between 0 and 1 has this mean and standard deviation.
         """
         if not 0 < self.mean < 1:
             raise ValueError(
@@ -109,7 +109,7 @@ class Field:
         return _beta(float(self.mean), float(self.sd))
 
 
-# The same object each time: what is tabulated of a distribution is kept with it.
+# Return the same object each time, because tables are cached by distribution.
 @cached(32, "beta distributions")
 def _beta(mean, sd):
     weight = mean * (1 - mean) / sd**2 - 1
@@ -117,35 +117,33 @@ def _beta(mean, sd):
 
 
 LARGEST_CODE = 2**15 - 1
-"""Of a class in a map: codes are numbers of 16 bits, of which -1 is no data."""
+"""Largest code of a class in a map. Codes are 16-bit integers, with -1 for no data."""
 
 
 @dataclass(frozen=True, eq=False)
 class CoverClass:
     """
-    A class of cover. Fields that are not given have the values of the landscape, or of the call of
-    `surface_reflectance`.
+    A land cover class. Missing fields are taken from the landscape, or from the arguments of `surface_reflectance`.
 
     Parameters
     ----------
     name : str, optional
-        One word; in a mapping of classes it is the key.
+        Name of one word; in a mapping of classes it is the key.
     lai : str, path, frozen scipy distribution or float, optional
-        Distribution of leaf area index as `lai_distribution` takes it, or one number where it is uniform. [m2 m-2]
+        Distribution of leaf area index as in `lai_distribution`, or a number for uniform leaf area. [m2 m-2]
     arp : float, optional
         Autoregressive parameter of leaf area, in [0, 0.2498]. [1]
     canopy : Canopy, optional
-        Leaves, their arrangement and the ground below them, none of them a raster. Fields that are not given have the
-        values of the scene.
+        Leaves, canopy structure and background, without rasters. Missing fields have the values of the scene.
     code : int, optional
-        Of the class in a map, 0 to 32767; by default classes count from 1.
+        Code of the class in a map, 0 to 32767; by default classes are numbered from 1.
 
     Raises
     ------
     ValueError
-        If a number is outside its range, or the name is no single word.
+        If a number is out of range, or the name is not a single word.
     TypeError
-        If a value is of another kind, or varies from cell to cell.
+        If a value has the wrong type, or varies by cell.
 
     Examples
     --------
@@ -188,7 +186,7 @@ class CoverClass:
         for name in self.canopy.given:
             if _has_raster(getattr(self.canopy, name)):
                 raise TypeError(
-                    f"{name} is the same in all of a class, got one that varies: give it to landscape() or "
+                    f"{name} must be uniform within a class, got one that varies: give it to landscape() or "
                     "surface_reflectance, and leave it out of the class"
                 )
 
@@ -219,8 +217,7 @@ def fife_classes() -> dict[str, CoverClass]:
     """
     The three treatments of the FIFE site, as classes 1 to 3.
 
-    They differ in the distribution of their leaf area alone, as in the paper; leaves, soil and litter, and the
-    structure of the field are those of the landscape. ``dataclasses.replace`` changes one.
+    As in the paper, they differ only in their distribution of leaf area. Use ``dataclasses.replace`` to change a class.
 
     Returns
     -------
@@ -288,8 +285,7 @@ _KINDS = {kind.__name__: kind for kind in (Canopy, Leaf, Background, Spectrum)}
 
 def table_text(table):
     """JSON text of a table of classes."""
-    # Distributions without a name, a file or an entry in scipy.stats are left out: they are not needed once leaf area
-    # exists.
+    # Distributions that cannot be named are omitted. They are not needed once leaf area exists.
     rows = [{each.name: getattr(row, each.name) for each in fields(row)} for row in table]
     rows = [{name: _plain(value) for name, value in row.items() if value is not TALLGRASS} for row in rows]
     return json.dumps([{name: value for name, value in row.items() if value is not None} for row in rows])
@@ -301,7 +297,7 @@ def read_table(text):
     try:
         return tuple(CoverClass(**{name: _made(value) for name, value in row.items()}) for row in json.loads(text))
     except (TypeError, AttributeError, json.JSONDecodeError) as error:
-        raise ValueError(f"the classes of the cover are not as landscape() writes them: {error}") from None
+        raise ValueError(f"the class table of the cover is invalid: {error}") from None
 
 
 def _plain(value):

@@ -79,10 +79,10 @@ def largest_share(attempt):
 
 def refused(correlations, share, reason):
     """Message for impossible correlations, which names the nearest possible ones."""
-    asked = ", ".join(f"{one}-{other} {r:g}" for (one, other), r in correlations.items())
+    requested = ", ".join(f"{one}-{other} {r:g}" for (one, other), r in correlations.items())
     # Cut, not rounded, to hundredths, so that the values in the message are allowed.
     near = ", ".join(f"{one}-{other} {np.trunc(100 * share * r) / 100:g}" for (one, other), r in correlations.items())
-    return f"correlations {asked} cannot be: {reason}. The nearest allowed in their proportion are {near}"
+    return f"correlations {requested} cannot be: {reason}. The nearest allowed in their proportion are {near}"
 
 
 # Nodes of a table; values between two nodes are interpolated.
@@ -122,7 +122,7 @@ def score_table(sample):
     kept = np.unique(np.linspace(0, values.size - 1, _NODES).round().astype(int))
     values, scores = values[kept], scores[kept]
     even, rounding = np.linspace(values[0], values[-1], _STARTS, retstep=True)
-    # A value that lies on one of the even ones may by rounding be taken for one beside.
+    # By rounding, a value at a node may be assigned to a neighbouring interval.
     first, last = (
         np.clip(np.searchsorted(values, even + aside * rounding, side="right") - 1, 0, values.size - 2)
         for aside in (-_ROUNDING, 1 + _ROUNDING)
@@ -278,9 +278,9 @@ def _parts(arps, correlations, scores, coarser):
     """Part of each field that follows the ground, and weights of the noises and of the fields on coarser lattices."""
     ground, signals = {}, {}
     for name in arps:
-        asked = {other: r for (one, other), r in correlations.items() if one == name and other in scores}
-        if asked:
-            ground[name], signals[name] = _follow(name, asked, scores)
+        requested = {other: r for (one, other), r in correlations.items() if one == name and other in scores}
+        if requested:
+            ground[name], signals[name] = _follow(name, requested, scores)
     names, coarse = [name for name in arps if name not in coarser], [name for name in arps if name in coarser]
     pairs = {pair: r for pair, r in correlations.items() if set(pair) <= set(arps)}
     shares = {pair: _left(*pair, r, arps, coarser, ground, signals) for pair, r in pairs.items()}
@@ -319,7 +319,7 @@ def _known(coarse, names, shares):
             matrix[i, j] = matrix[j, i] = left / most if most > 0 else 0.0
     _check_matrix(matrix[: len(coarse), : len(coarse)])
     for i in range(len(coarse), len(every)):
-        # Each of the others by itself: what they share beside this is a matter of their noises.
+        # Each other field separately, because their remaining correlation depends on their noises.
         _check_matrix(matrix[np.ix_([*range(len(coarse)), i], [*range(len(coarse)), i])])
     return _weights(every, coarse, matrix)
 
@@ -351,32 +351,34 @@ def _weights(names, sources, matrix):
     }
 
 
-def _follow(name, asked, scores):
+def _follow(name, requested, scores):
     """Part of a field that follows the ground, and its values over the sample."""
-    known = np.stack([scores[each] for each in asked])
+    known = np.stack([scores[each] for each in requested])
     between = np.atleast_2d(np.corrcoef(known))
-    wanted = np.array(list(asked.values()))
+    wanted = np.array(list(requested.values()))
     if not wanted.any():
-        return GroundPart(tuple(asked), wanted, score_table(np.array([-1.0, 1.0])), 0.0), np.zeros(known.shape[1])
+        return GroundPart(tuple(requested), wanted, score_table(np.array([-1.0, 1.0])), 0.0), np.zeros(known.shape[1])
     best, target, step = None, wanted, 1.0
     for _ in range(_ROUNDS):
         weights = np.linalg.lstsq(between, target, rcond=1e-9)[0]
         share = np.sqrt(max(float(target @ weights), 0.0))
         if share > 1 + 1e-9 or np.abs(between @ weights - target).max() > 1e-6:
-            raise Impossible(f"{name} cannot follow all of {', '.join(asked)} so closely, which correlate themselves")
+            raise Impossible(
+                f"{name} cannot follow all of {', '.join(requested)} so closely, which correlate themselves"
+            )
         table = score_table(weights @ known)
         signal = share * normal_scores(weights @ known, table)
         missed = wanted - np.mean(signal * known, axis=1)
         if best is None or np.abs(missed).max() < np.abs(best[0]).max():
-            best = missed, target, GroundPart(tuple(asked), weights, table, min(share, 1.0)), signal
+            best = missed, target, GroundPart(tuple(requested), weights, table, min(share, 1.0)), signal
         else:
             step /= 2
-        if np.abs(best[0]).max() < _CLOSE or len(asked) == 1:
+        if np.abs(best[0]).max() < _CLOSE or len(requested) == 1:
             break
         target = best[1] + step * best[0]
     missed, _, ground, signal = best
-    if np.abs(missed).max() > _APART and len(asked) > 1:
-        raise Impossible(f"no sum of {', '.join(asked)} has such ranks that {name} follows each of them")
+    if np.abs(missed).max() > _APART and len(requested) > 1:
+        raise Impossible(f"no sum of {', '.join(requested)} has such ranks that {name} follows each of them")
     return ground, signal
 
 

@@ -1,9 +1,9 @@
 """
 Patches and patterns of cover as functions of seed and place.
 
-Each block of the lattice draws separate numbers, so that any place can be made alone.
+Each block of the lattice has separate random numbers, so that any place can be computed alone.
 
-All patterns are functions of northing and easting, so that a window is a slice of the whole, chunks change nothing, and
+All patterns depend only on seed, northing and easting, so a window equals a slice of the whole for any chunks, and
 cells of another size show the same patches.
 """
 
@@ -29,20 +29,20 @@ _VORONOI, _SMOOTH, _PASTURES = 8, 9, 10
 # Side of the squares in which random numbers are drawn. [block]
 _SQUARE = 64
 
-# Weights of the smooth field end this many knots away, where they are 1.5e-8 of the largest.
+# Weights of the smooth field are cut off at this many knots, where they are 1.5e-8 of the maximum.
 _REACH = 6
 
 # Uniform numbers are multiples of 2**-53, and 0 has no normal deviate.
 _LEAST = 2.0**-54
 
-# Pastures along a side of a block that is fenced as a whole.
+# Pastures along a side of a block.
 _ALONG = 3
 
 
 def voronoi(seed, down, across, class_of=None):
     """Number of the Voronoi cell of each place, uniform in [0, 1), or its class, shape (y, x)."""
     # Each square of the unit lattice has one uniform random point, so that the mean area of the cells is 1.
-    # The nearest point lies within sqrt(2), so at most two squares away.
+    # The nearest point is within sqrt(2), so at most two squares away.
     (top, rows), (left, columns) = (_blocks(each, 2) for each in (down, across))
     points = _drawn(seed, _VORONOI, top, left, (rows, columns), 3)
     points[0] += np.arange(top, top + rows)[:, None]
@@ -212,32 +212,32 @@ def _weighted(down, across, top, left, knots, out):
 
 PATTERNS = ("voronoi", "levels", "pastures")
 
-# Shares may miss 1 by rounding.
+# Tolerance for the sum of fractions. [1]
 _WHOLE = 1e-6
 
 
 @dataclass(frozen=True)
 class Patches:
     """
-    How the classes of a drawn landscape lie.
+    Layout of the classes of a random landscape.
 
     Parameters
     ----------
     pattern : {"voronoi", "levels", "pastures"}
-        ``voronoi``: cells about random points, as stands and watersheds are. ``levels``: between contours of a smooth
-        field, in the order of the classes, as zones along a slope are. ``pastures``: rectangles with fences between.
+        ``voronoi``: Voronoi cells of random points, similar to stands or watersheds. ``levels``: zones between contours
+        of a smooth field, in the order of the classes. ``pastures``: rectangles.
     size : float
-        Of a patch: the root of the mean area; of ``levels``, the distance at which the correlation of the field falls
-        to 1/e. [m]
+        Square root of the mean patch area; for ``levels``, the distance at which the correlation of the field is 1/e.
+        [m]
     shares : sequence or mapping of str to float, optional
-        Share of the ground of each class, in their order or by name; equal by default. [1]
+        Area fraction of each class, in order or by name; equal by default. [1]
 
     Raises
     ------
     ValueError
-        If there is no such pattern, the size is not positive, or the shares are negative or do not sum to 1.
+        If the pattern is unknown, the size is not positive, or fractions are negative or do not sum to 1.
     TypeError
-        If one is of another kind.
+        If a value has the wrong type.
 
     Examples
     --------
@@ -266,7 +266,7 @@ class Patches:
 
     def shares_of(self, names: Sequence[str]) -> tuple[float, ...]:
         """
-        Share of each class.
+        Area fraction of each class.
 
         Parameters
         ----------
@@ -279,7 +279,7 @@ class Patches:
         Raises
         ------
         ValueError
-            If they are the shares of other classes.
+            If the names do not match the classes.
         """
         if self.shares is None:
             return (1.0 / len(names),) * len(names)

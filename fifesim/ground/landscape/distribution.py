@@ -52,8 +52,8 @@ def lai_distribution(source: LaiDistribution) -> FrozenDistribution:
     Parameters
     ----------
     source : str, path or frozen scipy distribution
-        A treatment of `treatments`, a CSV file whose column ``lai`` (or whose only column) holds samples from 0 to 20,
-        or any frozen continuous distribution of `scipy.stats` without negative values.
+        Name from `treatments`; a CSV file of samples from 0 to 20, in the column ``lai`` or the only column; or a
+        frozen continuous distribution from `scipy.stats` without negative values.
 
     Returns
     -------
@@ -63,9 +63,9 @@ def lai_distribution(source: LaiDistribution) -> FrozenDistribution:
     Raises
     ------
     ValueError
-        If the name is unknown, the file holds no usable samples, or LAI could be negative.
+        If the name is unknown, the file has no valid samples, or LAI could be negative.
     TypeError
-        If the source is none of these.
+        If the source has another type.
 
     References
     ----------
@@ -179,7 +179,7 @@ class _ReflectedKernels(stats.rv_continuous):
     """Mixture of normals at the samples and at their mirror images, restricted to positive values."""
 
     def __init__(self, samples, bandwidth):
-        # Seven bandwidths past the largest sample lie 1e-12 of a kernel.
+        # Beyond seven bandwidths from the largest sample, a kernel has a probability of 1e-12.
         super().__init__(a=0.0, b=float(samples.max() + 7 * bandwidth), name="reflected_kernels")
         self._samples, self._bandwidth = samples, bandwidth
 
@@ -242,19 +242,19 @@ def truncated_normal(mean, standard_deviation, lower, upper):
     return frozen(solution.x)
 
 
-# Quantiles are tabulated for normal deviates from -8.5 to 8.5, past which lie 2e-17 of all cells. The step leaves a
-# linear interpolation error of step**2 / 8 = 1.3e-7 times the curvature of the quantile function.
+# Quantiles are tabulated for normal deviates from -8.5 to 8.5, which excludes a probability of 2e-17. The error of
+# linear interpolation is step**2 / 8 = 1.3e-7 times the curvature of the quantile function.
 _REACH = 8.5
 QUANTILE_NODES = 2**14 + 1
 
-# Cells that are done together, so that they stay in the nearest cache.
+# Cells per batch, to stay in the L1 cache.
 _RUN = 1024
 
-# Of so many the quantiles of ranks are kept, 2 MB.
+# Largest number of cells for which quantiles of ranks are cached, 2 MB.
 _FEW = 2**18
 
 
-# Some hundredths of a second each; treatments and the distributions of drawn shares are the same objects each time.
+# Building a table takes some hundredths of a second. Distributions of treatments and fractions are cached objects.
 @cached(64, "quantile tables of distributions")
 def quantile_table(distribution):
     """Quantiles of a distribution at standard normal deviates from -8.5 to 8.5, shape (16385,), cached."""
@@ -303,7 +303,7 @@ def quantile_map_of_classes(field, numbers, tables):
 def _places(field, size, at, share):
     """Fill in the nodes of a table below deviates, and the weights of the next nodes."""
     per_deviate, last = (size - 1) / (2.0 * _REACH), np.uint32(size - 2)
-    # Without branches, so that the loop is done for several cells at once.
+    # Without branches, so that the loop is vectorized.
     for i in range(field.size):
         position = (field[i] + _REACH) * per_deviate
         known = position == position
@@ -353,7 +353,7 @@ def rank_map(field, distribution):
     Returns
     -------
     values : array, shape of the field
-        The quantiles (rank + 1/2) / n, each once.
+        The quantiles (rank + 1/2) / n, in the order of the field.
 
     References
     ----------

@@ -26,7 +26,7 @@ from fifesim.base.caches import cached
 from fifesim.ground.landscape.autoregression import field_variance, response
 from fifesim.ground.landscape.distribution import quantile_map, quantile_table
 
-# Of the squared frequency, so that the trend has a spectral density at zero. [radian2 per pixel2]
+# Offset of the squared frequency, so that the spectral density of the trend is finite at zero. [radian2 per pixel2]
 _SLOWEST = 1e-5
 
 
@@ -138,7 +138,7 @@ def weighed(cells, response, ratio):
     """Sums of cells weighted as in the estimate from pixels, the transpose of `kriged`, shape (rows, columns)."""
     spectrum = fft.rfft2(cells)
     spectrum *= np.conj(response)
-    # Of every ratio-th row the spectrum is the mean over the frequencies that are one of pixels.
+    # The spectrum of every ratio-th row is the mean over the frequencies that alias to one pixel frequency.
     folded = spectrum.reshape(ratio[0], -1, spectrum.shape[1]).mean(axis=0)
     return fft.irfft2(folded, s=(len(folded), cells.shape[1]))[:, :: ratio[1]]
 
@@ -149,7 +149,7 @@ _LAGS, _PIXELS = (1, 2, 4, 8), 128
 # Median of the square of a standard normal number.
 _MEDIAN = 0.454936423119572
 
-# Powers of two that are told apart: beyond these the process, or the trend, alone is left.
+# Range of tabulated powers of two; beyond them, only the process or only the trend remains.
 _LEAST, _MOST = -4, 6
 
 
@@ -238,8 +238,8 @@ def _second_differences(arp, ratio):
 # Of the shift before, where the gradient is asked again: (1 - H)^(-1/2) = 1 + H / 2 + 3 / 8 H^2 for a quadratic ln w.
 _AGAIN = 0.75
 
-# What the levels of pixels vary about is their mean by weights of this standard deviation, a quarter of the pixels that
-# are read around a tile; by narrower weights, the process itself would count as its mean. [pixel]
+# Standard deviation of the weights of the local mean of pixel levels, a quarter of the pixels read around a tile. With
+# narrower weights, the process itself would be part of the mean. [pixel]
 _SURROUNDINGS = 3.0
 
 
@@ -329,7 +329,7 @@ def residual_shift(own, known, shift, kriging, transform, deviation):
         variance = np.maximum(kriging_block_means(np.square(deviation), ratio), variance / 4)
     pixels = fft.irfft2(spectrum, s=known.shape) / variance + weighed(bent, kriging.response, ratio)
     gradient = by_pixel((pixels / bent[: ratio[0], : ratio[1]].size).astype(np.float32), ratio) * steep - bent
-    # What all cells of a pixel share is no residual.
+    # The mean over the cells of a pixel is not part of the residual.
     gradient -= by_pixel(kriging_block_means(gradient, ratio), ratio)
     spectrum = fft.rfft2(deviation * gradient)
     spectrum *= kriging.process

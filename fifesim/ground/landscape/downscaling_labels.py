@@ -36,19 +36,19 @@ _TILE, _FEWEST_PIXELS = 504, 8
 PIXEL_MARGIN = 12
 """Pixels read around a tile: the weight of one beyond them is below 3e-5."""
 
-# Largest distance between the corners of pixels and of cells. [cell]
+# Tolerance for the alignment of pixels with cells. [cell]
 _OFF = 1e-2
 
 _CURE = "make the grid from the map: lai.odc.geobox.zoom_out(1 / 3) has 3 x 3 cells a pixel"
 
 
 class PixelLattice(NamedTuple):
-    """Pixels of a map among the cells of a grid; places count from the origin of the CRS, southward and eastward."""
+    """Position of map pixels on a grid of cells, counted from the origin of the CRS, southward and eastward."""
 
     ratio: tuple[int, int]  # cells in a pixel
     pixel: tuple[int, int]  # place of the map's first pixel
     cell: tuple[int, int]  # place of the grid's first cell, counted from the corner of the pixel at 0
-    shift: tuple[int, int]  # place of that corner among the cells
+    shift: tuple[int, int]  # position of that corner in cells
 
     @property
     def tile(self):
@@ -126,8 +126,8 @@ def _corner(source, grid):
     off = [abs(each - round(each)) for each in corner]
     if max(off) > _OFF:
         raise ValueError(
-            f"the corners of the map's pixels lie {off[0]:.2f} rows and {off[1]:.2f} columns of cells beside those of "
-            f"the grid's cells: {_CURE}"
+            f"the corners of the map's pixels are {off[0]:.2f} rows and {off[1]:.2f} columns of cells away from "
+            f"those of the grid's cells: {_CURE}"
         )
     return tuple(map(round, corner))
 
@@ -155,62 +155,64 @@ def downscale(
     chunks: Chunks | None = None,
 ) -> xr.DataArray:
     """
-    Leaf area index of the cells below the pixels of a map.
+    Downscale a map of leaf area index to cells that vary within its pixels.
 
     Parameters
     ----------
     lai : xarray.DataArray, dims ([time], y, x)
-        Means over pixels; NaN where unknown. [m2 m-2]
+        Pixel means; NaN for no data. [m2 m-2]
     grid : odc.geo.geobox.GeoBox
-        Of cells in the map's CRS, of which a whole number fills a pixel: ``lai.odc.geobox.zoom_out(1 / 3)`` has 3 x 3.
+        Grid of the cells, in the CRS of the map, with a whole number of cells per pixel: ``lai.odc.geobox.zoom_out(1 /
+        3)`` has 3 x 3.
     arp : float, optional
         Autoregressive parameter of the cells, in [0, 0.2498]. [1]
     distribution : str, path or frozen scipy distribution, optional
-        Of the cells, as `fifesim.lai_distribution` takes it: what the map is a mean of is a scene of this distribution.
+        Distribution of LAI over all cells, as in `fifesim.lai_distribution`.
     cv : float or callable, optional
-        Coefficient of variation of the cells within a pixel, or a function of an array of means of pixels. By default
-        that of FIFE's grass: a standard deviation of 0.4 within pixels, and at most 0.6 of the mean. [1]
+        Coefficient of variation of the cells within a pixel, or a function of an array of pixel means. The default
+        follows FIFE's grass: a standard deviation of 0.4 within pixels, limited to 0.6 times the mean. [1]
     seed : int, optional
-        In [0, 2**63).
+        Seed of the random field, in [0, 2**63).
     chunks : mapping or int, optional
-        Makes the result lazy, as it is without where the map is.
+        Chunks of a lazy result. The result is also lazy if the map is.
 
     Returns
     -------
     lai : xarray.DataArray, dims ([time], y, x)
-        NaN in pixels that are NaN and beyond the map, 0 in pixels of 0. A function of the map, the seed and the place:
-        a window is a slice of the whole, and chunks change nothing. The attribute ``cv_within_pixels`` has the realised
-        coefficient of variation [1]; a lazy result has none. [m2 m-2]
+        NaN in NaN pixels and outside the map, 0 in pixels of 0. The result depends only on map, seed and position, so a
+        window equals a slice of the whole, for any chunks. The attribute ``cv_within_pixels`` is the realised
+        coefficient of variation [1], for results in memory. [m2 m-2]
 
     Warns
     -----
     UserWarning
-        If ``cv`` is a number, and the cells within pixels have one that is off by more than 5 % and by more than three
-        standard errors; by chunk, when it computes, if lazy.
+        If ``cv`` is a number, and the realised value differs by more than 5 % and more than three standard errors. A
+        lazy result is checked by chunk when it is computed.
 
     Raises
     ------
     ValueError
-        If a pixel is no whole number of cells, the map lies elsewhere, both distribution and cv are given, or a number
-        is not allowed; when computed, if the map has values that are no leaf area or that the distribution cannot have.
+        If a pixel is not a whole number of cells, the map does not overlap the grid, both distribution and cv are
+        given, or a number is out of range; when computed, if values of the map are not valid LAI or outside the
+        distribution.
     TypeError
-        If the seed is no whole number, or cv neither a number nor a function.
+        If the seed is not an integer, or cv is neither a number nor a function.
 
     Notes
     -----
-    Exact: the mean of the cells of each pixel, within rounding (1e-12), and that none is negative. Approximate: where
-    the map holds the means of a scene of the model, semivariances over one and two cells are the model's within 0.3 %,
-    with a cv of 0.4 within 0.7 %, inside of pixels and across their borders alike; wider distributions leave more. The
-    model is a field whose logarithm is normal for `cv`, which is then the root of the mean of variance over squared
-    mean of its pixels, and quantiles of a normal field for `distribution`; cells may pass the end of a distribution by
-    0.1 %. What a map has beside that is a trend, as strong as second differences of its pixels say in the surroundings
-    of each tile, which is interpolated. A map that is smoother than the model leaves cells less room: of a uniform map,
-    in pixels of 3 x 3 cells of a cv of 0.1, neighbours across a border have 0.88, 0.80 and 0.53 times the model's
-    semivariance at arp 0, 0.15 and 0.24, those in a pixel 1.00, 0.97 and 0.72 times.
+    The mean of the cells of each pixel is exact to rounding (1e-12), and no cell is negative. For a map of means of the
+    model, semivariances over one and two cells agree with the model within 0.3 % (0.7 % for a cv of 0.4), both within
+    pixels and across their borders. Errors increase for wider distributions. The model is a log-normal field for `cv`,
+    and a transformed normal field for `distribution`; cells may exceed the ends of a distribution by 0.1 %. For `cv`,
+    the coefficient of variation is the root mean of variance over squared mean of the pixels. Further variation of the
+    map is treated as a trend, estimated from second differences of the pixels around each tile and interpolated. If the
+    map is smoother than the model, cells vary less: for a uniform map with 3 x 3 cells per pixel and a cv of 0.1,
+    semivariances of neighbours across a border are 0.88, 0.80 and 0.53 times the model at arp 0, 0.15 and 0.24, and
+    1.00, 0.97 and 0.72 times within a pixel.
 
-    The field of cells is that of `fifesim.lai_scene`, whose seed gives the same ups and downs. A tile of cells holds at
-    least 8 pixels along an axis and reads 12 around: pixels of 150 x 150 cells take 1.7 GB, and many times the time
-    of a cell in a pixel of 3 x 3.
+    The field of cells is the field of `fifesim.lai_scene` for the same seed. A tile of cells has at least 8 pixels
+    along an axis and a margin of 12. Pixels of 150 x 150 cells therefore take 1.7 GB, and much more time per cell than
+    pixels of 3 x 3.
 
     References
     ----------
@@ -282,8 +284,8 @@ def _realised_variation(cells, lattice, first, wanted=None):
     error = squares.std() / np.sqrt(squares.size) / (2 * found) if found else 0.0
     if wanted and abs(found - wanted) > max(0.05 * wanted, 3 * error):
         warn(
-            f"cv={wanted:g} was asked for, and the cells within pixels have {found:.3g}: at this arp, neighbours in a "
-            "pixel are too much alike for the texture of the map; use a smaller arp, or accept the lower cv"
+            f"cv={wanted:g} was requested, but the realised value is {found:.3g}: at this arp, cells within a "
+            "pixel are too similar for the texture of the map; use a smaller arp, or accept the lower cv"
         )
     return found
 
@@ -310,7 +312,7 @@ class _Model:
 def _model(arp, distribution, cv, ratio):
     if distribution is not None and cv is not None:
         raise ValueError(
-            "give distribution= of the cells over the scene or cv= within pixels, not both: each decides the other"
+            "give distribution= of the cells over the scene or cv= within pixels, not both: each determines the other"
         )
     if distribution is not None:
         transform = downscaling.Marginal.of(lai_distribution(distribution), kept_variance(arp, ratio))
@@ -359,7 +361,7 @@ def _cells(model, seed, lattice, rows, columns, known):
     return assemble(make_tile, lattice.tile, lattice.cell[0] + rows.start, lattice.cell[1] + columns.start, shape)
 
 
-# Chunks smaller than tiles, or cut elsewhere, ask for a tile more than once. Eight tiles of 504 cells are 16 MB.
+# Chunks that do not match the tiles need some tiles more than once. Eight tiles of 504 cells take 16 MB.
 @cached(8, "tiles of downscaled cells")
 def _tile(model, seed, lattice, row, column, pixels):
     """One tile of cells, from the bytes of its pixels and the surrounding pixels."""
@@ -375,7 +377,7 @@ def _tile(model, seed, lattice, row, column, pixels):
     size = tuple(count * number for count, number in zip(shape, lattice.ratio, strict=True))
     field = window_field(seed, model.arp, *first, size)
     known, (deviations, of_levels) = pixels > 0, model.deviations(pixels)
-    # Pixels without leaves have no level and get that of the largest mean.
+    # Pixels without leaves have no level; use the level of the largest mean.
     levels = model.transform.level(np.where(known, pixels, pixels[known].max()))
     trend = downscaling.map_trend(levels, known, of_levels, model.arp, lattice.ratio)
     cells = downscaling.downscaled(

@@ -27,13 +27,13 @@ from fifesim.ground.landscape.covariance import Copula, copula, correlated, fiel
 from fifesim.ground.landscape.distribution import quantile_map, quantile_table
 from fifesim.ground.terrain.labels import illumination, slope, wetness
 
-# Largest number of rows and of columns of the ground that are sampled, evenly spaced.
+# Maximum number of evenly spaced rows and columns at which ground properties are sampled.
 SAMPLED = 256
 
 
 def copulas(arps, pairs, covariates, reference, coarser):
     """Copula of each field with the fields before it; lazy where the ground is lazy."""
-    # Lazy fields before the first that follows the ground do not wait for it.
+    # Lazy fields that do not depend on the ground do not wait for it.
     whole = _copula(arps, pairs, covariates, reference, coarser)
     if isinstance(whole, Copula):
         return dict.fromkeys(arps, whole)
@@ -86,7 +86,7 @@ _ARPS = Kind(
 )
 
 OF_ELEVATION = ("elevation", "wetness", "illumination", "slope")
-"""What correlations may name of a landscape's elevation."""
+"""Terrain properties that correlations may name."""
 
 
 def correlated_fields(
@@ -101,46 +101,47 @@ def correlated_fields(
     chunks: Chunks | None = None,
 ) -> dict[str, xr.DataArray]:
     """
-    Standard normal fields that correlate with each other and with the ground.
+    Simulate standard normal fields that correlate with each other and with ground properties.
 
     Parameters
     ----------
     grid : odc.geo.geobox.GeoBox
-        Of ground cells, in a projected CRS.
+        Grid of the ground cells, in a projected CRS.
     arps : dict of str to float
         Autoregressive parameter of each field, by its name, in [0, 0.2498]. [1]
     correlations : mapping, optional
         ``{("lai", "soil"): -0.4, ("lai", "elevation"): 0.3}``, or by name, ``{"lai": {"soil": -0.4}}``. [1]
     coarser : dict of str to int, optional
-        Ground cells along a side of a cell of a field's own lattice, where it varies on a coarser one. [1]
+        Ground cells per lattice cell along each side, for fields on a coarser lattice. [1]
     seed : int, optional
-        In [0, 2**63). The field "lai" is that of `fifesim.lai_scene`; each other name has noise of its own.
+        Seed, in [0, 2**63). The field "lai" equals the field of `fifesim.lai_scene`; every other name has independent
+        noise.
     covariates : dict of str to xarray.DataArray, dims (y, x), optional
-        Properties of the ground on the cells of the grid.
+        Ground properties on the cells of the grid.
     reference : dict of str to xarray.DataArray, dims (y, x), optional
-        The same properties over all of a landscape, of which the grid is a window, in cells of any size. By default
-        ranks are those on the grid.
+        The same properties for a larger area that contains the grid, with cells of any size. Ranks refer to this area;
+        by default to the grid.
     chunks : mapping or int or "auto", optional
-        Makes the fields lazy, as they are without where a covariate is.
+        Chunks of lazy fields. Fields are also lazy if a covariate is.
 
     Returns
     -------
     fields : dict of str to xarray.DataArray, dims (y, x)
-        Each the same to the bit in any chunks, and in any window of the ground that has its ``reference``; without
-        covariates functions of seed and place. [1]
+        Identical for any chunks, and in any window with the same ``reference``. Without covariates, fields depend only
+        on seed and position. [1]
 
     Raises
     ------
     ValueError
-        If correlations cannot be, with the nearest that can; where the ground is lazy, when it computes. If names are
-        unknown, an arp or the seed is out of range, or rasters lie on other grids.
+        If correlations are impossible; the message gives the closest feasible value, for lazy ground when it is
+        computed. If names are unknown, an arp or the seed is out of range, or rasters have different grids.
     TypeError
-        If correlations are no mapping of pairs to numbers, or the seed is no whole number.
+        If `correlations` does not map pairs to numbers, or the seed is not an integer.
 
     Notes
     -----
-    Correlations are those of standard normal scores at the same cell. The scores of the ground are by rank among at
-    most 256 x 256 evenly spaced cells; where it is lazy, these are computed apart, so that none waits in memory.
+    Correlations refer to standard normal scores of the same cell. Scores of ground properties are computed from ranks
+    among at most 256 x 256 evenly spaced cells. For a lazy ground, these cells are computed separately to limit memory.
 
     See Also
     --------
@@ -208,17 +209,17 @@ def landscape_fields(
     correlations = {name: r for name, r in covary.items() if name not in of_lai} if of_lai else covary
     if of_lai:
         correlations = correlations | {("lai", name): r for name, r in of_lai.items()}
-    asked = {name for one, other, _ in flat(correlations or {}) for name in (one, other)} - set(arps) - set(covariates)
-    of_dem = [name for name in OF_ELEVATION if name in asked]
+    named = {name for one, other, _ in flat(correlations or {}) for name in (one, other)} - set(arps) - set(covariates)
+    of_dem = [name for name in OF_ELEVATION if name in named]
     if of_dem and dem is None:
-        raise ValueError(f"covary names {', '.join(of_dem)}, which the elevation tells: give dem=")
+        raise ValueError(f"covary names {', '.join(of_dem)}, which needs an elevation: give dem=")
     if of_dem:
         covariates |= of_elevation(dem, of_dem, geometry=geometry)
     return _fields(grid, arps, correlations, coarser, seed, covariates, reference, chunks, values, wanted)
 
 
 def of_elevation(dem, names, *, geometry=None):
-    """Properties of the ground that fields may follow, dims (y, x), lazy where the elevation is."""
+    """Ground properties with which fields may correlate, dims (y, x), lazy if the elevation is."""
     make = {
         "elevation": lambda: dem,
         "wetness": lambda: wetness(dem),
@@ -227,7 +228,7 @@ def of_elevation(dem, names, *, geometry=None):
     }
     unknown = [name for name in names if name not in make]
     if unknown:
-        raise ValueError(f"an elevation model says nothing of {', '.join(unknown)}: it has {', '.join(make)}")
+        raise ValueError(f"{', '.join(unknown)} cannot be computed from an elevation model: use {', '.join(make)}")
     return {name: make[name]() for name in names}
 
 
@@ -252,8 +253,8 @@ def _lattices(arps, coarser):
 
 
 def _field(grid, name, streams, parts, ground, chunks, values):
-    """One field from its noises and the ground that it follows; streams are seeds, arps and sizes."""
-    # Kernels hold names, not rasters: what they hold goes with them into each worker.
+    """One field from its noises and the correlated ground; streams are seeds, arps and sizes."""
+    # Kernels refer to names, not rasters, because they are copied to each worker.
     lattice, followed = grids.lattice_position(grid), tuple(ground)
 
     def cells(made, row, column, shape, *layers):
@@ -287,7 +288,7 @@ def _field(grid, name, streams, parts, ground, chunks, values):
 
 
 def _noise(name, streams, made, start, shape):
-    """Part of a field that does not follow the ground, standard normal."""
+    """Part of a field that is independent of the ground, standard normal."""
     _, arp, size = streams[name]
     known = made.coarse.get(name, {})
     if size > 1:
@@ -316,7 +317,7 @@ def drawn_fields(grid, drawn, covary, arps, *, dem=None, geometry=None, seed=0, 
     """Standard normal fields of a landscape: leaf area scores by arp, and properties by name, dims (y, x)."""
     for name in set(covary or {}) & {"soil", *SHARES} - set(drawn):
         raise ValueError(
-            f"covary names {name}, which is not drawn: type {name}=fifesim.Field(mean=..., sd=...), or leave it out"
+            f"covary names {name}, which is no random field: give {name}=fifesim.Field(mean=..., sd=...), or remove it"
         )
     # Properties of the elevation are computed once for all fields.
     named = [name for name in OF_ELEVATION if name in (covary or {}) and dem is not None]
@@ -336,7 +337,7 @@ def drawn_fields(grid, drawn, covary, arps, *, dem=None, geometry=None, seed=0, 
     if not covary:
         made = [fields(others)] if others else [{}]
     else:
-        # Leaf area comes last: it takes of the noise of the others what its own arp needs, and they stay as they are.
+        # Leaf area comes last: it includes noise of the other fields, which do not change.
         made = [
             fields({**others, "lai": arp}, covary, wanted=["lai"] if number else None)
             for number, arp in enumerate(dict.fromkeys(arps))

@@ -32,7 +32,7 @@ from fifesim.ground.landscape.cover import Patches, patch_classes
 from fifesim.ground.landscape.field_labels import drawn_fields
 from fifesim.ground.landscape.lai_labels import lai_window, one_layer
 
-# Chunks of "auto" are of some of these. [cell]
+# Chunk size for "auto" is a multiple of this. [cell]
 _TILE = 1008
 
 
@@ -79,7 +79,7 @@ def classes_of(cover):
     """Table of the classes in the attributes of a raster of cover."""
     if "classes" not in cover.attrs:
         raise ValueError(
-            "the cover does not say what its classes are: make the landscape with fifesim.landscape(grid, "
+            "the classes of the cover are unknown: make the landscape with fifesim.landscape(grid, "
             "cover=raster, classes=...)"
         )
     return read_table(cover.attrs["classes"])
@@ -91,13 +91,13 @@ def _labelled(cover, table, history, **provenance):
     return cf.label(cover, "cover", history=history, classes=table_text(table), **flags, **provenance)
 
 
-# The functions that take these name what they need in their own messages.
+# Type errors of these are raised with more detail by the functions that use them.
 GroundProperty: TypeAlias = Annotated[FilePath | xr.DataArray | Field | float, ANYTHING]
 Cover: TypeAlias = Annotated[Patches | FilePath | xr.DataArray, UNCHECKED]
 Classes: TypeAlias = Annotated[CoverClass | Sequence[CoverClass] | Mapping[str, CoverClass], UNCHECKED]
 
 FIFE_PASTURES = Patches("pastures", 1200.0)
-"""Of the default landscape: rectangles of 144 ha on average, as large as ranches of the Flint Hills fence them."""
+"""Pasture layout of the default landscape: rectangles of 144 ha on average, typical of ranches in the Flint Hills."""
 
 _REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
 
@@ -122,63 +122,63 @@ def landscape(
     allow_remote: bool = False,
 ) -> xr.Dataset:
     """
-    A landscape: leaf area and classes of cover, and what else a ground scene is made of, on one grid.
+    Create a landscape: leaf area, land cover classes and other ground properties on one grid.
 
     Parameters
     ----------
     grid : odc.geo.geobox.GeoBox
-        Of ground cells, in a projected CRS.
+        Grid of the ground cells, in a projected CRS.
     cover : Patches, str, path or xarray.DataArray, optional
-        How the classes lie: patches that are drawn, or a map of whole numbers, a raster file or what rioxarray has
-        opened, in any CRS; cells no larger than the map's have its nearest class, larger ones the most frequent. By
-        default one class is everywhere, and FIFE's three treatments lie in pastures.
+        Layout of the classes: random patches, or a map of integer codes in any CRS, as a raster file or an array. Cells
+        no larger than the map cells take the nearest class, larger cells the most frequent one. By default a single
+        class covers the grid, and the three treatments of FIFE are laid out as pastures.
     classes : CoverClass, sequence of CoverClass, or mapping of str to CoverClass, optional
-        What the classes are; by default those that a raster of cover carries, or `fife_classes` of what is drawn.
+        Properties of the classes; by default from the attributes of a cover raster, or `fife_classes` for random
+        patches.
     lai : xarray.DataArray, str or path, optional
-        Your own leaf area, as `open_lai` takes it, in the place of the classes' distributions. [m2 m-2]
+        Leaf area map as in `open_lai`, instead of the distributions of the classes. [m2 m-2]
     arp : float, optional
-        Autoregressive parameter of the classes that say none, in [0, 0.2498]. [1]
+        Autoregressive parameter of classes without one, in [0, 0.2498]. [1]
     brown, crown_cover, soil, moisture : float, Field, xarray.DataArray, str or path, optional
-        Share of dead leaf area, share of the ground below crowns, brightness of the soil and its moisture, as
-        `surface_reflectance` takes them, in the place of the classes': a number, a `Field` that is drawn, or a map. [1]
+        Dead fraction of the leaf area, crown cover, soil brightness and soil moisture, as in `surface_reflectance`: a
+        number, a `Field` for a random field, or a map. They replace the values of the classes. [1]
     covary : dict of str to float, optional
-        Correlations of leaf area with ``elevation``, ``wetness``, ``illumination`` and ``slope``, and with what is
-        drawn, such as ``{"wetness": 0.5, "soil": -0.4}``: those of standard normal scores at the same cell. [1]
+        Correlations of leaf area with ``elevation``, ``wetness``, ``illumination``, ``slope`` and random fields, such
+        as ``{"wetness": 0.5, "soil": -0.4}``. They refer to standard normal scores of the same cell. [1]
     dem : xarray.DataArray, dims (y, x), optional
-        Elevation on the grid, where ``covary`` names something of it. [m]
+        Elevation on the grid, required if ``covary`` names a terrain property. [m]
     reference : dict of str to xarray.DataArray, optional
-        As in `correlated_fields`: the same of a larger ground, of which the grid is a window.
+        Terrain properties of a larger area that contains the grid, as in `correlated_fields`.
     geometry : Geometry, optional
-        Of the sun, where ``covary`` names the illumination.
+        Direction of the sun, required if ``covary`` names the illumination.
     seed : int, optional
-        In [0, 2**63).
+        Seed of the random fields, in [0, 2**63).
     chunks : mapping or int or "auto", optional
-        Makes the landscape lazy.
+        Chunks of a lazy landscape; in memory by default.
     allow_remote : bool, optional
-        Take addresses, and formats that lead to other files: only for what you trust.
+        Also open remote files and formats that refer to other files. Use this only for trusted files.
 
     Returns
     -------
     land : xarray.Dataset
-        ``lai`` [m2 m-2] and ``cover``, codes of classes by ``flag_values`` and ``flag_meanings`` with -1 for no data,
-        over (y, x), and the others where they are given. ``land.fifesim.surface_reflectance(instrument)`` takes it.
+        ``lai`` [m2 m-2] and ``cover``, class codes with ``flag_values`` and ``flag_meanings`` and -1 for no data, over
+        (y, x), and the other properties if given. Pass it on with ``land.fifesim.surface_reflectance(instrument)``.
 
     Raises
     ------
     ValueError
-        If the grid, arp, seed, a class or its share is not one allowed, correlations cannot be, a deviation is too
-        large, a map is not usable, or a class has no leaf area; of a lazy map when it computes, if it has a code
-        without a class.
+        If the grid, arp, seed, a class or its area fraction is invalid; correlations are impossible; a standard
+        deviation is too large; a map is invalid; or a class has no leaf area. A lazy map with a code without a class
+        raises when it is computed.
     TypeError
-        If an argument is of another kind.
+        If an argument has the wrong type.
 
     Notes
     -----
-    Every variable is a function of the seed and of place: a window is a slice of the whole, and chunks change nothing.
-    Leaf area of all classes comes from one white noise, filtered with each class's arp and mapped to its distribution.
-    A fence is so a change of density and of texture on ground that goes on: dense spots of one treatment are dense
-    spots of the other, as deep soil is on both sides of a fence, and landscapes of one seed differ by their classes
-    and not by chance.
+    All variables depend only on seed and position, so a window equals a slice of the whole, for any chunks. The leaf
+    area of all classes is derived from one white noise field, filtered with the arp of each class and mapped to its
+    distribution. Patterns therefore continue across class borders, where only distribution and texture change.
+    Landscapes with the same seed differ only through their classes.
 
     References
     ----------
@@ -205,7 +205,7 @@ def landscape(
     given = {name: each.mean if isinstance(each, Field) and not each.sd else each for name, each in given.items()}
     drawn = {name: each for name, each in given.items() if isinstance(each, Field)}
     if covary and lai is not None:
-        raise ValueError("lai is a map, which goes with the ground as it does: leave covary out, or the map")
+        raise ValueError("covary cannot be used with a map of lai: remove one of them")
     variables = {
         name: _property(name, each, grid, chunks, allow_remote)
         for name, each in given.items()
@@ -244,7 +244,7 @@ def _cover(grid, cover, table, seed, chunks, allow_remote):
     if cover is None:
         if len(table) > 1 and [each.name for each in table] != list(fife_classes()):
             raise ValueError(
-                f"nothing says how the {len(table)} classes lie: give cover= a map of their codes, or for instance "
+                f"the layout of the {len(table)} classes is unknown: give cover= a map of their codes, or for instance "
                 'fifesim.Patches("voronoi", size=300)'
             )
         cover = FIFE_PASTURES
@@ -265,7 +265,7 @@ def _lai(grid, cover, table, arp, seed, scores):
             "where it is uniform, or give landscape(lai=) a raster"
         )
     codes = tuple(each.code for each in table)
-    # The last is of cells without a class.
+    # The last entry is for cells without a class.
     tables = np.stack([*(_quantiles(each.lai) for each in table), np.full(distribution.QUANTILE_NODES, np.nan)])
     arps = [arp if each.arp is None else each.arp for each in table]
     # Errors of streaming_field are raised before anything lazy is built.
@@ -336,5 +336,5 @@ def _check_share(name, values):
     """Raise ValueError for values outside 0 to 1; NaN passes."""
     wrong = (np.asarray(values) < 0) | (np.asarray(values) > 1)
     if wrong.any():
-        raise ValueError(f"{name} must be in [0, 1], got {np.asarray(values)[wrong].flat[0]:g}: it is a share")
+        raise ValueError(f"{name} must be in [0, 1], got {np.asarray(values)[wrong].flat[0]:g}: it is a fraction")
     return values

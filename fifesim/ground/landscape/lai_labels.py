@@ -41,23 +41,23 @@ def lai_scene(
     chunks: Chunks | None = None,
 ) -> xr.DataArray:
     """
-    Leaf area index of a simulated landscape.
+    Simulate leaf area index as a random field.
 
     Parameters
     ----------
     grid : odc.geo.geobox.GeoBox
-        Of ground cells, in a projected CRS.
+        Grid of the ground cells, in a projected CRS.
     distribution : str, path or frozen scipy distribution, optional
-        As `ground.landscape.distribution.lai_distribution` takes it.
+        Distribution of LAI, as in `lai_distribution`.
     arp : float, optional
         Autoregressive parameter in [0, 0.25). [1]
     seed : int, optional
-        In [0, 2**63).
+        Seed of the random field, in [0, 2**63).
     method : {"streaming", "periodic"}, optional
-        ``streaming`` is a function of (seed, row, column): a window is a slice of the whole, and chunks change nothing.
-        ``periodic`` is the paper's: one Fourier transform of the whole scene and exact ranks, in memory.
+        ``streaming`` depends only on seed and position, so a window equals a slice of the whole, for any chunks.
+        ``periodic`` is the method of the paper: one Fourier transform of the whole scene, in memory, and exact ranks.
     chunks : mapping or int, optional
-        Makes the streaming scene lazy.
+        Chunks of a lazy scene, for the streaming method.
 
     Returns
     -------
@@ -67,9 +67,9 @@ def lai_scene(
     Raises
     ------
     ValueError
-        If the grid, arp, seed, distribution or method is not one allowed.
+        If the grid, arp, seed, distribution or method is invalid.
     TypeError
-        If the seed is no whole number.
+        If the seed is not an integer.
 
     References
     ----------
@@ -114,32 +114,33 @@ def open_lai(
     path_or_raster: FileOrRaster, grid: GeoBox, chunks: Chunks | None = None, *, allow_remote: bool = False
 ) -> xr.DataArray:
     """
-    A user's own map of leaf area index on a grid.
+    Resample a map of leaf area index to a grid.
 
     Parameters
     ----------
     path_or_raster : str, path or xarray.DataArray
-        A raster file, whose first band is LAI, or what rioxarray has opened, in any CRS and orientation. Whole numbers
-        with a scale, as of MODIS, are LAI by their ``scale_factor``. [m2 m-2]
+        Map of LAI in any CRS and orientation: a raster file, whose first band is used, or an array. Scaled integers
+        (e.g. MODIS) are converted with ``scale_factor``. [m2 m-2]
     grid : odc.geo.geobox.GeoBox
-        Of ground cells. Cells no larger than the map's are interpolated bilinearly, larger ones hold means.
+        Grid of the ground cells. Cells no larger than the map cells are interpolated bilinearly; larger cells are
+        means.
     chunks : mapping or int, optional
-        Makes the result lazy.
+        Chunks of a lazy result; in memory by default.
     allow_remote : bool, optional
-        Take addresses, and formats that lead to other files: only for what you trust.
+        Also open remote files and formats that refer to other files. Use this only for trusted files.
 
     Returns
     -------
     lai : xarray.DataArray, dims (y, x)
-        NaN where the map has no data. [m2 m-2]
+        NaN for no data. [m2 m-2]
 
     Raises
     ------
     ValueError
-        If the file is missing or not of a format that is opened, has no CRS, does not overlap the grid, or needs a
-        change of datum whose accuracy is unknown; if it has no data on the grid, known at once where the result is in
-        memory; if its name, description or units are those of another quantity; and, when computed, if LAI on the grid
-        or next to it is negative or above 20.
+        If the file is missing, has an unsupported format or no CRS, does not overlap the grid, or needs a datum
+        transformation of unknown accuracy; if there is no data on the grid (checked for results in memory); if name,
+        description or units indicate another quantity; and, when computed, if LAI on or next to the grid is negative or
+        above 20.
 
     Warns
     -----
@@ -160,14 +161,14 @@ def open_lai(
     lai = lai_window(path_or_raster, grid, chunks, allow_remote=allow_remote)
     if lai.chunks is None and not np.isfinite(lai.values).any():
         raise ValueError(
-            f"{lai.attrs['lai_distribution']} has no data on the grid, which spans {grids.extent(grid)}: all of it is "
-            "marked as no data; look at its nodata value with gdalinfo -stats"
+            f"{lai.attrs['lai_distribution']} has no data on the grid, which spans {grids.extent(grid)}: all cells are "
+            "marked as no data; check the nodata value with gdalinfo -stats"
         )
     return lai
 
 
 def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
-    """Map of leaf area index on a grid, where it may have no data, dims (y, x). [m2 m-2]"""
+    """Map of leaf area index on a grid, possibly without data, dims (y, x). [m2 m-2]"""
     if isinstance(path_or_raster, xr.DataArray):
         name = in_a_line(str(path_or_raster.name or "raster"), 150)
         _check_array(path_or_raster)
@@ -194,7 +195,7 @@ def _check_band(path, name, allow_remote):
         words = [source.descriptions[0], *(tags.get(key) for key in ("NETCDF_VARNAME", "long_name", "standard_name"))]
         scaled = (source.scales[0], source.offsets[0]) != (1.0, 0.0)
         counts = np.dtype(source.dtypes[0]).kind in "iu" and not scaled
-        # GDAL gives the unit of the heights of a compound CRS to bands without a unit.
+        # GDAL assigns the height unit of a compound CRS to bands without a unit.
         units = None if len(pyproj.CRS(source.crs).axis_info) > 2 else source.units[0]
         _check_metadata(name, words, units, counts)
 
@@ -203,7 +204,7 @@ def _check_metadata(name, words, units, counts):
     cf.check_words(name, [word for word in words if isinstance(word, str)], "lai", str(units or ""))
     if counts:
         warn(
-            f"{name} holds integers without a scale, which are taken as leaf area index: if they are counts, set their "
+            f"{name} holds integers without a scale, which are used as leaf area index: if they are scaled, set their "
             "scale (.assign_attrs(scale_factor=0.1), or gdal_edit.py -a_scale 0.1 for a file), else convert them with "
             ".astype(float)"
         )
@@ -242,12 +243,12 @@ def _streaming_cells(grid, density, arp, seed):
 
 
 def _periodic_cells(grid, density, arp, seed):
-    # Noise, spectrum, field, ranks, quantiles and result are in memory together.
+    # Noise, spectrum, field, ranks, quantiles and result are in memory at the same time.
     needed, free = 48 * grid.shape.x * grid.shape.y, psutil.virtual_memory().available
     if needed > free:
         raise ValueError(
             f"a periodic field of {grid.shape.y} x {grid.shape.x} cells needs {needed / 1e9:.1f} GB of memory, "
-            f'{free / 1e9:.1f} GB are free: use method="streaming", which needs no more for a larger scene'
+            f'{free / 1e9:.1f} GB are free: use method="streaming", whose memory does not grow with the scene'
         )
     return rank_map(periodic_field(seed, arp, tuple(grid.shape)), density)
 

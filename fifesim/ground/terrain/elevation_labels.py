@@ -212,48 +212,47 @@ def fine_dem(
     allow_remote: bool = False,
 ) -> xr.DataArray:
     """
-    Elevation model on a grid, by low-pass interpolation.
+    Resample an elevation model to a grid by low-pass interpolation.
 
     Parameters
     ----------
     path_or_raster : str, path or xarray.DataArray
-        A raster file, or what rioxarray has opened, in any CRS and orientation; its first band is elevation. It should
-        reach past the grid.
+        Elevation model in any CRS and orientation: a raster file, whose first band is used, or an array. It should
+        extend beyond the grid.
     grid : odc.geo.geobox.GeoBox
-        Of ground cells.
+        Grid of the ground cells.
     fill : float, optional
-        Distance from known elevation up to which holes are interpolated, and the model is carried on past its edge. [m]
+        Maximum distance from known elevations for interpolating gaps and extrapolating beyond the edge. [m]
     vertical_units : str, optional
-        Of the elevations, where they are not metres: "ft", "us-ft" and others; wins over what the file says.
+        Units of the elevations if they are not metres, such as "ft" or "us-ft". Takes precedence over the file.
     chunks : mapping or int or "auto", optional
-        Makes the result lazy, as it is without where the raster is.
+        Chunks of a lazy result. The result is also lazy if the raster is.
     allow_remote : bool, optional
         Take addresses, and formats that lead to other files: only for what you trust.
 
     Returns
     -------
     dem : xarray.DataArray, dims (y, x)
-        With the mean size of the model's cells, or of the blocks that they are averaged to, as attribute
-        ``source_resolution``. [m]
+        Elevation. The attribute ``source_resolution`` is the mean cell size of the model, after block averaging [m].
+        [m]
 
     Raises
     ------
     ValueError
-        If the model does not cover the grid, has holes, no CRS, or other units than metres that are not given, or needs
-        a change of datum whose accuracy is unknown. If the part that is read, on the grid and around it, holds heights
-        below -500 m or above 9000 m, such as undeclared marks of missing data. For a lazy raster this is known when
-        computed.
+        If the model does not cover the grid, has gaps, has no CRS, has undeclared units other than metres, or needs a
+        datum transformation of unknown accuracy. If elevations on or around the grid are below -500 m or above 9000 m,
+        such as undeclared missing values; a lazy raster is checked when it is computed.
 
     Warns
     -----
     UserWarning
-        If elevations lie in terraces of whole numbers, are 0 m where all others are far from it, or have a mean slope
-        above 20 degrees at 30 m while ``vertical_units`` is not given. A lazy raster is checked for 0 m only.
+        If elevations are integers that form terraces, are isolated values of 0 m, or have a mean slope above 20 degrees
+        at 30 m without given ``vertical_units``. A lazy raster is only checked for 0 m.
 
     Notes
     -----
-    Wavelengths above five cells of the source are recovered within 1e-3 of their amplitude, planes exactly. Cells of
-    the source less than two thirds of the grid's are averaged first. Heights keep their vertical datum.
+    Waves longer than five source cells are recovered within 1e-3 of their amplitude, and planes exactly. Source cells
+    smaller than two thirds of the grid cells are first averaged. The vertical datum is not changed.
 
     See Also
     --------
@@ -290,30 +289,30 @@ def source_dem(
     allow_remote: bool = False,
 ) -> tuple[xr.DataArray, dict[str, float]]:
     """
-    Elevation model around a grid, at about its own resolution; for horizons.
+    Elevation model around a grid, at about the resolution of the source; for horizons.
 
     Parameters
     ----------
     path_or_raster, grid, fill, vertical_units, allow_remote
         As in `fine_dem`.
     margin : float
-        Distance from the grid that is wanted on each side. [m]
+        Requested distance beyond the grid on each side. [m]
     chunks : mapping or int or "auto", optional
-        Makes the result lazy; where the model ends is looked up at once.
+        Chunks of a lazy result. The extent of the model is determined immediately.
 
     Returns
     -------
     dem : xarray.DataArray, dims (y, x)
-        In memory without chunks. Its cells are whole multiples of the grid's, from the grid's corner; it reaches up to
-        the margin and as far as the model does. NaN where unknown. [m]
+        Elevation up to the margin or the end of the model, NaN where unknown; in memory unless chunked. The cell size
+        is a whole multiple of the grid cell size, aligned with the grid corner. [m]
     reach : dict of str to float
-        How far the elevation is known without a gap beside all of the ``north``, ``east``, ``south`` and ``west`` side
-        of the grid, up to the margin. [m]
+        Distance up to which the elevation is known without gaps along the entire ``north``, ``east``, ``south`` and
+        ``west`` side of the grid, limited to the margin. [m]
 
     Raises
     ------
     ValueError
-        As in `fine_dem`, but not for what the model lacks, unless that is all.
+        As in `fine_dem`, except that gaps are allowed if some elevation is known.
 
     Examples
     --------
@@ -420,7 +419,7 @@ def _with_data(known, around):
 # Chunks of "auto" are of some of these. [cell]
 _TILE = 504
 
-# Coarser cells lose the valleys. [m]
+# Coarser cells do not resolve the valleys. [m]
 _LARGEST_CELL = 100.0
 
 _REFERENCE = "terrain after the statistics of Kings Creek, Konza Prairie (USGS 3DEP)"
@@ -433,7 +432,7 @@ def flint_hills(grid: GeoBox, seed: WholeNumber = 0, *, chunks: Chunks | None = 
     Parameters
     ----------
     grid : odc.geo.geobox.GeoBox
-        Of ground cells.
+        Grid of the ground cells.
     seed : int, optional
         In [0, 2**63).
     chunks : mapping or int or "auto", optional
@@ -442,15 +441,15 @@ def flint_hills(grid: GeoBox, seed: WholeNumber = 0, *, chunks: Chunks | None = 
     Returns
     -------
     dem : xarray.DataArray, dims (y, x)
-        A function of the seed and of easting and northing: a window is a slice of the whole, chunks change nothing, and
-        other cells show the same hills. [m]
+        Elevation, which depends only on seed, easting and northing: a window equals a slice of the whole for any
+        chunks, and cells of another size show the same hills. [m]
 
     Raises
     ------
     ValueError
-        If the grid or the seed is not one allowed, or cells are larger than 100 m, which lose the valleys.
+        If the grid or the seed is invalid, or cells are larger than 100 m and do not resolve the valleys.
     TypeError
-        If the seed is no whole number.
+        If the seed is not an integer.
 
     See Also
     --------

@@ -127,7 +127,7 @@ def _receivers(ground, preference, size, node, receiver, distance):
         far = distance[first : first + size - 2]
         steepest[:] = 0.0
         k = 0
-        # Neighbour by neighbour and not node by node: each is a line of nodes without branches.
+        # The loop over neighbours is outermost, so that inner loops over nodes have no branches.
         for a in range(-1, 2):
             for b in range(-1, 2):
                 if a == 0 and b == 0:

@@ -148,7 +148,7 @@ def horizon_toward(tangents, directions, azimuth):
 @njit(nogil=True, cache=True)
 def _march(dem, rays, top, left, out):
     cells, columns, width = dem.ravel(), out.shape[2], dem.shape[1]
-    # How far the cells of a sample lie from that of the ray, row after row.
+    # Offsets of the cells of a sample from the cell of the ray, by row.
     first = rays.first[:, 0] * width + rays.first[:, 1]
     second = rays.second[:, 0] * width + rays.second[:, 1]
     for direction in range(out.shape[0]):
@@ -172,7 +172,7 @@ def _raise_horizon(near, far, here, line):
     far_first, far_second, far_share, far_per_metre = far
     for j in range(line.size):
         rise = (first[j] + share * (second[j] - first[j]) - here[j]) * per_metre
-        # False for NaN: what is not known is open.
+        # False for NaN: unknown terrain is open.
         horizon = rise if rise > line[j] else line[j]
         rise = (far_first[j] + far_share * (far_second[j] - far_first[j]) - here[j]) * far_per_metre
         line[j] = rise if rise > horizon else horizon
@@ -364,7 +364,7 @@ def _add_sector(tangents, next_tangents, toward, next_toward, east, north, out):
 def _arc(a, b):
     """Term of Lambert of the great circle from a to b, clockwise seen from above: its angle times its normal."""
     x, y, z = b.y * a.z - b.z * a.y, b.z * a.x - b.x * a.z, b.x * a.y - b.y * a.x
-    # Of the angle from a to b, times the lengths of both.
+    # Sine of the angle from a to b, times both lengths.
     squared_sine, cosine = x * x + y * y + z * z, a.x * b.x + a.y * b.y + a.z * b.z
     # Tangents of its half and its quarter, over the sine, which may be 0.
     half = 1 / (np.sqrt(squared_sine + cosine * cosine) + cosine)

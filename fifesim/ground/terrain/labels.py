@@ -44,7 +44,7 @@ def slope(dem: xr.DataArray) -> xr.DataArray:
     Returns
     -------
     slope : xarray.DataArray, dims (y, x)
-        At every cell; one-sided at the edges and beside missing cells. [degree]
+        Slope from central differences; one-sided at edges and next to missing cells. [degree]
 
     Raises
     ------
@@ -75,8 +75,8 @@ def aspect(dem: xr.DataArray) -> xr.DataArray:
     """
     Azimuth down the slope, clockwise from true north.
 
-    Grid north differs from true north by the meridian convergence, which is added at each cell. A projection that does
-    not preserve angles adds its own distortion, 0.2 degrees for EPSG:3035 at 30 degrees east.
+    Grid north differs from true north by the meridian convergence, which is added at each cell. Projections that do not
+    preserve angles add a distortion, such as 0.2 degrees for EPSG:3035 at 30 degrees east.
 
     Parameters
     ----------
@@ -143,21 +143,21 @@ _REFERENCE = "Beven and Kirkby (1979), doi:10.1080/02626667909491834"
 
 def wetness(dem: xr.DataArray, *, resolution: float | None = None) -> xr.DataArray:
     """
-    Topographic wetness index: where water gathers, at the resolution of the elevation's source.
+    Topographic wetness index, at the resolution of the elevation source.
 
     Parameters
     ----------
     dem : xarray.DataArray, dims (y, x)
         [m]
     resolution : float, optional
-        Spacing of the places at which it is found, as a whole number of cells; by default the attribute
-        ``source_resolution`` of ``dem``, else 30 m. Between them it is interpolated. [m]
+        Spacing of the nodes at which the index is computed, a whole number of cells; by default the attribute
+        ``source_resolution`` of ``dem``, else 30 m. The index is interpolated between nodes. [m]
 
     Returns
     -------
     wetness : xarray.DataArray, dims (y, x)
-        Natural logarithm of drained area per metre of contour over slope. Lazy where ``dem`` is, and the same in any
-        chunks; but a window knows nothing of the water that flows into it. [ln m]
+        Natural logarithm of the drained area per metre of contour over slope. Lazy if ``dem`` is, and independent of
+        chunks. A window does not include water that flows in from outside. [ln m]
 
     Raises
     ------
@@ -166,8 +166,8 @@ def wetness(dem: xr.DataArray, *, resolution: float | None = None) -> xr.DataArr
 
     Notes
     -----
-    All places are in memory together when it computes: 1.2 percent of the cells of 3.33 m where the source has 30 m. A
-    lazy elevation is computed twice, for the places and for the cells, so that none of it waits in memory.
+    All nodes are in memory at the same time: 1.2 % of the number of cells for cells of 3.33 m and nodes of 30 m. A lazy
+    elevation is computed twice, for nodes and for cells, to limit memory.
 
     See Also
     --------
@@ -208,7 +208,7 @@ def _at_places(data, places):
         found = wetness_index(elevation, *places.cell)
         if np.isnan(found).all():
             return found
-        # Cells beside a gap lie between known places and unknown ones.
+        # Cells next to a gap lie between known and unknown nodes.
         nearest = ndimage.distance_transform_edt(np.isnan(found), return_distances=False, return_indices=True)
         return found[tuple(nearest)]
 
@@ -315,7 +315,7 @@ def _offset(dem_grid, grid):
         rows, columns = grids.lattice_offset(dem_grid, grid)
     except ValueError:
         raise ValueError(
-            f"the dem lies on other cells ({grids.extent(dem_grid)}, {dem_grid.affine.a:g} m) than the raster "
+            f"the dem has other cells ({grids.extent(dem_grid)}, {dem_grid.affine.a:g} m) than the raster "
             f"({grids.extent(grid)}, {grid.affine.a:g} m): bring it onto the raster's grid first"
         ) from None
     beyond = rows + grid.shape.y > dem_grid.shape.y or columns + grid.shape.x > dem_grid.shape.x
@@ -333,8 +333,8 @@ def sky_view(dem: xr.DataArray, horizon: Horizon | None = None) -> xr.DataArray:
     dem : xarray.DataArray, dims (y, x)
         [m]
     horizon : xarray.DataArray, dims (direction, y, x), optional
-        From `horizon`, such as that of an elevation model that reaches further; by default that of ``dem``, in 32
-        directions and 5 km far.
+        Horizon of a larger elevation model, from `horizon`; by default the horizon of ``dem`` in 32 directions up to 5
+        km.
 
     Returns
     -------
@@ -348,8 +348,8 @@ def sky_view(dem: xr.DataArray, horizon: Horizon | None = None) -> xr.DataArray:
 
     Notes
     -----
-    The part of the sky that is seen from a place is a vector that varies as slowly as the horizon; it is found at the
-    horizon's resolution and interpolated, and multiplied by the normal of each cell's own slope.
+    The visible sky is described by a vector that varies as slowly as the horizon. It is computed at the resolution of
+    the horizon, interpolated, and multiplied with the surface normal of each cell.
 
     See Also
     --------
@@ -408,18 +408,18 @@ def illumination(
     time: Time | None = None,
 ) -> xr.DataArray:
     """
-    Cosine of the solar zenith angle on the slope, 0 where the slope or the land around hides the sun.
+    Cosine of the solar zenith angle on the slope, 0 in self or cast shadow.
 
     Parameters
     ----------
     dem : xarray.DataArray, dims (y, x)
         [m]
     geometry : fifesim.base.geometry.Geometry, optional
-        By default that which the array carries, else of the sun at its time and place.
+        Direction of the sun; by default from the coordinates of the array, else from its time and place.
     horizon : xarray.DataArray, dims (direction, y, x), optional
         As in `sky_view`.
     time : str or datetime, optional
-        In the place of ``geometry``.
+        Time for the position of the sun, instead of ``geometry``.
 
     Returns
     -------
@@ -429,7 +429,7 @@ def illumination(
     Raises
     ------
     ValueError
-        As in `sky_view`; or, unless lazy, if the sun reaches no slope.
+        As in `sky_view`; or, unless lazy, if no slope is sunlit.
 
     See Also
     --------
@@ -476,7 +476,7 @@ def shadow(
 
     Examples
     --------
-    The sun of FIFE stands too high for shadows on these hills:
+    The sun of FIFE is too high for shadows on these hills:
 
     >>> import fifesim
     >>> dem = fifesim.flint_hills(fifesim.fife_site(30, window=((0, 60), (0, 60))), seed=7)

@@ -25,7 +25,7 @@ class Places(NamedTuple):
     """Evenly spaced rows and columns, in cells of an elevation model, and their spacing."""
 
     grid: GeoBox
-    """Of the elevation."""
+    """Grid of the elevation."""
     rows: np.ndarray
     columns: np.ndarray
     step: tuple[float, float]
@@ -172,32 +172,32 @@ def horizon(
     beside: xr.DataArray | None = None,
 ) -> xr.DataArray:
     """
-    Horizon of the land around, at the resolution of the elevation's source.
+    Horizon of the surrounding terrain, at the resolution of the elevation source.
 
     Parameters
     ----------
     dem : xarray.DataArray, dims (y, x)
-        Missing cells, and all beyond the raster, count as open. [m]
+        Elevation. The view is open across missing cells and beyond the raster. [m]
     directions : int, optional
         Number of azimuths, from north on.
     reach : float, optional
-        Greatest distance of terrain that counts. [m]
+        Maximum distance of the terrain. [m]
     resolution : float, optional
-        Spacing of the cells at which the horizon is found, as a whole number of cells; by default the attribute
+        Spacing of the nodes at which the horizon is computed, a whole number of cells; by default the attribute
         ``source_resolution`` of ``dem``, else 30 m. [m]
     beside : xarray.DataArray, dims (y, x), optional
-        An elevation model that ``dem`` lies around. A lazy result then has a chunk for each of its, one if it is not
-        lazy.
+        Elevation model inside ``dem``. A lazy result then has the same number of chunks, or one if this model is in
+        memory.
 
     Returns
     -------
     horizon : xarray.DataArray, dims (direction, y, x)
-        Zenith angle; its places are cells of ``dem``, the same in every window. [degree]
+        Zenith angle of the horizon. The nodes are cells of ``dem``, the same in every window. [degree]
 
     Raises
     ------
     ValueError
-        As in `slope`; or if directions or reach are too few or short.
+        As in `slope`; or if `directions` or `reach` is too small.
 
     See Also
     --------

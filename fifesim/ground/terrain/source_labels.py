@@ -32,7 +32,7 @@ LAND_ELEVATIONS = (-500, 9000)
 # Elevations of exactly 0 among others that are all farther from it may be voids. [m]
 _CLIFF = 50.0
 
-# Larger windows need several GB of memory with the arrays made from them. [cell]
+# Larger windows and the arrays derived from them need several GB of memory. [cell]
 _MOST_CELLS = 2**27
 
 
@@ -47,7 +47,7 @@ class ByWindow:
         return np.asarray(self._cells[window])
 
     def __dask_tokenize__(self):
-        # A token of its cells would read them all.
+        # A token of the cells would read all of them.
         return self._token
 
 
@@ -339,9 +339,9 @@ class Model:
         parts = zip((rows, columns), self.blocks, self.fill, self.source.shape, strict=True)
         for positions, count, fill, size in parts:
             low, high = ((edge + 0.5) / count - 0.5 for edge in (positions.min(), positions.max()))
-            # A hole, and the cells around it that shape what fills it, must be seen whole.
+            # A gap must be read completely, with the surrounding cells that determine its values.
             around = spline.SPLINE_MARGIN + int(np.ceil((2 * fill + 6) / count) if fill else 0)
-            # Beyond its margin the model says nothing.
+            # The model is unknown beyond its margin.
             first = max(int(np.floor(low)) - 2, -around) - around
             last = min(int(np.floor(high)) + 4, -(-size // count) + around) + around
             found.append((first * count, max(last - first, 0) * count))

@@ -3,10 +3,10 @@
 import numpy as np
 from numba import njit
 
-# Of the slopes by which water parts among lower neighbours, Freeman (1991).
+# Exponent of the slope for the division of water among lower neighbours, Freeman (1991).
 EXPONENT = 1.1
 
-# What holds no fall is taken to fall by so much, in metres a metre: a plain is wet, and not infinitely so.
+# Minimum slope, so that wetness is finite on level ground. [m m-1]
 LEAST_SLOPE = 1e-3
 
 # Pits are filled so that each cell lies so much above that which it drains to. [m a node]

@@ -13,10 +13,10 @@ from fifesim.output.colours import NO_DATA, colours_of, dark_and_bright, percent
 from fifesim.output.maps import false_colour_names
 from fifesim.scenario.chips import is_of_a_landscape
 
-# Of each part of the split.
+# Chips per part of the split on the contact sheet.
 _SHOWN = 4
 
-# Rows of truth at most, in the order of the table of quantities.
+# Maximum number of truth rows, in the order of the table of quantities.
 _ROWS = 3
 
 
@@ -146,7 +146,7 @@ def _drawn(chips, key):
     column, attributes = chips.columns[key], key.attributes
     row = {"name": key.name, "meaning": attributes["long_name"], "unit": attributes.get("units", "")}
     distribution = chips.study.drawn.get(key)
-    row["distribution"] = distribution.in_words if distribution else "one after the other"
+    row["distribution"] = distribution.in_words if distribution else "in sequence"
     row["of"] = "landscape" if is_of_a_landscape(key) else "chip"
     numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in column)
     found = (min(column), sum(column) / len(column), max(column)) if numbers else ("", "", "")

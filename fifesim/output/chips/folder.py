@@ -1,4 +1,4 @@
-"""A dataset: the chips of a study written into a folder shard by shard, which can be interrupted and resumed."""
+"""Dataset of the chips of a study, written shard by shard, which can be interrupted and resumed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from fifesim.scenario.studies import Study, StudyLike, read_study
 _FILES = DATASHEET, CONTACT_SHEET, STUDY = "datasheet.html", "contact_sheet.png", "study.toml"
 
 WHOLE = (*_FILES, store.ROOT)
-"""Files by which a dataset is known to be whole."""
+"""Files that mark a dataset as complete."""
 
 # Name under which the checksums of written shards are saved.
 _SAVED = "chips"
@@ -48,45 +48,45 @@ def dataset(
     client: Annotated[Any, Kind("a distributed.Client", lambda client: is_a(client, "Client"))] = None,
 ) -> xr.Dataset:
     """
-    Make a training set: chips of a study in a folder, as sharded Zarr.
+    Create a training set: images and truth of the chips of a study, as sharded Zarr.
 
     Parameters
     ----------
     study : str, path or fifesim.Study
     folder : str or path
-        Made where it does not exist; a Zarr store, with datasheet.html, contact_sheet.png and study.toml in it.
+        Folder for the Zarr store, datasheet.html, contact_sheet.png and study.toml. It is created if needed.
     n : int, optional
-        Chips.
+        Number of chips.
     overwrite : bool, optional
-        Replace an earlier dataset where the folder holds one.
+        Replace an existing dataset in the folder.
     resume : bool, optional
-        Go on with an interrupted run of the same study in this folder, or begin if there is none. Nothing is made if
-        the dataset is finished.
+        Resume an interrupted run of the same study in this folder, or start one. Nothing is done if the dataset is
+        complete.
     workers : int, optional
-        Make chips in so many processes of this machine. In a script, call it below ``if __name__ == "__main__":``, as
-        the processes import it.
+        Number of worker processes on this machine. In a script, call the function below ``if __name__ == "__main__":``,
+        because the processes import the script.
     client : distributed.Client, optional
-        Make shards on the workers of a cluster, by default on those of the current client where there is one.
+        Client of a cluster; by default the current client, if any.
 
     Returns
     -------
     dataset : xarray.Dataset
-        Lazy. Along ``chip``: digital numbers ``dn``, ``toa_reflectance`` and ``ndvi`` of the image, ``lai``, ``fpar``
-        and all else that is true of the ground of its pixels, and as coordinates what was drawn, ``landscape`` and
+        Lazy, along ``chip``: digital numbers ``dn``, ``toa_reflectance`` and ``ndvi`` of the image; ``lai``, ``fpar``
+        and other true ground properties of the pixels; and as coordinates the drawn values, ``landscape`` and
         ``split``.
 
     Raises
     ------
     ValueError
-        If the study is not possible, the folder holds something else, or both workers and a client are given. Nothing
-        is written then.
+        If the study is invalid, the folder has other contents, or both workers and a client are given. Nothing is
+        written in this case.
     OSError
-        If a file cannot be read or written. Shards that are finished are kept.
+        If a file cannot be read or written. Finished shards are kept.
 
     Notes
     -----
-    Chip k is `fifesim.simulate` of ``fifesim.chips_of(study, n).scenario(k)``, to the bit, whatever makes it; truth and
-    reflectance are kept in single precision.
+    Chip k is identical to `fifesim.simulate` of ``fifesim.chips_of(study, n).scenario(k)``, for any number of workers.
+    Truth and reflectance are stored in single precision.
 
     Examples
     --------
@@ -96,9 +96,9 @@ def dataset(
     """
     study = study if isinstance(study, Study) else read_study(study)
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
-        raise ValueError(f"workers must be a whole number of processes from 1 up, got {described(workers)}")
+        raise ValueError(f"workers must be an integer of at least 1, got {described(workers)}")
     if workers > 1 and client is not None:
-        raise ValueError("workers starts processes and client is of a cluster that runs: give one of them")
+        raise ValueError("workers starts processes and client uses a running cluster: give one of them")
     dataset_to_folder(study, folder, n, overwrite=overwrite, resume=resume, workers=workers, client=client)
     return xr.open_zarr(folder)
 
@@ -117,7 +117,7 @@ def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, wo
         _look_at(chips)
         _warn_of_empty_parts(chips)
         layout = store.layout_of(chips)
-        # The root makes the folder a store: it comes last.
+        # The root marks the folder as a store and is therefore moved last.
         names = [*store.stored_names(chips, layout), *_FILES, store.ROOT]
         earlier = folder.iterdir() if folder.is_dir() and (overwrite or resume) else ()
         # Arrays of an earlier dataset that the new one does not have.
@@ -150,7 +150,7 @@ def _make(chips, layout, folder, as_json, makers):
         if path.is_file():
             path.unlink()
     rows, columns = study.scenario.geobox().shape
-    # Chips of all landscapes that fill one tile of each field are made fastest together.
+    # It is fastest to make all chips from one tile of each landscape together.
     together = max(FIELD_TILE // rows, 1) * max(FIELD_TILE // columns, 1) * study.landscapes
     shards = store.Shards(len(chips), layout.size, together)
     store.make_store(folder, chips, layout, shards)
@@ -185,7 +185,7 @@ def _look_at(chips):
     try:
         scenario.geobox()
     except ValueError as error:
-        raise ValueError(f"chip {last}: {error}; with more landscapes chips lie nearer to each other") from None
+        raise ValueError(f"chip {last}: {error}; use more landscapes, so that chips are closer together") from None
 
 
 def _warn_of_empty_parts(chips):
@@ -193,8 +193,8 @@ def _warn_of_empty_parts(chips):
     empty, count = sorted(set(chips.study.split) - set(chips.split)), chips.study.landscapes
     if empty:
         warn(
-            f"no chip for {' and '.join(empty)}: {len(chips)} chips lie in as many of {count} landscapes, and each "
-            f"of these belongs to one part of the split. Make {count} chips or more (-n), or give fewer landscapes"
+            f"no chip for {' and '.join(empty)}: {len(chips)} chips are in as many of {count} landscapes, and each "
+            f"landscape belongs to one part of the split. Make {count} chips or more (-n), or use fewer landscapes"
         )
 
 

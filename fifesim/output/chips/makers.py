@@ -25,7 +25,7 @@ _FORKS = "forkserver" in multiprocessing.get_all_start_methods()
 if _FORKS:
     from multiprocessing import forkserver, resource_tracker
 
-# Number of groups of landscapes, whose chips are made together, for each process.
+# Groups of landscapes per process, whose chips are made together.
 _GROUPS = 4
 
 # Number of shards for which the hills around a landscape are made once, because they take longer than many chips.
@@ -51,7 +51,7 @@ def processes(number):
     context = multiprocessing.get_context("forkserver" if _FORKS else "spawn")
     if _FORKS:
         context.set_forkserver_preload([__name__])
-        # The tracker ignores Ctrl-C by itself, but lets it in again here.
+        # The tracker ignores Ctrl-C, but restores the handler here.
         resource_tracker.ensure_running()
         with interrupts_blocked():
             forkserver.ensure_running()
@@ -136,7 +136,7 @@ def _made(makers, chips, jobs, layout):
                 yield working.pop(future), future.result()
     except makers.ended as error:
         raise RuntimeError(
-            f"a process that made chips ended by itself: is there too little memory? What is finished is kept, use "
+            f"a worker process ended unexpectedly, perhaps from lack of memory. Finished chips are kept, use "
             f"--resume ({error})"
         ) from None
 

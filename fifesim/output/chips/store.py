@@ -16,16 +16,16 @@ from fifesim.sensor.response import calibration
 
 _ALONG_BAND = ("band", "wavelength", "gain", "offset", "compression", "solar_irradiance")
 
-# Number of chips whose reflectance is computed at once, in double precision.
+# Number of chips per batch for reflectance in double precision.
 _AT_ONCE = 50
 
-# Seven digits are more than a mean of leaf area has.
+# Seven digits exceed the accuracy of a mean leaf area.
 _FLOAT = np.float32
 
 
 class Layout(NamedTuple):
     """
-    Description that all chips of a study share.
+    Common description of the chips of a study.
 
     Parameters
     ----------
@@ -131,13 +131,13 @@ def _put(found, at, image, truth, layout):
     unknown = set(truth) - set(layout.truth)
     if unknown:
         raise ValueError(
-            f"has a truth that others have not, {', '.join(sorted(unknown))}: draw it for all, or for none"
+            f"has a true property that others lack, {', '.join(sorted(unknown))}: draw it for all chips or for none"
         )
     found["dn"][at] = image["dn"]
     if layout.has_ndvi:
         found["ndvi"][at] = image["ndvi"]
     for name in layout.truth:
-        # Where no leaf is dead, green leaves are all leaves.
+        # Without dead leaves, green leaves are all leaves.
         other = "fpar" if name == "green_fpar" else None
         found[name][at] = truth.get(name, truth.get(other, np.nan))
     for name in LIGHT:
@@ -174,7 +174,7 @@ class Shards:
     size : int
         Size of a chip. [byte]
     together : int
-        Chips that are made fastest together.
+        Number of chips that are made together for speed.
     """
 
     def __init__(self, count, size, together):
@@ -217,7 +217,7 @@ def make_store(folder, chips, layout, shards):
             name,
             shape=(len(chips), *inside),
             dtype=dtype,
-            # One number a chip is no work to read.
+            # One number per chip is fast to read.
             chunks=(shards.chunk if dims else shards.length, *inside),
             shards=(shards.length, *inside) if dims else None,
             compressors=codec,
@@ -226,7 +226,7 @@ def make_store(folder, chips, layout, shards):
             attributes=layout.attributes(name) | ({"_FillValue": 0} if number else {}),
         )
     with warnings.catch_warnings():
-        # All readers of Zarr 3 pass over what they do not know.
+        # Readers of Zarr 3 ignore unknown fields.
         warnings.filterwarnings("ignore", "Consolidated metadata is currently not part")
         zarr.consolidate_metadata(fresh)
     # Complete files replace earlier ones, which are identical, one by one.

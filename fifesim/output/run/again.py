@@ -18,7 +18,7 @@ from fifesim.output.run.identity import PRODUCT, SCENARIO_TAG, VERSIONS
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.toml import named_files, with_folder
 
-# A tag that is longer was not written here. [character]
+# Longer tags were not written by fifesim. [character]
 _LONGEST = 1_000_000
 
 
@@ -29,13 +29,13 @@ class Rerun(NamedTuple):
     Parameters
     ----------
     cells : int
-        Over all bands.
+        Number of cells in all bands.
     differing : int
         Number of differing cells.
     largest : float
-        Difference.
+        Largest difference.
     versions : dict of str to (str, str)
-        Versions with which it was made and versions here, for packages that differ; "none" for a missing one.
+        Versions of differing packages, in the original run and here; "none" if missing.
     """
 
     cells: int
@@ -70,8 +70,8 @@ def read_origin(path):
         tags = source.tags()
     if not {SCENARIO_TAG, PRODUCT, VERSIONS} <= set(tags):
         raise ValueError(
-            f"{file.name} does not say what it was made of: image.tif and truth.tif of fifesim simulate do, from "
-            "version 0.2; for older ones, run the scenario.toml that lies beside them"
+            f"{file.name} has no provenance: image.tif and truth.tif of fifesim simulate have it since "
+            "version 0.2; for older ones, run the scenario.toml in the same folder"
         )
     try:
         product, before = tags[PRODUCT], json.loads(tags[VERSIONS])
@@ -102,9 +102,9 @@ def _check_inputs(values, folder, name):
         there = os.path.normpath(folder / table[key])
         if not os.path.exists(there) and not there.startswith("/vsi"):
             raise ValueError(
-                f"{name} was made of {'.'.join((*place, key))} = {shown(table[key])}, seen from the folder that it lies"
-                f" in, and there is no such file {in_a_line(there, 120)}: rerun it where the run wrote it, or put that "
-                "file there"
+                f"{name} was made from {'.'.join((*place, key))} = {shown(table[key])}, relative to its"
+                f" folder, but {in_a_line(there, 120)} does not exist: rerun it in its original folder, or copy that "
+                "file"
             )
 
 

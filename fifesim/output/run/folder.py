@@ -39,7 +39,7 @@ def run_engine(scenario):
     """Run the engine for the atmosphere of a scenario, whose results are cached."""
     bands = [band.response for band in instrument(scenario.sensor.instrument).select(scenario.sensor.bands)]
     atmosphere, light = scenario.model_atmosphere(), scenario.sun_and_view()
-    # The skylight on the canopy does not depend on the view.
+    # Skylight on the canopy does not depend on the view.
     for vza, raa in ((0.0, 0.0), (light.vza, light.raa)):
         engines.band_terms(atmosphere, bands, light.sza, vza, raa, each=lambda runs: steps(runs, "6S, band by band"))
 
@@ -97,7 +97,7 @@ def simulate_to_folder(
             os.replace(unfinished / f"{SCENE}.partial", unfinished / SCENE)
         LOG.info("simulating %s into %s", grids.in_words(complete.geobox()), folder)
         _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads, as_json)
-        # The function itself: given its name, dask would look for a client, and import what clients need.
+        # The function instead of its name, with which dask would import distributed.
         scheduler = {"scheduler": dask.threaded.get, "num_workers": threads}
         with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}), doing("writing files and report"):
             _write_files(complete, tree, found, unfinished, folder if home is None else home)
@@ -163,7 +163,7 @@ def _write_files(scenario, tree, found, folder, home):
     if "ndvi" in tree["image"]:
         image["ndvi"] = ndvi(saved["image"])
     truth = xr.Dataset({name: saved[name] for name in tree["truth"].data_vars})
-    # Seven digits are more than a mean of leaf area has.
+    # Seven digits exceed the accuracy of a mean leaf area.
     for name, raster in (("image", image["dn"]), ("truth", truth.astype(np.float32))):
         tags = identity.origin_tags(scenario, f"{name}.tif", home)
         write_style(to_geotiff(raster, folder / f"{name}.tif", overwrite=True, tags=tags), overwrite=True)
@@ -177,7 +177,7 @@ def _write_files(scenario, tree, found, folder, home):
     (folder / "quicklook.png").write_bytes(quicklook)
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / identity.SCENARIO).write_text(write_scenario(scenario), encoding="utf-8")
-    stac.write_stac(stac.item(scenario, folder, report.title(scenario)), folder / "item.json")
+    stac.write_stac(stac.item(scenario, folder, report.headline(scenario)), folder / "item.json")
 
 
 def _check_some_data(scenario, image):
@@ -194,14 +194,14 @@ def _fits(image, truth):
     fits, reasons = {}, {}
     for name in VARIABLES if "ndvi" in image else ():
         try:
-            # By row and column, because with its own interval the image has other pixel centres than its truth.
+            # By row and column, because pixel centres of image and truth differ at the native interval.
             fits[name] = regress(*matched(truth[name], image["ndvi"], "index"), pair="index")
         except ValueError as error:
             reasons[name] = str(error)
     return fits, reasons
 
 
-# Side of the piece that is simulated to see how fast this machine is: a few chunks of the field. [cell]
+# Side of the window simulated to estimate the speed: a few chunks of the field. [cell]
 _PIECE = 2016
 
 # Beyond imports and task graph, memory holds chunks at work and chunks that wait for their neighbours. The piece has
@@ -211,7 +211,7 @@ _PIECE = 2016
 _COLUMNS, _WAITING_COLUMNS = 2, 5
 _WAITING, _RIM = 0.25, 0.03
 
-# Twice the difference between processes that do the same: 424 to 431 MiB in a run of 90 x 90 cells. [byte]
+# Twice the variation between equal processes: 424 to 431 MiB in a run of 90 x 90 cells. [byte]
 _SPREAD = 16 * 2**20
 
 # Time of a run relative to computing alone, with waiting for a free thread and writing files. [1]
@@ -254,7 +254,7 @@ def estimate_in_words(found, as_json=False):
         f"tasks    {found['tasks']}\n"
         f"memory   about {format_bytes(found['memory'])} with {found['threads']} threads or workers\n"
         f"disk     at most {format_bytes(found['disk'])} while it runs\n"
-        f"time     about {format_time(found['seconds'])} on this machine as busy as it is now"
+        f"time     about {format_time(found['seconds'])} on this machine at its current load"
     )
 
 
@@ -268,7 +268,7 @@ def _calibrate(scenario, threads):
     """Seconds of a run of a piece in the middle of the scene, its cells, cells per second, and peak memory."""
     piece = _piece(scenario)
     start = time.monotonic()
-    # A piece without data has no files, where the scene may have some.
+    # A window without data writes no files, although the scene may.
     with tempfile.TemporaryDirectory(prefix="fifesim-") as folder, suppress(ValueError):
         simulate_to_folder(piece, Path(folder) / "piece", threads=threads)
     once, used = time.monotonic() - start, [memory()]

@@ -32,7 +32,7 @@ def _beside(path, home):
 
 
 SCENARIO, STATE = "scenario.toml", "run.json"
-"""File of the scenario in the results, and file of what else must be the same in an unfinished run."""
+"""File of the scenario, and file of other properties that must not change in an unfinished run."""
 
 # Input files of this size in all are compared by content if only their change time or inode differ. [byte]
 _COMPARED = 2**30
@@ -132,17 +132,17 @@ def _check_same(unfinished, identity):
         same = {key: kept[key] == state[key] for key in state}
         same["inputs"] = not changed_inputs(kept["inputs"], state["inputs"])
     except (ValueError, KeyError, TypeError):
-        raise NotThisRun(f"{unfinished / STATE} is not what a run writes: begin again with --overwrite") from None
+        raise NotThisRun(f"{unfinished / STATE} is invalid: start again with --overwrite") from None
     if _keys(begun) != _keys(identity[BEGUN]):
         raise NotThisRun(
-            f"the run to resume is of another scenario, with {_other_lines(begun, identity[BEGUN])}: "
-            "leave out SCENARIO to go on with that one, or begin again with --overwrite"
+            f"the unfinished run has another scenario, with {_other_lines(begun, identity[BEGUN])}: "
+            "leave out SCENARIO to continue it, or start again with --overwrite"
         )
     reasons = {
-        "versions": "was begun with other versions of its packages: begin again with --overwrite",
-        "inputs": "was begun with an input file that has changed: begin again with --overwrite",
-        "scene": "was begun with --scene or without it: give it as it was",
-        "chips": f"was begun with {kept.get('chips')} chips: give it as it was",
+        "versions": "was started with other package versions: start again with --overwrite",
+        "inputs": "was started with an input file that has changed: start again with --overwrite",
+        "scene": "was started with another setting of --scene: use the same",
+        "chips": f"was started with {kept.get('chips')} chips: use the same number",
     }
     for key in state:
         if not same[key]:
@@ -164,8 +164,7 @@ def check_inputs(before, now):
     """Raise ValueError if input files changed while they were read."""
     if changed := changed_inputs(before, now):
         raise ValueError(
-            f"{changed[0]} changed while it was read, so that nothing of this run is kept: "
-            "begin again when the file is whole"
+            f"{changed[0]} changed while it was read, so this run is discarded: start again when the file is complete"
         )
 
 
@@ -173,10 +172,8 @@ def check_finished(path, old, new, inputs):
     """Raise ValueError if a finished run is not the requested one."""
     cure = "name another folder with -o, or run it again with --overwrite"
     if old != new:
-        raise ValueError(
-            f"{path.parent} holds the finished run of another scenario, with {_other_lines(old, new)}: {cure}"
-        )
+        raise ValueError(f"{path.parent} has a finished run of another scenario, with {_other_lines(old, new)}: {cure}")
     written = path.stat().st_mtime_ns
     for name, (_, modified, changed, *_) in inputs.items():
         if max(modified, changed) > written:
-            raise ValueError(f"{path.parent} holds a finished run that is older than its input {name}: {cure}")
+            raise ValueError(f"{path.parent} has a finished run that is older than its input {name}: {cure}")

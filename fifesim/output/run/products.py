@@ -27,7 +27,7 @@ _DETAIL = 16
 # The report shows terrain over this many pixels across at most, in the middle. [pixel]
 _TERRAIN = 512
 
-# Side of a chunk of a scene product, which is a file. [cell]
+# Side of a chunk of a scene product; each chunk is a file. [cell]
 _SIDE = 1008
 
 
@@ -160,7 +160,7 @@ def save_block(folder, name, index, block):
     path = _path(folder, name, index)
     path.parent.mkdir(parents=True, exist_ok=True)
     partial_path = path.with_suffix(".partial")
-    # numpy would not say why a file cannot be written.
+    # numpy does not report why a file cannot be written.
     content = io.BytesIO()
     np.save(content, block)
     with content.getbuffer() as whole:
@@ -222,7 +222,7 @@ def _load(path):
     """Load a block and check its checksum."""
     content = Path(path).read_bytes()
     if _checksum(content[:-_CHECKSUM]) != content[-_CHECKSUM:]:
-        raise OSError(f"{path} is not what was written: a run with --resume makes it again")
+        raise OSError(f"{path} has changed since it was written: run with --resume to make it again")
     return np.load(io.BytesIO(content), allow_pickle=False)
 
 

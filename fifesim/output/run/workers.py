@@ -106,7 +106,7 @@ def cluster(workers=None, scheduler=None):
     if workers is not None and workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
     if workers is None and scheduler is None:
-        # Given a name or nothing, dask would look for a client, and import what clients need.
+        # With a name or None, dask would import distributed.
         with dask.config.set(scheduler=dask.config.get("scheduler", dask.threaded.get)):
             yield None
         return
@@ -171,9 +171,9 @@ def run_on_client(graph, outputs, deliver, client):
             deliver(*outputs[futures.pop(future)], result)
             future.release()
     except KilledWorker as error:
-        raise RuntimeError(f"{error}: has a worker too little memory? What is finished is kept, use --resume") from None
+        raise RuntimeError(f"{error}: a worker may lack memory. Finished blocks are kept, use --resume") from None
     finally:
-        # No task goes on after an error.
+        # Cancel all tasks after an error.
         client.cancel(list(futures), force=True)
 
 
@@ -199,12 +199,12 @@ def _in_pieces(graph, outputs, deliver):
 
 def _needed(key, dependencies, made):
     """A task and all of its dependencies that are not computed yet."""
-    needed, asked = set(), [key]
-    while asked:
-        each = asked.pop()
+    needed, pending = set(), [key]
+    while pending:
+        each = pending.pop()
         if each not in made and each not in needed:
             needed.add(each)
-            asked += dependencies[each]
+            pending += dependencies[each]
     return needed
 
 

@@ -80,14 +80,14 @@ def lookup(name, known, kind):
     raise ValueError(f"unknown {kind} {name!r}: {hint}There are {', '.join(names)}")
 
 
-# What agencies write before the number of a band.
+# Prefixes of band numbers used by agencies.
 _PREFIXES = {"", "b", "band", "srb", "surreflb"}
 
 
 def band_called(name, instrument):
     """Band of an instrument by its name, its number, or a common name such as ``red``; None if there is none."""
     wanted = key(str(name))
-    # A common name may end in what looks like a number of a band: nir08.
+    # A common name may end like a band number: nir08.
     if wanted in COMMON_NAMES:
         found = nearest_band([band.wavelength for band in instrument.bands], COMMON_NAMES[wanted])
         return None if found is None else instrument.bands[found]
@@ -117,7 +117,7 @@ def false_colour_bands(instrument):
     return pair if green == red else (beside[green], *pair)
 
 
-# Keys whose value has several forms: what follows them in the place of an error is the form's name.
+# Keys with several types of values. In the location of an error, they are followed by the name of the type.
 _FORMS = ("srf", "lsf", "interval", "ifov")
 
 

@@ -344,7 +344,7 @@ class Instrument:
     product : Product, optional
         Scale of the agency's product.
     not_found : dict, optional
-        What is left out of ``noise`` and ``blur``, and who published it.
+        Parts missing in ``noise`` and ``blur``, with their publisher.
     aliases : tuple of str, optional
         Other names.
 
@@ -574,7 +574,7 @@ class Instrument:
         Returns
         -------
         bands : tuple of InstrumentBand
-            In the order asked for.
+            In the requested order.
 
         Raises
         ------
@@ -606,7 +606,7 @@ class Instrument:
         Returns
         -------
         bands : (InstrumentBand, InstrumentBand)
-            Of the finest grid that has both.
+            Bands on the finest grid that has both.
 
         Raises
         ------

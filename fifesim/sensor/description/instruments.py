@@ -31,7 +31,7 @@ from fifesim.sensor.description.plausibility import check_instrument_units
 from fifesim.sensor.description.short_file import completed
 from fifesim.sensor.description.spatial_response import with_response
 
-# What a misspelt key may be; those of short files among them.
+# Keys that are suggested for misspelt ones, including keys of short files.
 _KEYS = {key.name for kind in (Instrument, InstrumentBand, Noise, Product, Scan, ScanZone) for key in fields(kind)}
 _KEYS |= {"center", "width", "shape", "snr", "snr_radiance", "snr_shot"}
 

@@ -97,7 +97,7 @@ def blur_in_words(instrument, bands):
     text = f"modulation transfer at the Nyquist frequency {', '.join(transfers)}"
     unknown = [band.name for band in chosen if not knows_blur(instrument, band)]
     if unknown:
-        text += f"; of {', '.join(unknown)} the detector alone is known: the image is sharper than the instrument's"
+        text += f"; only the detector of {', '.join(unknown)} is known, so the image is too sharp"
         text += _published(instrument, "blur")
     alone = {band.name: text for band in chosen for text in _detector(instrument, band)}
     if alone:
@@ -123,11 +123,11 @@ def _detector(instrument, band):
 def noise_in_words(instrument, bands, kinds=()):
     """Noise added to some bands, or its absence, in one line."""
     if kinds:
-        return "all kinds that are described" if tuple(kinds) == (ALL,) else ", ".join(kinds)
+        return "all known components" if tuple(kinds) == (ALL,) else ", ".join(kinds)
     unknown = [band.name for band in instrument.select(bands) if band.noise is None]
     if not unknown:
-        return "none is added"
-    return f"none is added; that of {', '.join(unknown)} is not known{_published(instrument, 'noise')}"
+        return "none"
+    return f"none; the noise of {', '.join(unknown)} is unknown{_published(instrument, 'noise')}"
 
 
 def _published(instrument, quantity):

@@ -65,7 +65,7 @@ def check_same_grid(layer, other):
     if not grids.same_grid(one, two):
         names = " and ".join(os.path.basename(each.name) for each in (layer, other))
         raise ValueError(
-            f"{names} lie on different grids, {grids.in_words(one)} and {grids.in_words(two)}: "
+            f"{names} have different grids, {grids.in_words(one)} and {grids.in_words(two)}: "
             "open them one at a time with bands="
         )
 
@@ -110,7 +110,7 @@ _CURE = (
 # instruments of this package have 0.24 to 2.7.
 _DIMMEST, _BRIGHTEST = 0.02, 20.0
 
-# The digital number of saturated pixels; None where no number marks them.
+# Digital number of saturated pixels; None if there is none.
 Saturation: TypeAlias = Annotated[
     int | Literal["largest"] | None,
     Kind(
@@ -132,21 +132,21 @@ def calibrate(
     saturated: Saturation = "largest",
 ) -> xr.DataArray:
     """
-    Make an image of digital numbers, with calibration, wavelengths and sun, in the form that `sense` gives.
+    Create an image from digital numbers, with calibration, wavelengths and sun as from `sense`.
 
     Parameters
     ----------
     dn : xarray.DataArray of whole numbers, dims ([band], y, x)
-        Has a coordinate ``band`` of the instrument's names, or ``wavelength`` [um]. NaN is no data. [1]
+        Digital numbers with a coordinate ``band`` of band names, or ``wavelength`` [um]. NaN is no data. [1]
     instrument : str or Instrument
     time : str or datetime, optional
-        Time of the image, UTC without a time zone. The sun is that over the middle of the grid, and the view is from
-        nadir. By default the raster's coordinate ``time``.
+        Time of the image, in UTC unless it has a time zone; by default the coordinate ``time``. The sun is computed for
+        the grid centre; the view is nadir.
     geometry : Geometry or xarray.Dataset, optional
-        Sun and view, which replace the sun of the time. Without both, the raster's coordinates count.
+        Directions of sun and sensor, instead of ``time``; by default from the coordinates.
     gain, offset : float, sequence over the bands, or mapping of band name to float, optional
         Radiance of one count, and of digital number 0: RADIANCE_MULT and RADIANCE_ADD of Landsat's metadata. By default
-        those of the instrument's description, with its scale of square roots if it has one. [W m-2 sr-1 um-1]
+        from the description of the instrument, including a square-root scale. [W m-2 sr-1 um-1]
     nodata : int, optional
         Digital number of no data.
     saturated : int, "largest" or None, optional
@@ -163,10 +163,10 @@ def calibrate(
     Raises
     ------
     ValueError
-        If the bands, the sun, or one of gain and offset are unknown, gain and offset are not those of radiance in W m-2
-        sr-1 um-1, or the instrument cannot record a number. On lazy data, numbers are checked when they compute.
+        If the bands, the sun, gain or offset are unknown, gain and offset are implausible for W m-2 sr-1 um-1, or a
+        number is out of range. Lazy data are checked when they are computed.
     TypeError
-        If `dn` is no DataArray.
+        If `dn` is not a DataArray.
 
     See Also
     --------
@@ -174,7 +174,7 @@ def calibrate(
 
     Examples
     --------
-    Counts of an image that has lost its calibration:
+    Restore the calibration of an image:
 
     >>> import fifesim
     >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))

@@ -20,7 +20,7 @@ from fifesim.sensor.products.landsat import read_scene
 from fifesim.sensor.products.metadata import check_irradiance
 from fifesim.sensor.response.calibration import hundredths
 
-# Bit of QA_PIXEL where there are no data.
+# Bit of QA_PIXEL for no data.
 _FILL = 1
 
 _QUALITY = {"long_name": "QA_PIXEL, quality of the pixel by bits", "units": "1"}
@@ -50,32 +50,32 @@ def open_landsat(
         ``["red", "nir"]``. By default all bands that show the ground at the common pixel size, 30 m (MSS: 60 m). The
         panchromatic band has its own grid, and OLI's cirrus band shows no ground. Thermal bands are not read.
     angles : "centre" or "pixel", optional
-        Sun and view of the scene centre, which every step takes. The view is from nadir; for a scene that was acquired
-        off nadir, it follows from ROLL_ANGLE. With "pixel", angles by pixel from the files ``*_SZA.TIF``,
-        ``*_SAA.TIF``, ``*_VZA.TIF`` and ``*_VAA.TIF`` of Level 1: over a scene the solar zenith angle differs by some
-        two degrees, and the view zenith angle reaches 7.5 degrees at the sides.
+        "centre" uses sun and view of the scene centre, which all steps support. The view is from nadir; for a scene
+        that was acquired off nadir, it follows from ROLL_ANGLE. With "pixel", angles by pixel from the files
+        ``*_SZA.TIF``, ``*_SAA.TIF``, ``*_VZA.TIF`` and ``*_VAA.TIF`` of Level 1: over a scene the solar zenith angle
+        differs by some two degrees, and the view zenith angle reaches 7.5 degrees at the sides.
     quality : bool, optional
         Read QA_PIXEL as coordinate ``quality`` over (y, x), and remove pixels that QA_RADSAT marks as saturated. With
-        False, the two files need not be there.
+        False, the two files are not needed.
     chunks : mapping or int or "auto", optional
         Chunks of the lazy image; "auto" means 2048 x 2048 pixels of a band. None reads everything at once.
     instrument : str or Instrument, optional
-        Instrument whose spectral responses the bands have, instead of the spacecraft's.
+        Instrument that defines the spectral responses, instead of the spacecraft.
 
     Returns
     -------
     reflectance : xarray.DataArray of float32, dims (band, y, x)
-        NaN where there are no data (digital number 0), and where a band is saturated: by QA_RADSAT, or at the largest
-        digital number. Coordinates ``wavelength`` and ``solar_irradiance`` along band, ``time``, ``sza``, ``saa``,
-        ``vza``, ``vaa``, ``earth_sun_distance`` and ``quality``. [1]
+        NaN for no data (digital number 0) and for saturated pixels, by QA_RADSAT or the largest digital number.
+        Coordinates ``wavelength`` and ``solar_irradiance`` along band, ``time``, ``sza``, ``saa``, ``vza``, ``vaa``,
+        ``earth_sun_distance`` and ``quality``. [1]
 
     Raises
     ------
     ValueError
-        If the product is of another collection or spacecraft, was taken at night, a file is missing or no raster, or
-        the metadata contradict themselves: repeated keys; a scale that does not give REFLECTANCE_MINIMUM and _MAXIMUM
-        of the same file within 0.05 %; a sun that is 2 degrees away from its position at that time and place; an
-        Earth-Sun distance of another date; a date before the launch or in the future.
+        If the product is of another collection or spacecraft, was taken at night, a file is missing or not a raster, or
+        the metadata are inconsistent: repeated keys; a scale that does not give REFLECTANCE_MINIMUM and _MAXIMUM of the
+        same file within 0.05 %; a sun that is 2 degrees away from its position at that time and place; an Earth-Sun
+        distance of another date; a date before the launch or in the future.
 
     Notes
     -----
@@ -110,7 +110,7 @@ def open_landsat(
     there = [band.name for band in scene.bands if (folder / band.file).exists()]
     cure = f"fetch it, or open those that are there with bands={there}" if there else "is the product unpacked there?"
     layers = [open_layer(folder, band.file, sizes, cure) for band in selected]
-    # The panchromatic band's pixels are not parts of those of the other files.
+    # The pixels of the panchromatic band are not aligned with the other files.
     beside = quality and all(band.flag for band in selected)
     mask, flags = _quality(scene, folder, sizes, layers[0]) if beside else (None, None)
     geometry = _geometry(scene, folder, sizes, angles, layers[0])

@@ -53,49 +53,49 @@ def open_sentinel2(
     """
     Open a Sentinel-2 product: Level-1C as reflectance at the top of the atmosphere, Level-2A of the surface.
 
-    Sentinel-2A and -2B, of one tile, of processing baselines before and since 04.00, which brought offsets: they are
-    those of the metadata.
+    Supports single tiles of Sentinel-2A and -2B, with processing baselines before and since 04.00. Offsets are taken
+    from the metadata.
 
     Parameters
     ----------
     path : str or path
-        Of the unpacked ``.SAFE`` folder, or of its ``MTD_MSIL1C.xml`` or ``MTD_MSIL2A.xml``.
+        Unpacked ``.SAFE`` folder, or its metadata file ``MTD_MSIL1C.xml`` or ``MTD_MSIL2A.xml``.
     resolution : 10, 20 or 60, optional
-        Size of the pixels. Level-1C has each band at its own size, and those of 10 are opened by default; Level-2A has
-        all but the broad near infrared one at 20, which is its default. [m]
+        Pixel size. In Level-1C each band has one size, and the default is 10. The default of Level-2A is 20, which has
+        all bands except the broad near infrared band. [m]
     bands : str or sequence of str, optional
-        Such as ``["MSI4", "MSI8"]``, ``["B04", "B08"]`` or ``["red", "nir"]``; by default all of that size but the
-        cirrus band.
+        Band names, such as ``["MSI4", "MSI8"]``, ``["B04", "B08"]`` or ``["red", "nir"]``; by default all of this size
+        except the cirrus band.
     angles : "centre" or "pixel", optional
-        Mean sun and view of the tile, which every step takes; the view is the mean of the bands. A mean sun of NaN,
-        which tiles next to the antimeridian have, is replaced by the mean of the grid. With "pixel", angles by pixel,
-        interpolated between the nodes of the metadata's grids of 5 km; the view is the mean of bands and detectors.
+        "centre" uses mean sun and view of the tile, which all steps support; the view is the mean of the bands. A mean
+        sun of NaN, as in tiles at the antimeridian, is replaced by the mean of the grid. "pixel" interpolates the 5 km
+        grids of the metadata; the view is the mean of bands and detectors.
     quality : bool, optional
-        Whether with a coordinate ``quality`` over (y, x): the scene classification of Level-2A, for 10 m that of 20 m;
-        of Level-1C since baseline 04.00 its masks of 60 m, bit 1 for opaque clouds, 2 for cirrus, 4 for snow.
+        Read a coordinate ``quality`` over (y, x): the scene classification of Level-2A (at 20 m for 10 m bands), or the
+        60 m masks of Level-1C since baseline 04.00, with values 1 for opaque clouds, 2 for cirrus and 4 for snow.
     chunks : mapping or int or "auto", optional
-        The image is lazy; "auto" are 2048 x 2048 pixels of a band. None reads all of it at once.
+        Chunks of the lazy image; "auto" means 2048 x 2048 pixels of a band. None reads everything at once.
     instrument : str or Instrument, optional
-        Whose responses the bands have, instead of the spacecraft's; of Sentinel-2C none were found, and "MSI-C" takes
-        those of Sentinel-2A.
+        Instrument that defines the spectral responses, instead of the spacecraft. No responses were found for
+        Sentinel-2C; "MSI-C" uses the responses of Sentinel-2A.
 
     Returns
     -------
     reflectance : xarray.DataArray of float32, dims (band, y, x)
-        NaN where there are no data (digital number 0), and where a band is saturated (65535). Coordinates as
-        `fifesim.open_landsat` has them; the Earth-Sun distance is that of the product's own conversion. [1]
+        NaN for no data (digital number 0) and saturated pixels (65535). Coordinates as in `fifesim.open_landsat`; the
+        Earth-Sun distance is the value used in the product. [1]
 
     Raises
     ------
     ValueError
-        If the product is of another level or spacecraft, has the layout of the AWS buckets, holds more than one tile,
-        has no such band at the resolution, a file is missing or no raster, or the metadata contradict themselves: keys
-        repeated with different values; a scale that leaves -0.25 to 10 or does not reach a reflectance of 1; a sun that
-        is 2 degrees away from its position at that time and place; a date before the launch or in the future.
+        If the product has another level, spacecraft or layout (AWS buckets) or several tiles, a band is not available
+        at the resolution, a file is missing or not a raster, or the metadata are inconsistent: keys repeated with
+        different values; a scale that leaves -0.25 to 10 or does not reach a reflectance of 1; a sun that is 2 degrees
+        away from its position at that time and place; a date before the launch or in the future.
 
     Notes
     -----
-    Of Level-2A keep clear land with ``scene.where(scene.quality.isin([4, 5]))``, of Level-1C what is clear with
+    To keep clear land in Level-2A, use ``scene.where(scene.quality.isin([4, 5]))``. To remove clouds in Level-1C, use
     ``scene.where(scene.quality & 0b11 == 0)``.
 
     References
@@ -120,7 +120,7 @@ def open_sentinel2(
     if product.instrument is None and instrument is None:
         raise ValueError(
             f"the product is of {product.spacecraft}, whose responses fifesim does not have: give instrument='MSI-C', "
-            "which takes those of Sentinel-2A, 'MSI', 'MSI-B' or your own"
+            "which uses the responses of Sentinel-2A, 'MSI', 'MSI-B' or an instrument file"
         )
     description = find_instrument(product.instrument if instrument is None else instrument)
     if resolution is None:
@@ -160,15 +160,15 @@ def _selected(product, description, resolution, names):
             raise ValueError(f"{product.product} has no band of {resolution} m")
         return found
     names = [names] if isinstance(names, str) else [str(name) for name in names]
-    asked = [band.name for band in description.select(names)]
-    for name in asked:
+    requested = [band.name for band in description.select(names)]
+    for name in requested:
         if name not in known:
             sizes = [f"{size} m" for size, bands in product.bands.items() if name in {band.name for band in bands}]
             raise ValueError(
                 f"{product.product} has no {name} of {resolution} m"
                 + (f": it has it at {' and '.join(sizes)}, give resolution=" if sizes else "")
             )
-    return [known[name] for name in asked]
+    return [known[name] for name in requested]
 
 
 def _geometry(product, tile, bands, angles, beside, sizes):

@@ -21,7 +21,7 @@ ALL = "all"
 # Pixels of a scan line that are drawn together; a line's place in the counter is (0, 0, tile, line).
 _TILE = 1024
 
-# Keeps the streams apart from those of a landscape with the same seed.
+# Separates the random streams from a landscape with the same seed.
 _SENSOR = 2**40
 
 
@@ -48,8 +48,8 @@ class NoiseModel:
     offset_spread : float, optional
         Standard deviation of the detectors' offset. [W m-2 sr-1 um-1]
     along : "columns" or "rows", optional
-        Which pixels a detector sees: those of a row, as in a scanner that sweeps across the track, so that detectors
-        take turns by scan line; or those of a column, as in an array that is pushed along the track.
+        Pixels of a detector: rows for a scanner that sweeps across the track, where detectors alternate by scan line;
+        columns for an array that moves along the track.
 
     Raises
     ------
@@ -86,7 +86,7 @@ class NoiseModel:
         r"""
         The model that has published signal-to-noise ratios.
 
-        Two points decide both terms; one decides only their sum, and ``shot_share`` says how much of its variance is
+        Two points determine both terms; one point determines only their sum, and ``shot_share`` is the fraction that is
         shot noise.
 
         .. math:: b = s \, \frac{\sigma^2(L_1)}{L_1}, \quad \sigma_0^2 = (1 - s) \, \sigma^2(L_1),
@@ -223,7 +223,7 @@ def fixed_pattern(model, seed, band):
 def line_noise(seed, band, line, column, size, epoch=0):
     """Standard normal deviates of a part of a scan line, the same for each pixel in any part, shape (size,)."""
     first, last = column // _TILE, (column + size - 1) // _TILE
-    # Beside that of the fixed pattern, 1.
+    # Skip 1, the stream of the fixed pattern.
     image = epoch + (epoch > 0)
     tiles = [_normals(seed, band, (0, image, tile, line), _TILE) for tile in range(first, last + 1)]
     start = column - first * _TILE

@@ -519,7 +519,7 @@ def _tabulate(parts, truncation):
         # Half of the response at a distance of each sample and closer, the origin counted by half.
         within = step * (np.cumsum(density) - (density[0] + density) / 2)
         beyond = 1 - 2 * within[: 2 * density.size // _CUT]
-        # Lobes: what lies beyond must stay small.
+        # The side lobes beyond must be small.
         small = np.maximum.accumulate(np.abs(beyond)[::-1])[::-1] <= truncation
         if small.any():
             last = max(int(small.argmax()), 1)

@@ -8,7 +8,7 @@ from fifesim.base.bands import solar_spectrum
 
 # A step between samples is a gap from this many times the median of the steps around it, where no widths are known.
 _GAP = 2.5
-# Steps to either side whose median says what is usual.
+# Number of steps to either side whose median is the usual step.
 _AROUND = 2
 
 

@@ -63,7 +63,11 @@ def test_images_are_composed_by_their_ndvi_or_by_what_is_given(stack):
 @pytest.mark.parametrize(
     ("change", "options", "said"),
     [
-        (lambda ndvi: ndvi.fillna(0).astype(np.uint8), {}, r"another sun at each date, take \.fifesim\.to_reflectance"),
+        (
+            lambda ndvi: ndvi.fillna(0).astype(np.uint8),
+            {},
+            r"the sun of each date: convert them with \.fifesim\.to_reflectance",
+        ),
         (lambda ndvi: ndvi.isel(time=0), {}, "images along time, got dimensions"),
         (lambda ndvi: ndvi, {"method": "median"}, "method must be one of maximum-value, got 'median'"),
         (lambda ndvi: ndvi, {"by": xr.DataArray(np.zeros((2, 2, 2)), dims=("time", "y", "x"))}, "dates of the images"),
@@ -80,7 +84,7 @@ def test_what_makes_no_composite_is_refused(stack, change, options, said):
     [
         (lambda by: by.isel(time=[1, 0, 2]), r"other dates than the images, or in another order: .*\.sortby\('time'\)"),
         (lambda by: by.isel(time=[1, 0, 2]).drop_vars(set(by.coords) - {"time"}), "other dates than the images"),
-        (lambda by: by.assign_coords(x=by["x"] + 30.0), "lie on different grids"),
+        (lambda by: by.assign_coords(x=by["x"] + 30.0), "have different grids"),
     ],
 )
 def test_what_decides_has_the_dates_and_cells_of_the_images(stack, change, said):
@@ -125,13 +129,13 @@ def test_a_composite_comes_back_from_netcdf_and_zarr(stack, tmp_path, kind, chun
 
 def test_the_date_of_a_composite_has_its_own_attributes(stack):
     found = fifesim.composite(stack)
-    assert found["date"].attrs == {"long_name": "date of the image that is kept"}
+    assert found["date"].attrs == {"long_name": "date of the selected image"}
     assert found["sza"].attrs["standard_name"] == "solar_zenith_angle" and "history" not in found["sza"].attrs
 
 
 def test_a_composite_with_angles_of_its_cells_goes_to_netcdf_as_the_warning_says(stack, tmp_path):
     found = fifesim.composite(stack)
-    with pytest.warns(UserWarning, match="leaves out sza, .* or write a netCDF with"):
+    with pytest.warns(UserWarning, match="lacks sza, .* or write a netCDF with"):
         again = fifesim.open_image(found.fifesim.to_geotiff(tmp_path / "composite.tif"))
     xr.testing.assert_identical(again, found.drop_vars("sza"))
     found.to_netcdf(tmp_path / "composite.nc")

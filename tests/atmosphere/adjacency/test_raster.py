@@ -280,7 +280,7 @@ def test_cells_are_not_held_until_all_are_known(function):
     [
         (30.0, "surroundings must be reflectances from 0 to 1, got"),
         (float("nan"), "surroundings must be reflectances from 0 to 1, got"),
-        ([0.1, 0.2, 0.3], "surroundings must be one number, or one for each of the 2 bands, got 3"),
+        ([0.1, 0.2, 0.3], "surroundings must be a number, or one for each of the 2 bands, got 3"),
         (raster(np.zeros((9, 9)), 60.0, west=900_000.0), "must lie within 100 km of the scene"),
         (raster(np.zeros((3, 9, 9)), 60.0), "the surroundings have 3 bands, the scene 2"),
         (

@@ -123,9 +123,9 @@ def test_particles_may_absorb_all_or_nothing(albedo):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"visibility": 23}, "must be an aot, from 0 to 2, got visibility=23: type aot=0.2"),
-        ({}, "must be an aot, from 0 to 2, got nothing"),
-        ({"aot": 0.2, "engine": "6S"}, "got '6S'.*type engine='successive-orders'"),
+        ({"visibility": 23}, "must be given as aot, from 0 to 2, got visibility=23: give for example aot=0.2"),
+        ({}, "must be given as aot, from 0 to 2, got nothing"),
+        ({"aot": 0.2, "engine": "6S"}, "got '6S'.*use engine='successive-orders'"),
     ],
 )
 def test_amount_is_an_optical_thickness_and_6s_takes_no_tables(haze, options, message):

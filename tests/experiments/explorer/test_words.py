@@ -15,7 +15,7 @@ def test_every_stage_has_its_words():
 
 def test_sliders_begin_at_the_scenario_and_say_its_values(sweep):
     arp, haze, sza, instrument, registration = page.slider_words(sweep)
-    assert arp["start"] == 0 and "leaves are alike up to 8 m, arp 0.15" in arp["texts"][0]
+    assert arp["start"] == 0 and "leaf area is correlated up to 8 m, arp 0.15" in arp["texts"][0]
     assert haze["marks"] == ["45 km"] and haze["start"] == 0
     assert sza["texts"][0] == "28.5° from overhead"
     assert instrument["marks"] == ["HRV", "TM"]
@@ -25,7 +25,7 @@ def test_sliders_begin_at_the_scenario_and_say_its_values(sweep):
 
 def test_what_cannot_vary_says_so(sweep):
     arp, haze, *_ = page.slider_words(replace(sweep, arps=(None,), hazes=(None,)))
-    assert arp["texts"] == ["as the map has them"] and haze["texts"] == ["without haze"]
+    assert arp["texts"] == ["as in the map"] and haze["texts"] == ["without haze"]
 
 
 def test_haze_is_said_as_it_is_given(small):

@@ -42,10 +42,10 @@ def test_corner_of_the_scenes_is_where_it_is_asked_for():
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"west": 600000.0}, "is not on the site of FIFE"),
+        ({"west": 600000.0}, "is not on the FIFE site"),
         ({"cells": 50}, "at least 90, 10 pixels"),
         ({"dem": "nowhere.tif"}, "a raster file of elevation"),
-        ({"sensor": "SuperDove"}, "smaller than a cell"),
+        ({"sensor": "SuperDove"}, "smaller than a ground cell"),
         ({"sensor": "NOPE"}, "unknown instrument"),
         ({"reading": "mine"}, "must be one of native"),
     ],

@@ -66,7 +66,7 @@ def test_command_writes_tables_figures_scenarios_and_page(prepared, tmp_path):
     # Every reading has a row of R2 and slopes, and the aligned one a column of Table 2.
     assert "Drift or blur?" in page and "slope: native</th>" in page and "aligned</th>" in page
     # The drift is shown together with the passages of the paper that speak against it.
-    assert "The paper's text speaks for aligned pixels: " in page
+    assert "The text of the paper suggests aligned pixels: " in page
     assert all(f"“{passage}” (section {section})" in page for section, passage in PASSAGES.items())
     assert prepared("-o", "out").exit_code == 2
 
@@ -76,9 +76,9 @@ def test_page_says_the_reading_the_inputs_and_what_is_fitted(prepared, tmp_path,
     result = prepared("-o", "own", "--reading", "aligned", "--dem", "flint-hills", *given(folders))
     assert result.exit_code == 0, result.output
     page = re.sub(r"\s+", " ", (tmp_path / "own" / "report.html").read_text())
-    assert "Pixels are read as <em>aligned</em>" in page and "Beside it stands <em>native</em>" in page
+    assert "Table 1 is interpreted as <em>aligned</em>" in page and "also shown for <em>native</em>" in page
     assert "The ground is the synthetic Flint Hills." in page
-    assert "0 of the numbers below were fitted to the 54" in page
+    assert "0 of the values below were fitted to the 54" in page
     assert "given by you" in page and "--reading aligned --dem flint-hills --densities" in page
     (case,) = prepared.asked
     assert case.optics == {"TM3": (0.09, 0.05), "TM4": (0.42, 0.40)} and case.cells == 90

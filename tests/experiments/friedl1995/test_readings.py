@@ -41,7 +41,7 @@ def test_aligned_reading_stands_beside_every_other():
     ("name", "sensor", "said"),
     [
         ("blurred", "TM", "must be one of native, aligned, narrow"),
-        ("narrow", "OLI", "for OLI type native, aligned, offset"),
+        ("narrow", "OLI", "for OLI use native, aligned, offset"),
     ],
 )
 def test_reading_that_there_is_not_is_refused(name, sensor, said):

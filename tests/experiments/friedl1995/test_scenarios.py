@@ -87,5 +87,5 @@ def test_inputs_and_readings_are_in_the_scenario(tmp_path, folders, options):
 
 def test_density_without_a_file_has_no_scenario():
     densities = {name: stats.uniform(0.5, 1.0) for name in friedl1995.treatments()}
-    with pytest.raises(ValueError, match="that of burned-grazed is no file"):
+    with pytest.raises(ValueError, match="the density of burned-grazed is not a file"):
         reproduction.check_named(case_of(densities=densities, cells=90))

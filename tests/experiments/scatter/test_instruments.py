@@ -87,6 +87,6 @@ def test_a_budget_of_an_instrument_from_the_command_line(tmp_path, monkeypatch):
     made = CliRunner().invoke(app, ["budget", "--sensor", "HRV", "-o", "out", "--realisations", "1"])
     assert made.exit_code == 0, made.output
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "of XS2, XS3 the detector alone is known" in page
+    assert "only the detector of XS2, XS3 is known" in page
     both = CliRunner().invoke(app, ["budget", "x.toml", "--sensor", "HRV"])
     assert both.exit_code == 2

@@ -114,7 +114,7 @@ def test_a_chosen_leaf_reaches_the_canopy(lai):
     ("given", "message"),
     [
         ({"soil_dri": 0.6, "dead_grass": 0.4}, "no spectrum 'soil_dri', did you mean 'soil_dry'. There are soil_dry, "),
-        ({"soil_dry": 0.6}, "must add up to 1, got 0.6: what reflects nothing is 'shade'"),
+        ({"soil_dry": 0.6}, "must add up to 1, got 0.6: the part without reflection is 'shade'"),
         ({"soil_dry": 1.5, "shade": -0.5}, r"fraction of 'soil_dry' must be in \[0, 1\], got 1.5"),
         ({"no_such.csv": 1.0}, "cannot read the spectrum no_such.csv"),
     ],

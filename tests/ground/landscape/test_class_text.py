@@ -65,5 +65,5 @@ def test_distribution_of_samples_is_left_out():
 
 @pytest.mark.parametrize("text", ["grass", "[1]", '[{"height": 3}]'])
 def test_other_text_is_refused(text):
-    with pytest.raises(ValueError, match="not as landscape"):
+    with pytest.raises(ValueError, match="class table of the cover is invalid"):
         read_table(text)

@@ -17,7 +17,7 @@ def of_canopy(**fields):
 
 
 def varies(name):
-    return f"class 'wood': {name} is the same in all of a class, got one that varies: give it to landscape"
+    return f"class 'wood': {name} must be uniform within a class, got one that varies: give it to landscape"
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def test_missing_is_no_class():
 @pytest.mark.parametrize("wrong", [-5, 7, 32765])
 def test_other_codes_are_named(dtype, wrong):
     """-5 is 32764 to an index that counts from the end."""
-    with pytest.raises(ValueError, match=rf"codes without a class: {wrong}, in 2 of 3 cells. There are 40, 0, 32764"):
+    with pytest.raises(ValueError, match=rf"codes without a class: {wrong}, in 2 of 3 cells. Classes are 40, 0, 32764"):
         check_codes(np.array([wrong, 40, wrong], dtype), TABLE)
 
 

@@ -68,7 +68,7 @@ def test_a_part_of_the_chips_is_a_slice(chips, layout, arrays):
 
 def test_a_truth_that_others_have_not_names_its_chip(chips, layout):
     without = layout._replace(truth=("lai", "fpar"))
-    with pytest.raises(ValueError, match=r"chip \d: has a truth that others have not, green_fpar"):
+    with pytest.raises(ValueError, match=r"chip \d: has a true property that others lack, green_fpar"):
         chip_arrays(chips, range(0, 7), without)
 
 
@@ -115,5 +115,5 @@ def test_pixels_at_the_edge_are_those_of_a_larger_scene():
     whole = fifesim.simulate(parse_scenario({**SMALL, "grid": larger, "sensor": {"instrument": "L4TM"}}))["image"]["dn"]
     np.testing.assert_array_equal(image, whole.sel(y=image.y, x=image.x, method="nearest", tolerance=0.01))
     periodic = parse_scenario(SMALL | {"ground": {"method": "periodic"}})
-    with pytest.raises(ValueError, match=r"no ground beyond the scene: type method = \"streaming\""):
+    with pytest.raises(ValueError, match=r"no ground beyond the scene: use method = \"streaming\""):
         fifesim.simulate(periodic, complete=True)

@@ -100,7 +100,7 @@ def test_a_stopped_run_goes_on_to_the_same_bits(after, study, whole, tmp_path, m
             dataset_to_folder(study, folder, COUNT)
     assert {path.name for path in folder.iterdir()} == {UNFINISHED}
     assert study_to_resume(folder) == (study, COUNT)
-    with pytest.raises(ValueError, match="holds a run that is not finished"):
+    with pytest.raises(ValueError, match="has an unfinished run"):
         dataset_to_folder(study, folder, COUNT)
     made = stopping(monkeypatch, 100)
     dataset_to_folder(study, folder, COUNT, resume=True)
@@ -156,7 +156,7 @@ def test_nothing_is_left_of_a_run_that_cannot_end_well(study, tmp_path, monkeypa
 
 @pytest.mark.parametrize(
     ("count", "draws", "message"),
-    [(9, DRAWS, "was begun with 7 chips"), (7, {"visibility": {"uniform": [10, 50]}}, "is of another scenario, with")],
+    [(9, DRAWS, "was started with 7 chips"), (7, {"visibility": {"uniform": [10, 50]}}, "has another scenario, with")],
 )
 def test_another_run_is_not_gone_on_with(count, draws, message, study, tmp_path, monkeypatch):
     folder = tmp_path / "chips.zarr"
@@ -223,7 +223,7 @@ def test_what_a_study_cannot_be_is_told_before_anything_is_written(study, tmp_pa
     wide = parse_scenario(SMALL | {"grid": {"width": 30_000.0, "height": 30_000.0}})
     far = fifesim.chips_of(Study(wide, DRAWS, landscapes=1, split={"all": 1.0}), 60_000)
     monkeypatch.setattr(chips_folder, "_LOOKED_AT", 1)
-    with pytest.raises(ValueError, match=r"chip 59999: .*with more landscapes chips lie nearer"):
+    with pytest.raises(ValueError, match=r"chip 59999: .*use more landscapes, so that chips are closer"):
         chips_folder._look_at(far)
     assert list(tmp_path.iterdir()) == []
 
@@ -231,7 +231,7 @@ def test_what_a_study_cannot_be_is_told_before_anything_is_written(study, tmp_pa
 @pytest.mark.parametrize(("count", "none"), [(1, "test and (train|validation)"), (2, "(test|train|validation)")])
 def test_a_part_that_gets_no_chip_is_told(count, none, study):
     chips = fifesim.chips_of(study, count)
-    with pytest.warns(UserWarning, match=rf"no chip for {none}: {count} chips lie in as many of 3 landscapes.*-n"):
+    with pytest.warns(UserWarning, match=rf"no chip for {none}: {count} chips are in as many of 3 landscapes.*-n"):
         chips_folder._warn_of_empty_parts(chips)
 
 
@@ -285,7 +285,7 @@ class Client:
 
 @pytest.mark.parametrize(
     ("workers", "client", "said"),
-    [(0, None, "from 1 up, got 0"), (2.0, None, "from 1 up, got 2.0"), (2, Client(), "give one of them")],
+    [(0, None, "at least 1, got 0"), (2.0, None, "at least 1, got 2.0"), (2, Client(), "give one of them")],
 )
 def test_processes_are_a_number_or_a_cluster(workers, client, said, study, tmp_path):
     with pytest.raises(ValueError, match=said):

@@ -133,14 +133,14 @@ def test_processes_end_at_once_where_nobody_waits_for_them(chips, layout, shards
 def test_a_process_says_what_it_could_not_make(chips, layout, shards):
     other = layout._replace(truth=())
     with (
-        pytest.raises(ValueError, match=r"chip \d: has a truth that others have not, fpar, lai"),
+        pytest.raises(ValueError, match=r"chip \d: has a true property that others lack, fpar, lai"),
         processes(1) as makers,
     ):
         list(made_shards(chips, other, shards, [0, 1, 2], [].append, makers))
 
 
 def test_a_process_that_is_killed_is_told(chips, layout, shards):
-    with pytest.raises(RuntimeError, match="ended by itself: is there too little memory"), processes(1) as makers:
+    with pytest.raises(RuntimeError, match="ended unexpectedly, perhaps from lack of memory"), processes(1) as makers:
         for _ in made_shards(chips, layout, shards, [0, 1, 2], [].append, makers):
             (process,) = multiprocessing.active_children()
             os.kill(process.pid, signal.SIGKILL)

@@ -54,7 +54,7 @@ def test_without_a_green_band_the_image_is_its_ndvi():
     dataset = dataset_of(["TM3", "TM4"], [0.66, 0.84])
     picture = contact_sheet(dataset, ["test"]).axes[0].images[0]
     np.testing.assert_array_equal(picture.get_array(), dataset["ndvi"][0])
-    assert picture.get_cmap().name == "YlGn"
+    assert picture.get_cmap().name == "viridis"
 
 
 def test_a_band_is_stretched_as_in_a_report():

@@ -56,7 +56,7 @@ def test_inputs_move_with_the_file(tmp_path):
     moved = (tmp_path / "one").rename(tmp_path / "two")
     assert rerun(moved / "out" / "image.tif").differing == 0
     (moved / "lai.tif").unlink()
-    with pytest.raises(ValueError, match=r"ground\.lai_file = .*lai\.tif.*no such file"):
+    with pytest.raises(ValueError, match=r"ground\.lai_file = .*lai\.tif.*does not exist"):
         rerun(moved / "out" / "image.tif")
 
 
@@ -72,13 +72,15 @@ def test_an_image_that_left_its_inputs_behind_says_where_they_would_lie(tmp_path
     with pytest.raises(ValueError) as caught:
         rerun(sent)
     said = str(caught.value)
-    assert "ground.lai_file = '../../maps/lai.tif', seen from the folder that it lies in" in said
-    assert f"no such file {tmp_path / 'maps' / 'lai.tif'}: rerun it where the run wrote it" in said and len(said) <= 500
+    assert "ground.lai_file = '../../maps/lai.tif', relative to its folder" in said
+    assert (
+        f"{tmp_path / 'maps' / 'lai.tif'} does not exist: rerun it in its original folder" in said and len(said) <= 500
+    )
 
 
 def test_a_file_without_the_tags_is_refused_with_what_to_do(travelled, tmp_path):
     other = fifesim.to_geotiff(fifesim.open_image(travelled / "image.tif"), tmp_path / "other.tif")
-    with pytest.raises(ValueError, match=r"does not say what it was made of.*scenario\.toml"):
+    with pytest.raises(ValueError, match=r"has no provenance.*scenario\.toml"):
         rerun(other)
 
 

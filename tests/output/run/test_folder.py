@@ -54,7 +54,7 @@ def test_report_gives_the_regressions_of_its_files(folder):
     for name in ("lai", "fpar"):
         fit = fifesim.regress(truth.sel(band=name, drop=True), ndvi)
         assert f"{fit.slope:.4f}" in page
-        assert f"{fit.r2:.4f}" in page
+        assert f"R² = {fit.r2:.3f}" in page
 
 
 def test_report_gives_mean_and_deviation_of_its_files(folder):
@@ -85,17 +85,21 @@ def heading(folder):
 
 def test_report_and_its_title_begin_with_what_is_synthetic(folder):
     title, tag, lines = heading(folder)
-    assert title == tag == "burned-grazed, arp 0.24, seen by TM (synthetic landscape, hypothetical overpass)"
+    seen = "Simulated Landsat-5 Thematic Mapper image, FIFE site, 6 June 1987 16:35 UTC"
+    assert title == tag == f"{seen} (synthetic landscape, hypothetical overpass)"
     said = (folder / "scenario.toml").read_text(encoding="utf-8").splitlines()[0]
     assert said.startswith("# Synthetic landscape: leaf area is synthetic; the ground is level; only")
     assert said.endswith("Hypothetical overpass, 6 June 1987 16:35 UTC.")
-    assert lines[0] == said.removeprefix("# ")
+    assert lines[0] == f"burned-grazed, arp 0.24. {said.removeprefix('# ')}"
     assert json.loads((folder / "item.json").read_text(encoding="utf-8"))["properties"]["title"] == title
 
 
 def test_report_is_self_contained(folder):
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    assert not re.findall(r'src="(?!data:)', page)
+    *local, doi = re.findall(r'href="([^"]*)"', page)
+    assert doi.startswith("https://doi.org/") and all((folder / name).is_file() for name in local)
+    assert {"image.tif", "truth.tif", "scenario.toml"} <= set(local)
     # Image and cells, two lines, three maps, three histograms.
     assert len(re.findall("data:image/(?:png|webp);base64,", page)) == 11
 
@@ -117,8 +121,8 @@ def test_a_single_band_through_its_detector_alone_has_no_ndvi_and_still_a_report
     scenario = parse_scenario(SMALL | {"sensor": {"bands": ["TM5"], "response": "detector"}})
     simulate_to_folder(scenario, tmp_path / "one")
     page = html.unescape((tmp_path / "one" / "report.html").read_text(encoding="utf-8"))
-    assert "What NDVI tells" not in page
-    said = "0.64; of TM5 the detector alone is known: the image is sharper than the instrument's"
+    assert "Leaf area and FPAR from NDVI" not in page
+    said = "0.64; only the detector of TM5 is known, so the image is too sharp"
     assert BLUR.format(said) in page
     assert read_scenario(tmp_path / "one" / "scenario.toml").sensor.response == "detector"
 
@@ -178,7 +182,7 @@ def test_pixels_at_their_own_interval_pair_with_the_truth_by_row_and_column(tmp_
     monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     scenario = parse_scenario(SMALL | {"sensor": {"interval": "native"}, "terrain": {"dem": "flat"}})
     simulate_to_folder(scenario, tmp_path / "own")
-    assert "What NDVI tells" in (tmp_path / "own" / "report.html").read_text(encoding="utf-8")
+    assert "Leaf area and FPAR from NDVI" in (tmp_path / "own" / "report.html").read_text(encoding="utf-8")
 
 
 def lai_map(path, values):
@@ -192,15 +196,16 @@ def test_report_of_a_map_calls_nothing_synthetic(tmp_path):
     own = lai_map(tmp_path / "lai.tif", np.linspace(1, 3, 30)) | {"geometry": {"time": "1987-08-15T16:40Z"}}
     simulate_to_folder(parse_scenario(own), tmp_path / "out")
     title, tag, lines = heading(tmp_path / "out")
-    assert title == tag == "lai.tif, seen by TM"
-    assert lines[0] == "Leaf area is from a file; the ground is level. Time as given, 15 August 1987 16:40 UTC."
+    assert title == tag == "Simulated Landsat-5 Thematic Mapper image, FIFE site, 15 August 1987 16:40 UTC"
+    said = "Leaf area is from a file; the ground is level. Time as given, 15 August 1987 16:40 UTC."
+    assert lines[0] == f"lai.tif. {said}"
 
 
 def test_a_uniform_map_has_no_line_and_still_a_report(tmp_path):
     files = simulate_to_folder(parse_scenario(lai_map(tmp_path / "lai.tif", 2.0)), tmp_path / "out")
     assert all(path.stat().st_size > 0 for path in files)
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "What NDVI tells" not in page and re.search("R² of .*none, all", page, re.DOTALL)
+    assert "Leaf area and FPAR from NDVI" not in page and re.search("R² of .*none, all", page, re.DOTALL)
 
 
 @pytest.mark.parametrize(("values", "offset"), [(2.0, [9.5, 0.0]), (np.nan, [0.0, 0.0])])
@@ -278,6 +283,6 @@ def test_a_run_on_a_map_says_that_tallgrass_is_taken(tmp_path):
     values = np.linspace(0.5, 3, 600).reshape(20, 30)
     scenario = parse_scenario({**SMALL, **lai_map(tmp_path / "lai.tif", values)})
     with pytest.warns(
-        UserWarning, match="grows on lai.tif: FIFE's tallgrass is taken for soil and litter, green leaves"
+        UserWarning, match="vegetation of lai.tif is unknown: using FIFE's tallgrass for soil and litter, green leaves"
     ):
         simulate_to_folder(scenario, tmp_path / "run")

@@ -170,11 +170,11 @@ def test_a_state_that_no_run_wrote_is_named(tmp_path, text):
     identity = identity_of(parse_scenario(SMALL).complete(), False)
     begin(tmp_path, identity)
     (tmp_path / "run.json").write_text(text)
-    with pytest.raises(NotThisRun, match=r"run\.json is not what a run writes.*--overwrite"):
+    with pytest.raises(NotThisRun, match=r"run\.json is invalid.*--overwrite"):
         begin(tmp_path, identity)
 
 
-@pytest.mark.parametrize(("key", "said"), [("versions", "other versions"), ("scene", "--scene or without")])
+@pytest.mark.parametrize(("key", "said"), [("versions", "package versions"), ("scene", "another setting of --scene")])
 def test_another_state_is_not_gone_on_with(tmp_path, key, said):
     identity = identity_of(parse_scenario(SMALL).complete(), False)
     begin(tmp_path, identity)
@@ -195,13 +195,13 @@ def test_a_run_is_gone_on_with_whatever_the_comments_say(tmp_path):
     begin(tmp_path, identity | {BEGUN: rest})
     begin(tmp_path, identity | {BEGUN: f"# Other words.\n{rest}"})
     turned = parse_scenario(values | {"classes": dict(reversed(classes.items()))}).complete()
-    with pytest.raises(NotThisRun, match="of another scenario"):
+    with pytest.raises(NotThisRun, match="has another scenario"):
         begin(tmp_path, identity_of(turned, False))
 
 
 def test_a_time_of_another_run_is_named_without_the_heading(tmp_path):
     begin(tmp_path, identity_of(parse_scenario(SMALL | {"geometry": {"time": "1987-08-15T16:40Z"}}).complete(), False))
-    with pytest.raises(NotThisRun, match=r'of another scenario, with time = "1987-08-15T16:40Z": leave out'):
+    with pytest.raises(NotThisRun, match=r'has another scenario, with time = "1987-08-15T16:40Z": leave out'):
         begin(tmp_path, identity_of(parse_scenario(SMALL).complete(), False))
 
 

@@ -48,7 +48,7 @@ def test_a_changed_block_is_none_and_is_not_read(tmp_path, array):
     content[-20] ^= 1
     path.write_bytes(content)
     assert (0, 0, 0) not in saved_blocks(tmp_path, "image", array)
-    with pytest.raises(OSError, match="not what was written"):
+    with pytest.raises(OSError, match="has changed since it was written"):
         saved_array(tmp_path, "image", array).compute()
 
 

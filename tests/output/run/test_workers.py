@@ -161,7 +161,7 @@ def test_a_task_that_ends_its_workers_is_told_and_the_others_are_cancelled(monke
     error = KilledWorker("task", SimpleNamespace(address="tcp://here"), 3)
     stub, found = Stub(monkeypatch, error), []
     tasks, outputs = tasks_of({"ones": da.ones(3, chunks=1)}, [("ones", (n,)) for n in range(3)])
-    with pytest.raises(RuntimeError, match="has a worker too little memory"):
+    with pytest.raises(RuntimeError, match="a worker may lack memory"):
         run_on_client(tasks, outputs, lambda *output: found.append(output), stub)
     assert found == [("ones", (0,), "first")] and stub.released == stub.futures[:1]
     assert stub.cancelled == stub.futures[1:]

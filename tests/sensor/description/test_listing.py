@@ -69,15 +69,15 @@ def test_what_a_file_does_not_know_it_says_with_who_does(name):
 
 def test_a_line_says_which_bands_lack_noise_or_blur_and_who_published_it():
     oli = instrument("OLI")
-    assert noise_in_words(oli, ["OLI4"]) == "none is added"
-    said = "none is added; that of OLI6 is not known, of bands 1 and 6"
+    assert noise_in_words(oli, ["OLI4"]) == "none"
+    said = "none; the noise of OLI6 is unknown, of bands 1 and 6"
     assert noise_in_words(oli, ["OLI4", "OLI6"]).startswith(said)
     assert noise_in_words(oli, ["OLI6"], ["thermal", "shot"]) == "thermal, shot"
-    assert blur_in_words(oli, ["OLI4"]).endswith(f"sharper than the instrument's, {oli.not_found['blur']}")
+    assert blur_in_words(oli, ["OLI4"]).endswith(f"so the image is too sharp, {oli.not_found['blur']}")
     assert "sharper" not in blur_in_words(instrument("MSI"), ["MSI4"])
     # The cosine of Table 1 passes more than its detector, as wide as the field of view, does.
     said = "0.69; the detector alone has 0.64: the image of TM3 is sharper"
     assert blur_in_words(instrument("TM"), ["TM3"]).endswith(said)
     # A file of one's own need not say it.
     own = dataclasses.replace(oli, not_found={})
-    assert noise_in_words(own, ["OLI6"]).endswith("that of OLI6 is not known")
+    assert noise_in_words(own, ["OLI6"]).endswith("the noise of OLI6 is unknown")

@@ -135,7 +135,7 @@ def test_missing_stays_missing(tmp_path, site, codes):
 def test_code_without_a_class_is_named_when_it_computes(tmp_path, site, codes):
     codes[0, :3], codes[9, 9] = 50, 60
     path = write(tmp_path / "cover.tif", codes, site.affine)
-    message = r"codes without a class: 50, 60, in 4 of 2430 cells\. There are 10, 20, 80"
+    message = r"codes without a class: 50, 60, in 4 of 2430 cells\. Classes are 10, 20, 80"
     with pytest.raises(ValueError, match=message):
         cover_map(path, site, TABLE)
     with no_compute():
@@ -161,5 +161,5 @@ def test_map_that_is_of_no_use_is_refused(tmp_path, site, codes):
 
 
 def test_cover_that_says_no_classes_is_refused(site):
-    with pytest.raises(ValueError, match="does not say what its classes are"):
+    with pytest.raises(ValueError, match="the classes of the cover are unknown"):
         classes_of(drawn_cover(site, Patches("voronoi", 40), TABLE, 7).drop_attrs())

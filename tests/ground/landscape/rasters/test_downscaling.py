@@ -84,7 +84,7 @@ def test_variation_that_is_not_realised_is_warned_of(arp, short):
     for chunks in (None, 120):
         with warnings.catch_warnings(record=True, action="always", category=UserWarning) as said:
             cells = fifesim.downscale(coarse, grid, cv=0.4, arp=arp, seed=1, chunks=chunks).compute()
-        assert any("cv=0.4 was asked for" in str(each.message) for each in said) == short
+        assert any("cv=0.4 was requested" in str(each.message) for each in said) == short
         blocks = cells.values.reshape(80, 3, 90, 3)
         realised = np.sqrt(np.mean(blocks.var(axis=(1, 3)) / blocks.mean(axis=(1, 3)) ** 2))
         if chunks is None:

@@ -257,7 +257,7 @@ def test_what_cannot_be_is_refused_before_it_computes(make, changes, error, said
 
 
 def test_a_map_of_leaf_area_goes_with_the_ground_as_it_does(make, land):
-    with pytest.raises(ValueError, match="lai is a map, which goes with the ground as it does: leave covary out"):
+    with pytest.raises(ValueError, match="covary cannot be used with a map of lai: remove one of them"):
         make(lai=land["lai"])
     mine = make(lai=land["lai"], covary=None)
     np.testing.assert_array_equal(mine["lai"], land["lai"])

@@ -156,7 +156,7 @@ def test_elevation_is_asked_what_it_tells(grid, hills, following):
     xr.testing.assert_identical(from_hills["lai"], following["lai"])
     with pytest.raises(ValueError, match=r"covary names elevation, .* give dem="):
         landscape_fields(grid, {"lai": 0.15}, {"elevation": 0.3})
-    with pytest.raises(ValueError, match="an elevation model says nothing of rain"):
+    with pytest.raises(ValueError, match="rain cannot be computed from an elevation model"):
         of_elevation(hills, ["rain"])
 
 

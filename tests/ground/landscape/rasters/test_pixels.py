@@ -64,7 +64,7 @@ def test_tiles_hold_some_pixels_of_any_size(cells, tile):
         (fifesim.grid_at("EPSG:32614", 699960, 4400040, 900, 900, 30), r"cells of 30 x 30 m"),
         (
             fifesim.grid_at("EPSG:32614", 699961, 4400040, 100, 100, 2.5),
-            r"lie 0.00 rows and 0.40 columns of cells beside",
+            r"are 0.00 rows and 0.40 columns of cells away from",
         ),
         (
             fifesim.grid_at("EPSG:32614", 709960, 4400040, 100, 100, 2.5),

@@ -107,7 +107,7 @@ def test_numbers_and_rasters_of_other_properties_are_variables(tmp_path, site, l
     opened = rioxarray.open_rasterio(path, masked=True).squeeze("band", drop=True)
     with no_compute():
         lazy = fifesim.landscape(site, lai=lai, brown=opened + 0.5, chunks=20)
-    with pytest.raises(ValueError, match=r"brown must be in \[0, 1\], got 1\.\d+: it is a share"):
+    with pytest.raises(ValueError, match=r"brown must be in \[0, 1\], got 1\.\d+: it is a fraction"):
         lazy.brown.compute()
 
 
@@ -128,7 +128,7 @@ def test_cover_that_carries_its_classes_needs_no_others(site, land):
 @pytest.mark.parametrize(
     "options, error, message",
     [
-        ({"classes": CLASSES}, ValueError, "nothing says how the 3 classes lie: give cover= a map"),
+        ({"classes": CLASSES}, ValueError, "the layout of the 3 classes is unknown: give cover= a map"),
         ({"cover": fifesim.Patches("voronoi", 9, (0.5, 0.5))}, ValueError, "2 shares for 3 classes"),
         ({"cover": "map.tif"}, ValueError, "a map of cover needs classes="),
         (

@@ -57,5 +57,5 @@ def test_one_convergence_for_a_wide_scene_is_warned_of():
     """400 km at 85 degrees north: grid north turns by 23 degrees from the middle to a corner."""
     wide = fifesim.grid_at("EPSG:3413", -600000, -200000, 400000, 400000, 10000)
     dem = labelled(wide, 1000 + plane(tuple(wide.shape), 10000.0, 10000.0, 5.0, 70.0) / 40)
-    with pytest.warns(UserWarning, match=r"grid north turns by up to \d+\.\d degrees"):
+    with pytest.warns(UserWarning, match=r"grid north rotates by up to \d+\.\d degrees"):
         fifesim.illumination(dem, fifesim.Geometry(60.0, 120.0))

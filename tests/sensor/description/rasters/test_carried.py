@@ -45,7 +45,7 @@ def test_given_wins_over_carried(lai):
 
 
 def test_what_nobody_says_is_asked_for():
-    with pytest.raises(ValueError, match="which instrument looks at mine: give instrument=, one of AVHRR"):
+    with pytest.raises(ValueError, match="the instrument of mine is unknown: give instrument=, one of AVHRR"):
         given_instrument(None, raster())
     with pytest.raises(ValueError, match="for an instrument 'MINE', which fifesim does not have: give instrument="):
         carried_instrument(raster(instrument="MINE"))

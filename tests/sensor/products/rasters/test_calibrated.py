@@ -111,7 +111,7 @@ def test_one_band_without_a_dimension(dn):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({}, "nothing says where the sun stands over the raster"),
+        ({}, "the position of the sun over the raster"),
         ({"time": "noon"}, "time must be a date and time such as 1987-06-06T16:35:00Z, got 'noon'"),
         ({"time": "1987-06-06T06:35"}, "the sun is below the horizon"),
         ({"geometry": SUN, "gain": 1.0}, "give both, or neither"),

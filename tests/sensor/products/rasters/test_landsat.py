@@ -187,7 +187,7 @@ def test_a_scene_by_pixel_goes_through(folders, tmp_path):
     ndvi = scene.fifesim.to_surface().fifesim.ndvi()
     centre = fifesim.open_landsat(folder, bands=["OLI4", "OLI5"]).fifesim.to_surface().fifesim.ndvi()
     assert float(abs(ndvi - centre).max()) < 0.05
-    with pytest.warns(UserWarning, match="leaves out sza"):
+    with pytest.warns(UserWarning, match="lacks sza"):
         ndvi.fifesim.to_geotiff(tmp_path / "ndvi.tif")
 
 
@@ -197,7 +197,7 @@ def test_the_panchromatic_band_is_opened_by_name(folders):
     pan = fifesim.open_landsat(folder, bands="OLI8")
     assert pan.shape == (1, 23, 35) and "quality" not in pan.coords
     assert float(pan["x"][1] - pan["x"][0]) == 15.0
-    with pytest.raises(ValueError, match=r"^LC08_\w+_B4\.TIF and LC08_\w+_B8\.TIF lie on different grids"):
+    with pytest.raises(ValueError, match=r"^LC08_\w+_B4\.TIF and LC08_\w+_B8\.TIF have different grids"):
         fifesim.open_landsat(folder, bands=["OLI8", "OLI4"])
     assert "OLI9" in fifesim.open_landsat(folder, bands=["OLI9"])["band"].values
 

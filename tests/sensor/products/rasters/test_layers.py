@@ -49,5 +49,5 @@ def test_layers_of_different_grids_do_not_stack(tmp_path):
     one, two = (products_labels.open_layer(tmp_path, name, None, "") for name in ("a.tif", "b.tif"))
     bands = [ProductBand(name, "a.tif", 1e-3, 0.0, 255, None) for name in ("TM3", "TM4")]
     assert products_labels.reflectance([one, one], bands).dims == ("band", "y", "x")
-    with pytest.raises(ValueError, match=r"^b\.tif and a\.tif lie on different grids, .*bands="):
+    with pytest.raises(ValueError, match=r"^b\.tif and a\.tif have different grids, .*bands="):
         products_labels.reflectance([one, two], bands)

@@ -68,7 +68,7 @@ def test_the_detector_is_the_default(toa):
 def test_what_is_no_scaling_is_refused(toa):
     with pytest.raises(ValueError, match="scaling must be 'detector' or 'product', got 'level1'"):
         toa.fifesim.sense("OLI", scaling="level1")
-    with pytest.raises(ValueError, match="TM has no product that is scaled by reflectance, as those of OLI"):
+    with pytest.raises(ValueError, match="TM has no product scaled to reflectance, unlike OLI"):
         toa.fifesim.sense("TM", scaling="product")
     with pytest.raises(ValueError, match="is one of digital numbers"):
         toa.fifesim.sense("OLI", scaling="product", quantise=False)

@@ -128,7 +128,7 @@ def test_bands_of_different_pixels_go_apart_or_onto_one_grid():
     coarse = replace(TM.bands[3], gsd=60.0)
     mixed = replace(TM, bands=(*TM.bands[:3], coarse, *TM.bands[4:]))
     assert bands_by_grid(mixed, mixed.select(["TM4", "TM3"])) == {"30m": [1], "60m": [0]}
-    with pytest.raises(ValueError, match=r"30 x 30 m: TM3; 60 x 60 m: TM4.*sense each group by itself.*onto="):
+    with pytest.raises(ValueError, match=r"30 x 30 m: TM3; 60 x 60 m: TM4.*sense each group separately.*onto="):
         pixel_grid(grids.geobox(scene()), mixed, mixed.select(["TM3", "TM4"]))
     assert {node.path: node["toa_radiance"].sizes["x"] for node in sensed(scene(), mixed).leaves} == {
         "/30m": 22,

@@ -230,9 +230,9 @@ def test_a_scan_is_written_as_netcdf_and_read_again(tmp_path):
 def test_a_map_is_what_a_geotiff_holds(tmp_path):
     toa, away = lit()
     image = fifesim.sense_swath(toa, "TM", **away)
-    with pytest.raises(ValueError, match=r"put it onto one with .grid_swath\(grid\)"):
+    with pytest.raises(ValueError, match=r"map the scan with .grid_swath\(grid\)"):
         image.fifesim.to_geotiff(tmp_path / "scan.tif")
-    with pytest.warns(UserWarning, match="leaves out vza, vaa"):
+    with pytest.warns(UserWarning, match="lacks vza, vaa"):
         image.fifesim.grid_swath(grids.aligned_grid(grids.geobox(toa), 30.0)).fifesim.to_geotiff(tmp_path / "map.tif")
     assert fifesim.open_image(tmp_path / "map.tif").dtype == np.uint8
 
