@@ -371,7 +371,8 @@ class Scenario(Keys):
         >>> changed.ground.arp, changed.atmosphere.visibility, changed.sensor.seed, scenario.sensor.seed
         (0.24, 20.0, 3, 0)
         """
-        values, names = values_of(self), {}
+        values = values_of(self)
+        names: dict[Any, str] = {}
         for name, value in changes.items():
             key = find_key(name, called="replace:")
             if key.place[0] == "classes" and key.place[1] not in self.classes:
