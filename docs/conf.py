@@ -50,6 +50,8 @@ exclude_patterns = [
 ]
 templates_path = ["_templates"]
 default_role = "py:obj"
+# Modules that are not on these pages refer to publications, too.
+suppress_warnings = ["ref.citation"]
 
 html_theme = "furo"
 html_title = f"fifesim {version}"
