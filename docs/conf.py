@@ -179,7 +179,11 @@ def _index_words(app, docname, source):
     if words := SEARCH_WORDS.get(docname):
         entries = ", ".join(f"! {word}" for word in words)
         source[0] = re.sub(
-            r"^# .*\n", rf"\g<0>\n```{{index}} {entries}\n```\n", source[0], count=1, flags=re.MULTILINE
+            r"^# .*\n",
+            rf"\g<0>\n```{{index}} {entries}\n```\n",
+            source[0],
+            count=1,
+            flags=re.MULTILINE,
         )
 
 

@@ -58,7 +58,9 @@ def _group(group, names):
 def write():
     """Write the page, and remove pages of names that are no longer public."""
     PAGE.parent.mkdir(exist_ok=True)
-    names = [name for group, listed in groups().items() for name in listed + _BESIDE.get(group, [])]
+    names = [
+        name for group, listed in groups().items() for name in listed + _BESIDE.get(group, [])
+    ]
     for page in PAGE.parent.rglob("*.rst"):
         if page.stem.removeprefix("fifesim.") not in names:
             page.unlink()

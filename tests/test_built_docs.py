@@ -73,5 +73,7 @@ def test_first_link_of_the_index_is_the_page_with_sliders():
 
 def test_words_to_search_for_are_of_pages_that_exist():
     source = (DOCS / "conf.py").read_text(encoding="utf-8")
-    pages = re.findall(r'^    "([\w/]+)": \["', source[source.index("SEARCH_WORDS") :].partition("}\n")[0], re.MULTILINE)
+    pages = re.findall(
+        r'^    "([\w/]+)": \["', source[source.index("SEARCH_WORDS") :].partition("}\n")[0], re.MULTILINE
+    )
     assert pages and [page for page in pages if not (DOCS / f"{page}.md").exists()] == []
