@@ -13,8 +13,8 @@ _BESIDE = {"Atmosphere": ["atmosphere.spectrum"]}
 _HEAD = """Functions and classes
 =====================
 
-All public names by group. A function of a raster is also a method of the ``.fifesim`` accessor: ``fifesim.ndvi(image)`` is
-``image.fifesim.ndvi()``. ``fifesim.__version__`` is the version.
+All public names by group. A function of a raster is also a method of the ``.fifesim`` accessor:
+``fifesim.ndvi(image)`` is ``image.fifesim.ndvi()``. ``fifesim.__version__`` is the version.
 
 .. currentmodule:: fifesim
 """
