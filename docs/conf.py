@@ -47,6 +47,7 @@ exclude_patterns = [
     "paper/*",
     "gallery/**/*.ipynb",
     "gallery/*.ipynb",
+    "**sg_execution_times.rst",
 ]
 templates_path = ["_templates"]
 default_role = "py:obj"
