@@ -20,9 +20,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 import docstrings
 import make_api
 import make_bounds
+import make_tables
 
 make_api.write()
 make_bounds.write()
+make_tables.write()
 
 project = "fifesim"
 author = "the fifesim developers"
@@ -43,6 +45,7 @@ exclude_patterns = [
     "bounds.md",
     "gallery_src",
     "paper/*",
+    "tables/*",
     "gallery/**/*.ipynb",
     "gallery/*.ipynb",
 ]

@@ -30,7 +30,7 @@ def readable(lines):
     -------
     lines : list of str
     """
-    shown = [line if _is_code(line) else _linked(_raised(line)) for line in lines]
+    shown = [line if _is_code(line) else _linked(raised(line)) for line in lines]
     return _equations(shown)
 
 
@@ -71,14 +71,14 @@ def _known(module):
     return any(name.endswith(f".{module}") for name in make_api.modules())
 
 
-def _raised(line):
+def raised(line):
     """Units with their exponents raised, which no line breaks: m-2 is m⁻²."""
     return _BRACKET.sub(_raised_units, line)
 
 
 def _raised_units(found):
-    raised = _UNIT.sub(lambda unit: unit[1] + unit[2].translate(_RAISED), found[0])
-    return found[0] if raised == found[0] else raised.replace(" ", "\N{NO-BREAK SPACE}")
+    changed = _UNIT.sub(lambda unit: unit[1] + unit[2].translate(_RAISED), found[0])
+    return found[0] if changed == found[0] else changed.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _equations(lines):
