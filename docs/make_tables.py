@@ -19,7 +19,7 @@ from fifesim.atmosphere.models import PROFILES
 from fifesim.cli import app
 from fifesim.ground.canopy.leaf_angles import _CUMULATIVE as LEAF_ANGLES
 from fifesim.ground.landscape.distribution import treatments
-from fifesim.scenario.keys import INTERVALS, LIMITS, StandKeys
+from fifesim.scenario.keys import INTERVALS, FIELD_LIMITS, StandKeys
 from fifesim.scenario.scenario import Scenario
 from fifesim.sensor.description import instrument_file
 from fifesim.sensor.description.fields import by_axes
@@ -123,8 +123,8 @@ _TYPES = {
 
 def _range(key, known):
     """Allowed numbers of a key: limits in brackets are allowed, limits in parentheses are not."""
-    if key in LIMITS:
-        low, high = LIMITS[key]
+    if key in FIELD_LIMITS:
+        low, high = FIELD_LIMITS[key]
         return f"[{low:g}, {high:g}]"
     limits = {
         name: getattr(each, name)

@@ -11,7 +11,7 @@ import yaml
 
 import fifesim
 from fifesim.cli import app
-from fifesim.scenario.keys import LIMITS, Section, StandKeys
+from fifesim.scenario.keys import FIELD_LIMITS, Section, StandKeys
 from fifesim.scenario.scenario import Scenario
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.response.noise import KINDS
@@ -109,7 +109,7 @@ def test_names_of_the_table_are_those_that_a_scenario_accepts(tables):
 
 
 def test_limits_of_a_landscape_are_those_of_the_table(tables):
-    for key, (low, high) in LIMITS.items():
+    for key, (low, high) in FIELD_LIMITS.items():
         assert rows(sections(tables.scenario_keys())["[landscape]"])[key][3] == f"[{low:g}, {high:g}]"
         with pytest.raises(ValueError, match="must be in"):
             fifesim.Scenario(landscape={"cover": "none", "deviations": {"soil": 0.1}} | {key: {"soil": high + 0.01}})
