@@ -19,7 +19,7 @@ from fifesim.atmosphere.models import PROFILES
 from fifesim.cli import app
 from fifesim.ground.canopy.leaf_angles import _CUMULATIVE as LEAF_ANGLES
 from fifesim.ground.landscape.distribution import treatments
-from fifesim.scenario.keys import INTERVALS, FIELD_LIMITS, StandKeys
+from fifesim.scenario.keys import FIELD_LIMITS, INTERVALS, StandKeys
 from fifesim.scenario.scenario import Scenario
 from fifesim.sensor.description import instrument_file
 from fifesim.sensor.description.fields import by_axes
