@@ -185,3 +185,13 @@ def test_page_on_citing_has_the_work_and_the_paper(tables):
     assert f"volume = {{{paper['volume']}}}" in text and f"{paper['start']}--{paper['end']}" in text
     assert all(each["family-names"] in text for each in paper["authors"])
     assert max(map(len, text.partition("```bibtex")[2].splitlines())) <= 96
+
+
+def test_visibilities_of_the_page_have_their_optical_thickness():
+    page = (DOCS / "howto" / "aerosol.md").read_text("utf-8")
+    found = [cells for name, cells in rows(page).items() if name.endswith(" km")]
+    assert len(found) == 5
+    for visibility, aot, _ in found:
+        air = fifesim.Atmosphere(visibility=float(visibility.removesuffix(" km")))
+        assert f"{air.aot:.2f}" == aot
+    assert "45 km of visibility" in page and fifesim.Scenario().atmosphere.visibility == 45
