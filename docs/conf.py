@@ -21,10 +21,12 @@ import docstrings
 import make_api
 import make_bounds
 import make_tables
+import make_why_scatter
 
 make_api.write()
 make_bounds.write()
 make_tables.write()
+make_why_scatter.write()
 
 project = "fifesim"
 author = "the fifesim developers"
