@@ -1,6 +1,7 @@
 """Tables of scenario keys, commands, instruments and citations, made from the code when the pages are built."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -218,6 +219,7 @@ QUANTITIES = {
     "noise": ("noise", None),
     "limits": ("nominal limits of the bands", None),
     "gains": ("other gain states", None),
+    "paper_lsf": ("line spread function of Friedl et al. (1995)", None),
     "compression": ("compression of digital numbers", None),
 }
 # Mappings of an instrument that are not columns of its table.
@@ -239,22 +241,30 @@ def instruments():
         "noise",
         "geolocation error",
     ]
-    rows = [_overview(item) for item in items]
-    return "\n".join([_table(columns, rows), *(_instrument(item) for item in items)])
+    parts = [_table(columns, [_overview(item) for item in items])]
+    if any("origin" in _other_columns(item) for item in items):
+        parts.append(_ORIGINS)
+    return "\n".join([*parts, *(_instrument(item) for item in items)])
+
+
+_ORIGINS = """A number was measured in flight, measured before launch, required by the mission, or assumed. The uncertainty of the
+line spread function is the largest error of the modulation transfer at the Nyquist frequency, the uncertainty of the noise is a
+factor of its standard deviation, and the uncertainty of the geolocation error is in metres.
+"""
 
 
 def _overview(item):
     pixels = sorted({item.pixel(band) for band in item.bands})
-    blur = [knows_blur(item, band) for band in item.bands]
-    noise = [band.noise is not None for band in item.bands]
+    blur = [_state(item, band, "lsf", knows_blur(item, band)) for band in item.bands]
+    noise = [_state(item, band, "noise", band.noise is not None) for band in item.bands]
     return [
         f"[{item.name}](#{_anchor(item)})",
         item.title,
         ", ".join(f"{size:g}" for size in pixels),
         item.bits,
         len(item.bands),
-        _share(blur),
-        _share(noise),
+        _counted(blur),
+        _counted(noise),
         "unknown" if item.geolocation is None else f"{item.geolocation:g} m",
     ]
 
@@ -263,13 +273,19 @@ def _anchor(item):
     return "instrument-" + item.name.lower().replace("+", "-plus")
 
 
-def _share(known):
-    return (
-        "known"
-        if all(known)
-        else f"{sum(known)} of {len(known)} bands"
-        if any(known)
-        else "unknown"
+def _state(item, band, number, is_known):
+    """Whether a number of a band is known, or its origin if the file states one."""
+    if not is_known:
+        return "unknown"
+    return _annotation(item, band, "origin", number).partition(";")[0] or "known"
+
+
+def _counted(states):
+    """States of the bands, with the number of bands if they differ."""
+    if len(set(states)) == 1:
+        return states[0]
+    return ", ".join(
+        f"{state} ({count} of {len(states)} bands)" for state, count in Counter(states).items()
     )
 
 
@@ -278,10 +294,11 @@ def _instrument(item):
     also = f" Other names: {', '.join(item.aliases)}." if item.aliases else ""
     others = _other_columns(item)
     columns = ["quantity", "value", "source", *(name.replace("_", " ") for name in others)]
-    rows = [
-        [*_quantity(item, number), *(_by_number(known, number) for known in others.values())]
-        for number in given_numbers(item)
-    ]
+    rows = []
+    for number in given_numbers(item):
+        rows.append(
+            [*_quantity(item, number), *(_annotations(item, name, number) for name in others)]
+        )
     parts = [
         f"({_anchor(item)})=\n## {item.name}\n\n{item.title}.{also}\n",
         _table(columns, rows),
@@ -323,27 +340,41 @@ def _quantity(item, number):
 
 
 def _other_columns(item):
-    """Further mappings of an instrument by the names of its numbers, such as the origin of each value."""
-    known = {
-        number
-        for name in ("INSTRUMENT", "BAND", "OPTIONAL")
-        for number in getattr(instrument_file, f"{name}_NUMBERS")
-    }
+    """Names of further mappings by quantity, such as the origin of the values."""
     found = {}
-    for each in fields(item):
-        value = getattr(item, each.name)
-        if (
-            each.name not in _TEXTS
-            and isinstance(value, Mapping)
-            and value
-            and set(value) <= known
-        ):
-            found[each.name] = value
-    return found
+    for each in (item, *item.bands):
+        for known in fields(each):
+            value = getattr(each, known.name)
+            if known.name not in _TEXTS and isinstance(value, Mapping) and value:
+                found.setdefault(known.name, set()).update(map(_number_of, value))
+    numbers = {
+        *instrument_file.INSTRUMENT_NUMBERS,
+        *instrument_file.BAND_NUMBERS,
+        *instrument_file.OPTIONAL_NUMBERS,
+    }
+    return [name for name, keys in found.items() if keys <= numbers]
 
 
-def _by_number(known, number):
-    return _words(known[number]) if number in known else ""
+def _number_of(quantity):
+    return "lsf" if quantity == "blur" else quantity
+
+
+def _annotations(item, column, number):
+    """Text of a further column for a number, with the names of the bands where it differs."""
+    found = {}
+    for band in item.bands:
+        found.setdefault(_annotation(item, band, column, number), []).append(band.name)
+    return _with_bands(
+        item, {text: names for text, names in found.items() if text or len(found) == 1}
+    )
+
+
+def _annotation(item, band, column, number):
+    for each in (band, item):
+        for quantity, value in getattr(each, column, {}).items():
+            if _number_of(quantity) == number:
+                return _words(value)
+    return ""
 
 
 def _words(value):
@@ -351,8 +382,10 @@ def _words(value):
     if is_dataclass(value):
         value = {each.name: getattr(value, each.name) for each in fields(value)}
     if isinstance(value, Mapping):
+        given = {name: _words(each) for name, each in value.items() if each is not None}
+        kind = [given.pop("kind")] if "kind" in given else []
         return "; ".join(
-            f"{name} {_words(each)}" for name, each in value.items() if each is not None
+            [*kind, *(f"{name.replace('_', ' ')} {text}" for name, text in given.items())]
         )
     if isinstance(value, tuple | list):
         return ", ".join(map(_words, value))

@@ -13,7 +13,7 @@ import fifesim
 from fifesim.cli import app
 from fifesim.scenario.keys import FIELD_LIMITS, Section, StandKeys
 from fifesim.scenario.scenario import Scenario
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.description.instrument_file import Instrument, InstrumentBand
 from fifesim.sensor.response.noise import KINDS
 
 ROOT = Path(__file__).parents[1]
@@ -144,9 +144,9 @@ def test_every_number_of_an_instrument_has_its_source_on_the_page(tables):
         item, text = fifesim.instrument(name), found[name]
         by_quantity = rows(text)
         for number in tables.given_numbers(item):
-            assert tables.QUANTITIES[number][0] in by_quantity
+            cells = by_quantity[tables.QUANTITIES.get(number, [number.replace("_", " ")])[0]]
             keys = {band.sources.get(number) or item.sources.get(number) for band in item.bands}
-            assert all(key in by_quantity[tables.QUANTITIES[number][0]][2] for key in keys if key)
+            assert all(key in cells[2] for key in keys if key)
         assert all(f"**{key}**: {publication}" in text for key, publication in item.references.items())
         assert all(gap in text for gap in item.not_found.values())
         assert all(band.name in text for band in item.bands if len(item.bands) < 22)
@@ -156,23 +156,51 @@ def test_every_number_of_an_instrument_has_its_source_on_the_page(tables):
 def test_values_of_an_instrument(tables):
     found = sections(tables.instruments())
     tm, msi = rows(found["TM"]), rows(found["MSI"])
-    assert tm["altitude"][1:] == ["705 km", "Friedl1995"]
-    assert tm["geolocation error (rms along each axis)"][1:] == ["8.5 m", "USGS2020"]
+    assert tm["altitude"][1:3] == ["705 km", "Friedl1995"]
+    assert tm["geolocation error (rms along each axis)"][1:3] == ["8.5 m", "USGS2020"]
     assert "20 m (MSI5–MSI7, MSI8A, MSI11, MSI12)" in msi["pixel of the gridded product"][1]
-    assert msi["MSI10"][-1] == "SNR 50 at 6" and tm["TM3"][3:] == ["-1.2 to 204.3", "1536", "unknown"]
+    assert msi["MSI10"][-1] == "SNR 50 at 6" and tm["TM3"][3:5] == ["-1.2 to 204.3", "1536"]
     overview = rows(tables.instruments().partition("## ")[0])
-    assert overview["[OLI](#instrument-oli)"][-3:] == ["unknown", "4 of 9 bands", "8.5 m"]
+    assert overview["[MSS](#instrument-mss)"][2:] == ["60", "6", "4", "unknown", "unknown", "unknown"]
+    assert overview["[L4TM](#instrument-l4tm)"][-3] != "unknown" and overview["[L4TM](#instrument-l4tm)"][-1] == "8.5 m"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """As an instrument file may state it."""
+
+    kind: str
+    uncertainty: float | None = None
+
+
+@dataclass(frozen=True)
+class DescribedBand(InstrumentBand):
+    origin: dict = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Described(Instrument):
+    origin: dict = field(default_factory=dict)
+
+
+def values_of(item):
+    return {each.name: getattr(item, each.name) for each in fields(item)}
 
 
 def test_instruments_with_further_fields_get_further_columns(tables):
-    @dataclass(frozen=True)
-    class Described(Instrument):
-        origin: dict = field(default_factory=dict)
-
-    known = fifesim.instrument("TM")
-    item = Described(**{each.name: getattr(known, each.name) for each in fields(known)}, origin={"altitude": "read"})
+    known = fifesim.instrument("L4TM")
+    first, *others = (DescribedBand(**values_of(band)) for band in known.bands)
+    first = DescribedBand(**values_of(first) | {"origin": {"noise": Origin("assumed")}})
+    stated = {"blur": Origin("in-flight", 0.1), "noise": Origin("required", 2.0), "altitude": "read"}
+    item = Described(**values_of(known) | {"bands": (first, *others), "origin": stated})
     found = rows(tables._instrument(item))
-    assert found["quantity"][-1] == "origin" and found["altitude"][-1] == "read" and found["scan"][-1] == ""
+    assert found["quantity"][-1] == "origin" and found["scan"][-1] == "" and found["altitude"][-1] == "read"
+    assert found["line spread function"][-1] == "in-flight; uncertainty 0.1"
+    names = [band.name for band in others]
+    assert found["noise"][-1] == f"assumed ({first.name}); required; uncertainty 2 ({names[0]}–{names[-1]})"
+    overview = tables._overview(item)
+    count = len(known.bands)
+    assert overview[-3:-1] == ["in-flight", f"assumed (1 of {count} bands), required ({count - 1} of {count} bands)"]
 
 
 def test_page_on_citing_has_the_work_and_the_paper(tables):
