@@ -86,7 +86,7 @@ def _key_row(name, section, key, known):
     names = _names(name, key, known)
     unit = docstrings.raised(f"[{section.unit(key)}]")[1:-1]
     limits = ", ".join(f"`{each}`" for each in names) or _range(key, known)
-    meaning = docstrings.raised(known.description)
+    meaning = re.sub(r"\bu([gm])\b", r"µ\1", docstrings.raised(known.description))
     return [f"`{key}`", _type(known, names), unit, limits, _default(known.default), meaning]
 
 
@@ -174,7 +174,7 @@ def command_line():
         parts.append(f"## {name}\n\n{command.help}\n\n```sh\n{usage}\n```\n")
         records = [each.get_help_record(context) for each in command.get_params(context)]
         rows = [
-            [f"`{option}`", _in_parentheses(meaning)]
+            [f"`{option.replace(' range>', '>')}`", _in_parentheses(meaning)]
             for option, meaning in records
             if option != "--help"
         ]
@@ -184,8 +184,9 @@ def command_line():
 
 
 def _in_parentheses(meaning):
-    """Help of an option with its default and range in parentheses; the default of a counted flag says nothing."""
-    return re.sub(r"\s{2,}\[(.*)\]$", r" (\1)", meaning.removesuffix("  [default: 0]"))
+    """Help of an option with its default and range in parentheses, without the default of a counted flag."""
+    meaning = meaning.removesuffix("  [default: 0]").replace("[x>=", "[at least ")
+    return re.sub(r"\s{2,}\[(.*)\]$", r" (\1)", meaning)
 
 
 # Quantities of an instrument with their words and values; a number without an entry is shown by its name.
@@ -247,9 +248,9 @@ def instruments():
     return "\n".join([*parts, *(_instrument(item) for item in items)])
 
 
-_ORIGINS = """A number was measured in flight, measured before launch, required by the mission, or assumed. The uncertainty of the
-line spread function is the largest error of the modulation transfer at the Nyquist frequency, the uncertainty of the noise is a
-factor of its standard deviation, and the uncertainty of the geolocation error is in metres.
+_ORIGINS = """A number was measured in flight, measured before launch, required by the mission, or assumed. The
+uncertainty of the line spread function is the largest error of the modulation transfer at the Nyquist frequency, the
+uncertainty of the noise is a factor of its standard deviation. The geolocation error has an uncertainty in metres.
 """
 
 

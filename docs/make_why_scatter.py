@@ -83,7 +83,7 @@ def panels(case):
 def draw_panels(found):
     """Scatter of true LAI and NDVI, one panel for each cause."""
     figure, axes = plt.subplots(
-        2, 3, figsize=(10.5, 6.6), layout="constrained", sharex=True, sharey=True
+        2, 3, figsize=(8.6, 6), layout="constrained", sharex=True, sharey=True
     )
     top = max(panel.lai.max() for panel in found)
     for number, (axis, panel) in enumerate(zip(axes.flat, found, strict=True), 1):
@@ -91,7 +91,7 @@ def draw_panels(found):
         slope, intercept = np.polyfit(panel.ndvi, panel.lai, 1)
         line = np.array([panel.ndvi.min(), panel.ndvi.max()])
         axis.plot(line, intercept + slope * line, color="#b2182b", linewidth=1.8)
-        axis.set_title(f"{number}  {panel.title}", loc="left", fontsize=10.5)
+        axis.set_title(f"{number}  {panel.title}", loc="left", fontsize=10)
         axis.text(0.05, 0.9, f"R² = {panel.r2:.2f}", transform=axis.transAxes, fontsize=12)
         axis.set(ylim=(0, 1.05 * top))
         axis.spines[["top", "right"]].set_visible(False)
@@ -125,7 +125,7 @@ def mixed_pixel(low=0.3, high=4.0):
 
 def draw_pixel(case):
     """The two ways in which variation within pixels causes scatter."""
-    figure, (curve, place) = plt.subplots(1, 2, figsize=(10.5, 4.3), layout="constrained")
+    figure, (curve, place) = plt.subplots(1, 2, figsize=(8.6, 3.7), layout="constrained")
     area, ndvi, (low, high, mean), (at_low, at_high, even), mixed = mixed_pixel()
     curve.plot(area, ndvi, color="#1a9850", linewidth=2)
     curve.plot([low, high], [at_low, at_high], "o", color="#1a9850")
@@ -231,5 +231,5 @@ def write():
         ("why_pixel", draw_pixel(case)),
         ("why_scatter", draw_panels(panels(case))),
     ):
-        figure.savefig(FOLDER / f"{name}.png", dpi=110)
+        figure.savefig(FOLDER / f"{name}.png", dpi=130)
         plt.close(figure)
