@@ -21,10 +21,14 @@ import docstrings
 import make_api
 import make_bounds
 import make_explorer
+import make_tables
+import make_why_scatter
 
 make_api.write()
 make_bounds.write()
 make_explorer.write()
+make_tables.write()
+make_why_scatter.write()
 
 project = "fifesim"
 author = "the fifesim developers"
@@ -45,6 +49,7 @@ exclude_patterns = [
     "bounds.md",
     "gallery_src",
     "paper/*",
+    "tables/*",
     "gallery/**/*.ipynb",
     "gallery/*.ipynb",
     "**sg_execution_times.rst",
@@ -69,15 +74,20 @@ SEARCH_WORDS = {
     "benchmarks": ["accuracy", "accurate", "how accurate", "validation", "verify"],
     "changes": ["changelog", "release notes", "what changed"],
     "cite": ["citation", "cite", "how to cite", "bibtex", "doi"],
-    "howto/haze": ["aerosol", "which aerosol", "visibility", "haze", "smoke", "dust"],
+    "howto/aerosol": ["aerosol", "which aerosol", "visibility", "smoke", "dust"],
+    "howto/haze": ["haze"],
     "howto/my_dem": ["my dem", "dem", "elevation"],
     "howto/my_image": ["my image", "landsat", "sentinel-2"],
     "howto/my_map": ["my map", "lai map"],
     "howto/my_sensor": ["noise", "add noise", "sensor noise", "my sensor"],
     "howto/paper": ["reproduce", "table 2", "reproduce table 2", "friedl"],
-    "howto/scenario": ["key", "scenario key", "toml"],
+    "howto/scenario": ["toml"],
+    "howto/score": ["score"],
     "install": ["installation", "pip", "conda", "windows"],
     "large_scenes": ["cluster", "slurm", "memory", "resume"],
+    "command_line": ["command", "option"],
+    "scenario_keys": ["key", "scenario key"],
+    "why_scatter": ["scatter"],
     "nomenclature": ["fpar", "symbols", "units"],
 }
 

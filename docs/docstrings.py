@@ -27,7 +27,7 @@ def readable(lines):
     -------
     lines : list of str
     """
-    shown = [line if _is_code(line) else _linked(_raised(line)) for line in lines]
+    shown = [line if _is_code(line) else _linked(raised(line)) for line in lines]
     return _equations(shown)
 
 
@@ -61,14 +61,14 @@ def _of_module(found):
     return f"fifesim.{found[2]}"
 
 
-def _raised(line):
+def raised(line):
     """Units with their exponents raised, which no line breaks: m-2 is m⁻²."""
     return _BRACKET.sub(_raised_units, line)
 
 
 def _raised_units(found):
-    raised = _UNIT.sub(lambda unit: unit[1] + unit[2].translate(_RAISED), found[0])
-    return found[0] if raised == found[0] else raised.replace(" ", "\N{NO-BREAK SPACE}")
+    changed = _UNIT.sub(lambda unit: unit[1] + unit[2].translate(_RAISED), found[0])
+    return found[0] if changed == found[0] else changed.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _equations(lines):

@@ -24,11 +24,11 @@ ANSWERS = {
     "how accurate": "benchmarks",
     "citation": "cite",
     "cite": "cite",
-    "aerosol": "howto/haze",
+    "aerosol": "howto/aerosol",
     "cluster": "large_scenes",
     "Table 2": "howto/paper",
     "what changed": "changes",
-    "scenario key": "howto/scenario",
+    "scenario key": "scenario_keys",
     "FPAR": "nomenclature",
     "regress": "api/names/fifesim.regress",
 }

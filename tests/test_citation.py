@@ -19,12 +19,7 @@ def test_citation_names_the_project_as_its_package_does():
     assert doi in (ROOT / "docs" / "references.rst").read_text(encoding="utf-8")
 
 
-def test_page_on_citing_gives_what_the_citation_file_gives():
-    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    paper = citation["references"][0]
-    page = re.sub(r"[\s>]+", " ", (ROOT / "docs" / "cite.md").read_text(encoding="utf-8"))
-    for text in (citation["title"].partition(": ")[2], PROJECT["version"], paper["doi"], paper["title"]):
-        assert page.count(text) == 2, text
+def test_readme_leads_to_the_page_on_citing():
     assert "docs/cite.md" in (ROOT / "README.md").read_text(encoding="utf-8")
 
 

@@ -135,6 +135,8 @@ VARYING = tuple(DRAWN)
 KEYS = {name: known for name, known in PROPERTIES.items() if known.default is not None}
 """Canopy properties that are single keys of a scenario."""
 COVARIATES = ("elevation", "wetness", "illumination")
+FIELD_LIMITS = {"deviations": (0, 1), "arps": (0, 0.2498), "covary": (-1, 1)}
+"""Smallest and largest number in the tables of a landscape. [1]"""
 
 # Values by the name of a band, spectrum or leaf constituent.
 ByName = dict[str, Annotated[float, Field(strict=True, allow_inf_nan=False)]]
@@ -244,7 +246,7 @@ class LandscapeKeys(Section):
     @classmethod
     def _known_properties(cls, values, info):
         known = VARYING + (COVARIATES if info.field_name == "covary" else ())
-        low, high = {"deviations": (0, 1), "arps": (0, 0.2498), "covary": (-1, 1)}[info.field_name]
+        low, high = FIELD_LIMITS[info.field_name]
         for name, value in values.items():
             if name not in known:
                 raise ValueError(f"unknown name {shown(name)}: {nearest(name, known)}allowed are {', '.join(known)}")

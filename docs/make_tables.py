@@ -1,0 +1,532 @@
+"""Tables of scenario keys, commands, instruments and citations, made from the code when the pages are built."""
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from textwrap import wrap
+from types import UnionType
+from typing import Literal, Union, get_args, get_origin
+
+import docstrings
+import typer
+import yaml
+
+import fifesim
+from fifesim.atmosphere import ENGINES
+from fifesim.atmosphere.mixtures import MODELS
+from fifesim.atmosphere.models import PROFILES
+from fifesim.cli import app
+from fifesim.ground.canopy.leaf_angles import _CUMULATIVE as LEAF_ANGLES
+from fifesim.ground.landscape.distribution import treatments
+from fifesim.scenario.keys import FIELD_LIMITS, INTERVALS, StandKeys
+from fifesim.scenario.scenario import Scenario
+from fifesim.sensor.description import instrument_file
+from fifesim.sensor.description.fields import by_axes
+from fifesim.sensor.description.instruments import instrument, instrument_names
+from fifesim.sensor.description.spatial_response import knows_blur
+from fifesim.sensor.description.spectral_response import half_peak
+from fifesim.sensor.response.noise import ALL, KINDS
+
+FOLDER = Path(__file__).parent / "tables"
+CITATION = Path(__file__).parents[1] / "CITATION.cff"
+
+
+def write():
+    """Write the tables."""
+    FOLDER.mkdir(exist_ok=True)
+    for table in (scenario_keys, command_line, instruments, citation):
+        (FOLDER / f"{table.__name__}.md").write_text(table(), encoding="utf-8")
+
+
+def _table(columns, rows):
+    """Markdown table."""
+    lines = [columns, ["---"] * len(columns), *rows]
+    return "\n".join(f"| {' | '.join(_cell(each) for each in line)} |" for line in lines) + "\n"
+
+
+def _cell(text):
+    return str(text).replace("|", r"\|").replace("\n", " ")
+
+
+# Names that a key accepts apart from files and numbers, in the order of the tables of the code.
+NAMES = {
+    ("ground", "distribution"): treatments(),
+    ("ground", "leaf_angles"): tuple(LEAF_ANGLES),
+    ("atmosphere", "profile"): PROFILES,
+    ("atmosphere", "aerosol"): (*MODELS, "none"),
+    ("atmosphere", "engine"): ENGINES,
+    ("sensor", "interval"): INTERVALS,
+    ("sensor", "response"): ("system", "detector", "paper"),
+    ("sensor", "noise"): (*KINDS, ALL),
+}
+
+
+def scenario_keys():
+    """All keys of a scenario, section by section."""
+    parts = []
+    for name in Scenario.model_fields:
+        section = Scenario.section((name, "NAME") if name == "classes" else (name,))
+        heading = "classes.NAME" if name == "classes" else name
+        parts.append(f"## `[{heading}]`\n\n{section.__doc__}\n")
+        known = section.model_fields
+        if name == "classes":
+            shared = ", ".join(f"`{key}`" for key in StandKeys.model_fields)
+            parts.append(f"A class has these keys of `[ground]`: {shared}. It also has:\n")
+            known = {
+                key: each for key, each in known.items() if key not in StandKeys.model_fields
+            }
+        rows = [_key_row(name, section, key, each) for key, each in known.items()]
+        parts.append(_table(["key", "type", "unit", "range", "default", "meaning"], rows))
+    return "\n".join(parts)
+
+
+def _key_row(name, section, key, known):
+    names = _names(name, key, known)
+    unit = docstrings.raised(f"[{section.unit(key)}]")[1:-1]
+    limits = ", ".join(f"`{each}`" for each in names) or _range(key, known)
+    meaning = re.sub(r"\bu([gm])\b", r"µ\1", docstrings.raised(known.description))
+    return [f"`{key}`", _type(known, names), unit, limits, _default(known.default), meaning]
+
+
+def _names(name, key, known):
+    """Names that a key accepts."""
+    if get_origin(known.annotation) is Literal:
+        return get_args(known.annotation)
+    if (name, key) in NAMES:
+        return NAMES[name, key]
+    return (known.json_schema_extra or {}).get("file", {}).get("names", ())
+
+
+def _type(known, names):
+    """Type of the value of a key in words."""
+    annotation = known.annotation
+    kinds = (
+        get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
+    )
+    words = [_TYPES[get_origin(kind) or kind] for kind in kinds if kind is not type(None)]
+    if "file" in (known.json_schema_extra or {}):
+        words = ["name", "file"] if names or known.default else ["file"]
+    elif names:
+        words = [word.replace("text", "name") for word in words]
+    if words == ["list"]:
+        (item,) = get_args(annotation)
+        words = ["list of names"] if item is str else ["two numbers"]
+    return " or ".join(words)
+
+
+_TYPES = {
+    float: "number", int: "whole number", bool: "true or false", str: "text", list: "list", dict: "table of numbers",
+    Literal: "name",
+}  # fmt: skip
+
+
+def _range(key, known):
+    """Allowed numbers of a key: limits in brackets are allowed, limits in parentheses are not."""
+    if key in FIELD_LIMITS:
+        low, high = FIELD_LIMITS[key]
+        return f"[{low:g}, {high:g}]"
+    limits = {
+        name: getattr(each, name)
+        for each in known.metadata
+        for name in _SIGNS
+        if hasattr(each, name)
+    }
+    lower = next((name for name in ("ge", "gt") if name in limits), None)
+    upper = next((name for name in ("le", "lt") if name in limits), None)
+    if lower and upper:
+        low, high = _number(limits[lower]), _number(limits[upper])
+        return f"{'[' if lower == 'ge' else '('}{low}, {high}{']' if upper == 'le' else ')'}"
+    return ", ".join(f"{_SIGNS[name]} {_number(limit)}" for name, limit in limits.items())
+
+
+_SIGNS = {"ge": "≥", "gt": ">", "le": "≤", "lt": "<"}
+
+
+def _number(value):
+    return "2⁶³" if value == 2**63 else f"{value:.10g}"
+
+
+def _default(value):
+    """Default of a key as a scenario file has it."""
+    if value is None:
+        return "–"
+    if value == {}:
+        return "empty"
+    return f"`{_written(value)}`"
+
+
+def _written(value):
+    if isinstance(value, list):
+        return f"[{', '.join(map(_written, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str) else _number(value)
+
+
+def command_line():
+    """All commands with their arguments and options, as their help has them."""
+    group, parts = typer.main.get_command(app), []
+    for name, command in group.commands.items():
+        context = command.context_class(command, info_name=f"fifesim {name}")
+        usage = command.get_usage(context).removeprefix("Usage: ")
+        parts.append(f"## {name}\n\n{command.help}\n\n```sh\n{usage}\n```\n")
+        records = [each.get_help_record(context) for each in command.get_params(context)]
+        rows = [
+            [f"`{option.replace(' range>', '>')}`", _in_parentheses(meaning)]
+            for option, meaning in records
+            if option != "--help"
+        ]
+        if rows:
+            parts.append(_table(["argument or option", "meaning"], rows))
+    return "\n".join(parts)
+
+
+def _in_parentheses(meaning):
+    """Help of an option with its default and range in parentheses, without the default of a counted flag."""
+    meaning = meaning.removesuffix("  [default: 0]").replace("[x>=", "[at least ")
+    return re.sub(r"\s{2,}\[(.*)\]$", r" (\1)", meaning)
+
+
+# Quantities of an instrument with their words and values; a number without an entry is shown by its name.
+QUANTITIES = {
+    "altitude": ("altitude", lambda item: f"{item.altitude / 1000:g} km"),
+    "gsd": ("pixel of the gridded product", lambda item: _by_band(item, item.pixel, "g", "m")),
+    "interval": (
+        "sampling interval at nadir",
+        lambda item: _by_band(item, item.ground_intervals, ".4g", "m"),
+    ),
+    "ifov": (
+        "instantaneous field of view at nadir",
+        lambda item: _by_band(item, item.ground_fields, ".4g", "m"),
+    ),
+    "bits": ("radiometric resolution", lambda item: f"{item.bits} bits"),
+    "lsf": ("line spread function", lambda item: _blur(item)),
+    "geolocation": (
+        "geolocation error (rms along each axis)",
+        lambda item: f"{item.geolocation:g} m",
+    ),
+    "scan": ("scan", lambda item: _scan(item.scan)),
+    "detectors": (
+        "detectors per band",
+        lambda item: _by_band(item, lambda band: band.detectors or item.detectors, "", ""),
+    ),
+    "product": ("scale of the Level-1 product", lambda item: _product(item.product)),
+    "srf": ("spectral response", None),
+    "full_scale_radiance": ("radiance of the largest digital number", None),
+    "min_radiance": ("radiance of digital number 0", None),
+    "solar_irradiance": ("solar irradiance", None),
+    "noise": ("noise", None),
+    "limits": ("nominal limits of the bands", None),
+    "gains": ("other gain states", None),
+    "paper_lsf": ("line spread function of Friedl et al. (1995)", None),
+    "compression": ("compression of digital numbers", None),
+}
+# Mappings of an instrument that are not columns of its table.
+_TEXTS = ("sources", "references", "not_found")
+# An imaging spectrometer has too many bands for a table.
+_MOST_BANDS = 22
+
+
+def instruments():
+    """What is known of each instrument, and the source of each number."""
+    items = [instrument(name) for name in instrument_names()]
+    columns = [
+        "instrument",
+        "title",
+        "pixels [m]",
+        "bits",
+        "bands",
+        "blur",
+        "noise",
+        "geolocation error",
+    ]
+    parts = [_table(columns, [_overview(item) for item in items])]
+    if any("origin" in _other_columns(item) for item in items):
+        parts.append(_ORIGINS)
+    return "\n".join([*parts, *(_instrument(item) for item in items)])
+
+
+_ORIGINS = """A number was measured in flight, measured before launch, required by the mission, or assumed. The
+uncertainty of the line spread function is the largest error of the modulation transfer at the Nyquist frequency, the
+uncertainty of the noise is a factor of its standard deviation. The geolocation error has an uncertainty in metres.
+"""
+
+
+def _overview(item):
+    pixels = sorted({item.pixel(band) for band in item.bands})
+    blur = [_state(item, band, "lsf", knows_blur(item, band)) for band in item.bands]
+    noise = [_state(item, band, "noise", band.noise is not None) for band in item.bands]
+    return [
+        f"[{item.name}](#{_anchor(item)})",
+        item.title,
+        ", ".join(f"{size:g}" for size in pixels),
+        item.bits,
+        len(item.bands),
+        _counted(blur),
+        _counted(noise),
+        "unknown" if item.geolocation is None else f"{item.geolocation:g} m",
+    ]
+
+
+def _anchor(item):
+    return "instrument-" + item.name.lower().replace("+", "-plus")
+
+
+def _state(item, band, number, is_known):
+    """Whether a number of a band is known, or its origin if the file states one."""
+    if not is_known:
+        return "unknown"
+    return _annotation(item, band, "origin", number).partition(";")[0] or "known"
+
+
+def _counted(states):
+    """States of the bands, with the number of bands if they differ."""
+    if len(set(states)) == 1:
+        return states[0]
+    return ", ".join(
+        f"{state} ({count} of {len(states)} bands)" for state, count in Counter(states).items()
+    )
+
+
+def _instrument(item):
+    """Section of one instrument: quantities with sources, bands, gaps and publications."""
+    also = f" Other names: {', '.join(item.aliases)}." if item.aliases else ""
+    others = _other_columns(item)
+    columns = ["quantity", "value", "source", *(name.replace("_", " ") for name in others)]
+    rows = []
+    for number in given_numbers(item):
+        rows.append(
+            [*_quantity(item, number), *(_annotations(item, name, number) for name in others)]
+        )
+    parts = [
+        f"({_anchor(item)})=\n## {item.name}\n\n{item.title}.{also}\n",
+        _table(columns, rows),
+        _bands(item),
+    ]
+    parts += [f"Not known: {name}, {text}.\n" for name, text in item.not_found.items()]
+    parts.append(
+        "\n".join(f"- **{key}**: {_words(text)}" for key, text in item.references.items())
+        + "\n"
+    )
+    return "\n".join(parts)
+
+
+def given_numbers(item):
+    """Names of the numbers that the description of an instrument has for itself or for a band."""
+
+    def given(each, names):
+        return [name for name in names if getattr(each, name, None)]
+
+    required, optional = instrument_file.INSTRUMENT_NUMBERS, instrument_file.OPTIONAL_NUMBERS
+    found = {*required, *instrument_file.BAND_NUMBERS, *given(item, optional)}
+    for band in item.bands:
+        found.update(given(band, optional))
+    order = [*QUANTITIES, *required, *instrument_file.BAND_NUMBERS, *optional]
+    return [name for name in dict.fromkeys(order) if name in found]
+
+
+def _quantity(item, number):
+    """Words, value and source keys of a number."""
+    words, value = QUANTITIES.get(number, (number.replace("_", " "), None))
+    if number in instrument_file.BAND_NUMBERS or value is None:
+        own = getattr(item, number, None)
+        shown = "by band" if own is None else _words(own)
+    else:
+        shown = value(item)
+    keys = [band.sources.get(number) or item.sources.get(number) for band in item.bands]
+    keys = [*([item.sources[number]] if number in item.sources else []), *keys]
+    return [words, shown, ", ".join(dict.fromkeys(key for key in keys if key))]
+
+
+def _other_columns(item):
+    """Names of further mappings by quantity, such as the origin of the values."""
+    found = {}
+    for each in (item, *item.bands):
+        for known in fields(each):
+            value = getattr(each, known.name)
+            if known.name not in _TEXTS and isinstance(value, Mapping) and value:
+                found.setdefault(known.name, set()).update(map(_number_of, value))
+    numbers = {
+        *instrument_file.INSTRUMENT_NUMBERS,
+        *instrument_file.BAND_NUMBERS,
+        *instrument_file.OPTIONAL_NUMBERS,
+    }
+    return [name for name, keys in found.items() if keys <= numbers]
+
+
+def _number_of(quantity):
+    return "lsf" if quantity == "blur" else quantity
+
+
+def _annotations(item, column, number):
+    """Text of a further column for a number, with the names of the bands where it differs."""
+    found = {}
+    for band in item.bands:
+        found.setdefault(_annotation(item, band, column, number), []).append(band.name)
+    return _with_bands(
+        item, {text: names for text, names in found.items() if text or len(found) == 1}
+    )
+
+
+def _annotation(item, band, column, number):
+    for each in (band, item):
+        for quantity, value in getattr(each, column, {}).items():
+            if _number_of(quantity) == number:
+                return _words(value)
+    return ""
+
+
+def _words(value):
+    """Text of a value of any type."""
+    if is_dataclass(value):
+        value = {each.name: getattr(value, each.name) for each in fields(value)}
+    if isinstance(value, Mapping):
+        given = {name: _words(each) for name, each in value.items() if each is not None}
+        kind = [given.pop("kind")] if "kind" in given else []
+        return "; ".join(
+            [*kind, *(f"{name.replace('_', ' ')} {text}" for name, text in given.items())]
+        )
+    if isinstance(value, tuple | list):
+        return ", ".join(map(_words, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _by_band(item, value, form, unit):
+    """Value of a quantity along and across the track, with the names of the bands where it differs."""
+    found = {}
+    for band in item.bands:
+        pair = value(band)
+        along, across = pair if isinstance(pair, tuple) else (pair, pair)
+        if along is None:
+            text = "unknown"
+        elif f"{along:{form}}" == f"{across:{form}}":
+            text = f"{along:{form}} {unit}"
+        else:
+            text = f"{along:{form}} {unit} along track, {across:{form}} {unit} across"
+        found.setdefault(text.strip(), []).append(band.name)
+    return _with_bands(item, found)
+
+
+def _with_bands(item, found):
+    """Texts with the names of their bands, from a dict; the text alone if it holds for all bands."""
+    if len(found) == 1:
+        return next(iter(found))
+    return "; ".join(f"{text} ({_listed(item, names)})" for text, names in found.items())
+
+
+def _listed(item, names):
+    """Names of bands, with a dash for three or more that follow each other."""
+    order, runs = [band.name for band in item.bands], []
+    for name in names:
+        if runs and order.index(runs[-1][-1]) + 1 == order.index(name):
+            runs[-1].append(name)
+        else:
+            runs.append([name])
+    return ", ".join(f"{run[0]}–{run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs)
+
+
+def _blur(item):
+    """Kind of the line spread function, and whether it includes more than the detector."""
+    kinds = {}
+    for band in item.bands:
+        given = band.lsf or item.lsf
+        axes = dict.fromkeys(each.kind for each in by_axes(given))
+        text = " and ".join(_KINDS.get(kind, kind) for kind in axes)
+        text += "" if knows_blur(item, band) else ", detector alone"
+        kinds.setdefault(text, []).append(band.name)
+    return _with_bands(item, kinds)
+
+
+_KINDS = {"boxcar": "uniform", "gaussian": "Gaussian"}
+
+
+def _scan(scan):
+    swath = f", swath {scan.swath / 1000:g} km" if scan.swath else ""
+    return f"{scan.kind}, {scan.max_angle:g}° to either side{swath}"
+
+
+def _product(product):
+    sun = "" if product.sun_corrected else " times the cosine of the solar zenith angle"
+    return f"{product.gain:g} × DN {product.offset:+g} is reflectance{sun}; {product.bits} bits"
+
+
+def _bands(item):
+    """Table of the bands, or their range if they are many."""
+    if len(item.bands) > _MOST_BANDS:
+        centres = sorted(band.wavelength for band in item.bands)
+        return f"{len(centres)} bands with centres from {centres[0]:.3f} to {centres[-1]:.3f} µm.\n"
+    columns = [
+        "band",
+        "centre [µm]",
+        "half maximum [µm]",
+        "radiance of DN 0 and of the largest DN",
+    ]
+    columns += ["solar irradiance", "noise"]
+    rows = []
+    for band in item.bands:
+        low, high = half_peak(band.response)
+        radiance = f"{band.min_radiance:.4g} to {band.full_scale_radiance:.4g}"
+        noise = "unknown"
+        if band.noise is not None:
+            ratio = band.noise.radiance / band.noise.equivalent_radiance
+            noise = f"SNR {ratio:.3g} at {band.noise.radiance:.3g}"
+        irradiance = f"{band.solar_irradiance:.5g}"
+        rows.append(
+            [
+                band.name,
+                f"{band.wavelength:.3f}",
+                f"{low:.3f}–{high:.3f}",
+                radiance,
+                irradiance,
+                noise,
+            ]
+        )
+    return _table(columns, rows)
+
+
+def citation():
+    """How to cite the package and the paper, from CITATION.cff."""
+    cited = yaml.safe_load(CITATION.read_text(encoding="utf-8"))
+    (paper,) = cited["references"]
+    authors = [f"{each['family-names']}, {each['given-names']}" for each in paper["authors"]]
+    package = {
+        "title": f"{{{cited['title']}}}",
+        "author": " and ".join(f"{{{each['name']}}}" for each in cited["authors"]),
+        "note": f"Version {fifesim.__version__}",
+    }
+    article = {
+        "title": f"{{{paper['title']}}}",
+        "author": " and ".join(authors),
+        "journal": paper["journal"],
+        "volume": paper["volume"],
+        "pages": f"{paper['start']}--{paper['end']}",
+        "year": paper["year"],
+        "doi": paper["doi"],
+    }
+    names = ", ".join(each["name"] for each in cited["authors"])
+    doi = f"[doi:{paper['doi']}](https://doi.org/{paper['doi']})"
+    return "\n".join(
+        [
+            f"> {names[0].upper()}{names[1:]}. *{cited['title']}*. Version {fifesim.__version__}.\n",
+            f"> {'; '.join(authors)} ({paper['year']}). {paper['title']}. *{paper['journal']}* {paper['volume']}, "
+            f"{paper['start']}–{paper['end']}. {doi}\n",
+            "```bibtex",
+            _bibtex("software", "fifesim", package),
+            _bibtex(
+                "article", f"{paper['authors'][0]['family-names']}{paper['year']}", article
+            ),
+            "```\n",
+        ]
+    )
+
+
+def _bibtex(kind, key, values):
+    """Entry of a bibliography, with lines that fit a page."""
+    lines = [f"@{kind}{{{key},"]
+    for name, value in values.items():
+        lines += wrap(
+            f"{name} = {{{value}}},", 92, initial_indent="  ", subsequent_indent="    "
+        )
+    return "\n".join([*lines, "}"])

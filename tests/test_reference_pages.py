@@ -1,0 +1,229 @@
+"""Tables that the documentation makes from the code are complete."""
+
+import importlib
+import tomllib
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+
+import pytest
+import typer
+import yaml
+
+import fifesim
+from fifesim.cli import app
+from fifesim.scenario.keys import FIELD_LIMITS, Section, StandKeys
+from fifesim.scenario.scenario import Scenario
+from fifesim.sensor.description.instrument_file import Instrument, InstrumentBand
+from fifesim.sensor.response.noise import KINDS
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+BOUNDS = ("ge", "gt", "le", "lt")
+
+
+@pytest.fixture
+def tables(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    return importlib.import_module("make_tables")
+
+
+def sections(text):
+    """Text below each heading of the second level."""
+    parts = text.split("\n## ")
+    parts[0] = parts[0].removeprefix("## ")
+    return {part.partition("\n")[0].strip("`"): part for part in parts}
+
+
+def rows(text):
+    """Cells of the tables of a text by the first cell."""
+    lines = [line.strip("|").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    return {cells[0].strip(" `"): [cell.strip() for cell in cells] for cells in lines}
+
+
+def test_each_page_includes_its_table(tables):
+    pages = {"scenario_keys": "scenario_keys", "command_line": "command_line", "instruments": "instruments"}
+    for page, table in (pages | {"cite": "citation"}).items():
+        assert f"```{{include}} tables/{table}.md" in (DOCS / f"{page}.md").read_text("utf-8")
+        assert callable(getattr(tables, table))
+
+
+def test_scenario_keys_have_unit_range_default_and_meaning(tables):
+    found = sections(tables.scenario_keys())
+    assert list(found) == [f"[{'classes.NAME' if name == 'classes' else name}]" for name in Scenario.model_fields]
+    for name in Scenario.model_fields:
+        is_class = name == "classes"
+        section = Scenario.section((name, "grass") if is_class else (name,))
+        text = found["[classes.NAME]" if is_class else f"[{name}]"]
+        by_key = rows(text)
+        for key, known in section.model_fields.items():
+            if is_class and key in StandKeys.model_fields:
+                assert f"`{key}`" in text
+                continue
+            _, kind, unit, limits, default, meaning = by_key[key]
+            assert kind and meaning.replace("µ", "u") == tables.docstrings.raised(known.description)
+            assert unit == tables.docstrings.raised(f"[{section.unit(key)}]")[1:-1]
+            bounds = [getattr(each, name) for each in known.metadata for name in BOUNDS if hasattr(each, name)]
+            assert all(tables._number(bound) in limits for bound in bounds)
+            if known.default is None:
+                assert default == "–"
+            elif known.default == {}:
+                assert default == "empty"
+            else:
+                assert tomllib.loads(f"key = {default.strip('`')}")["key"] == approx(known.default)
+
+
+def approx(value):
+    return pytest.approx(value) if isinstance(value, float) else value
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "row"),
+    [
+        ("ground", "arp", ["number", "1", "[0, 0.25)", "`0.15`"]),
+        ("grid", "cell", ["number", "m", "≥ 0.001", "`3.333333333`"]),
+        ("ground", "seed", ["whole number", "", "[0, 2⁶³)", "`7`"]),
+        ("landscape", "covary", ["table of numbers", "", "[-1, 1]", "empty"]),
+        ("sensor", "offset", ["two numbers", "pixel", "", "`[0, 0]`"]),
+        ("sensor", "interval", ["name or number", "m", "`product`, `native`", '`"product"`']),
+        ("atmosphere", "adjacency", ["true or false", "", "", "`false`"]),
+        ("atmosphere", "h2o", ["number", "g\N{NO-BREAK SPACE}cm⁻²", "[0, 10]", "–"]),
+    ],
+)
+def test_rows_of_some_keys(tables, section, key, row):
+    assert rows(sections(tables.scenario_keys())[f"[{section}]"])[key][1:5] == row
+
+
+def test_names_of_the_table_are_those_that_a_scenario_accepts(tables):
+    for (section, key), names in tables.NAMES.items():
+        annotation = Scenario.section((section,)).model_fields[key].annotation
+        for name in names:
+            others = {"instrument": "L4TM"} if key == "noise" else {}
+            if name in (*KINDS, "all") and key == "noise":
+                others["noise_model"] = {"thermal": 0.1, "shot": 0.1, "detectors": 2, "gain_spread": 0.1}
+            value = [name] if annotation == list[str] else name
+            found = getattr(fifesim.Scenario(**{section: {key: value} | others}), section)
+            assert getattr(found, key) == value
+        wrong = ["nonsense"] if annotation == list[str] else "nonsense"
+        with pytest.raises(ValueError, match="nonsense"):
+            fifesim.Scenario(**{section: {key: wrong}})
+
+
+def test_limits_of_a_landscape_are_those_of_the_table(tables):
+    for key, (low, high) in FIELD_LIMITS.items():
+        assert rows(sections(tables.scenario_keys())["[landscape]"])[key][3] == f"[{low:g}, {high:g}]"
+        with pytest.raises(ValueError, match="must be in"):
+            fifesim.Scenario(landscape={"cover": "none", "deviations": {"soil": 0.1}} | {key: {"soil": high + 0.01}})
+
+
+def test_a_key_of_an_unknown_type_is_an_error(tables):
+    class Other(Section):
+        key: bytes = b""
+
+    with pytest.raises(KeyError):
+        tables._type(Other.model_fields["key"], ())
+
+
+def test_every_command_option_and_help_text_is_on_the_page(tables):
+    group = typer.main.get_command(app)
+    found = sections(tables.command_line())
+    assert list(found) == list(group.commands)
+    for name, command in group.commands.items():
+        assert command.help in found[name]
+        for parameter in command.params:
+            assert " ".join(parameter.help.split()) in " ".join(found[name].split())
+            names = parameter.opts if parameter.param_type_name == "option" else [parameter.name]
+            assert all(option in found[name] for option in names)
+    assert (
+        "(default: fife)" in found["simulate"]
+        and "`--threads <int>` | Number of threads; by default one per core. (at least 1)" in found["simulate"]
+    )
+    assert "default: 0" not in found["simulate"]
+    assert "fifesim rerun [OPTIONS] {file}" in found["rerun"]
+
+
+def test_every_number_of_an_instrument_has_its_source_on_the_page(tables):
+    page = tables.instruments()
+    found = {name.partition("\n")[0]: text for name, text in sections(page).items()}
+    for name in fifesim.instrument_names():
+        item, text = fifesim.instrument(name), found[name]
+        by_quantity = rows(text)
+        for number in tables.given_numbers(item):
+            cells = by_quantity[tables.QUANTITIES.get(number, [number.replace("_", " ")])[0]]
+            keys = {band.sources.get(number) or item.sources.get(number) for band in item.bands}
+            assert all(key in cells[2] for key in keys if key)
+        assert all(f"**{key}**: {publication}" in text for key, publication in item.references.items())
+        assert all(gap in text for gap in item.not_found.values())
+        assert all(band.name in text for band in item.bands if len(item.bands) < 22)
+        assert f"(#{tables._anchor(item)})" in page and f"({tables._anchor(item)})=" in page
+
+
+def test_values_of_an_instrument(tables):
+    found = sections(tables.instruments())
+    tm, msi = rows(found["TM"]), rows(found["MSI"])
+    assert tm["altitude"][1:3] == ["705 km", "Friedl1995"]
+    assert tm["geolocation error (rms along each axis)"][1:3] == ["8.5 m", "USGS2020"]
+    assert "20 m (MSI5–MSI7, MSI8A, MSI11, MSI12)" in msi["pixel of the gridded product"][1]
+    assert msi["MSI10"][-1] == "SNR 50 at 6" and tm["TM3"][3:5] == ["-1.2 to 204.3", "1536"]
+    overview = rows(tables.instruments().partition("## ")[0])
+    assert overview["[MSS](#instrument-mss)"][2:] == ["60", "6", "4", "unknown", "unknown", "unknown"]
+    assert overview["[L4TM](#instrument-l4tm)"][-3] != "unknown" and overview["[L4TM](#instrument-l4tm)"][-1] == "8.5 m"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """As an instrument file may state it."""
+
+    kind: str
+    uncertainty: float | None = None
+
+
+@dataclass(frozen=True)
+class DescribedBand(InstrumentBand):
+    origin: dict = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Described(Instrument):
+    origin: dict = field(default_factory=dict)
+
+
+def values_of(item):
+    return {each.name: getattr(item, each.name) for each in fields(item)}
+
+
+def test_instruments_with_further_fields_get_further_columns(tables):
+    known = fifesim.instrument("L4TM")
+    first, *others = (DescribedBand(**values_of(band)) for band in known.bands)
+    first = DescribedBand(**values_of(first) | {"origin": {"noise": Origin("assumed")}})
+    stated = {"blur": Origin("in-flight", 0.1), "noise": Origin("required", 2.0), "altitude": "read"}
+    item = Described(**values_of(known) | {"bands": (first, *others), "origin": stated})
+    found = rows(tables._instrument(item))
+    assert found["quantity"][-1] == "origin" and found["scan"][-1] == "" and found["altitude"][-1] == "read"
+    assert found["line spread function"][-1] == "in-flight; uncertainty 0.1"
+    names = [band.name for band in others]
+    assert found["noise"][-1] == f"assumed ({first.name}); required; uncertainty 2 ({names[0]}–{names[-1]})"
+    overview = tables._overview(item)
+    count = len(known.bands)
+    assert overview[-3:-1] == ["in-flight", f"assumed (1 of {count} bands), required ({count - 1} of {count} bands)"]
+
+
+def test_page_on_citing_has_the_work_and_the_paper(tables):
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    (paper,) = cited["references"]
+    text = tables.citation()
+    flat = " ".join(text.split())
+    assert cited["title"] in text and fifesim.__version__ in text
+    assert f"title = {{{{{paper['title']}}}}}" in flat and f"https://doi.org/{paper['doi']}" in text
+    assert f"volume = {{{paper['volume']}}}" in text and f"{paper['start']}--{paper['end']}" in text
+    assert all(each["family-names"] in text for each in paper["authors"])
+    assert max(map(len, text.partition("```bibtex")[2].splitlines())) <= 96
+
+
+def test_visibilities_of_the_page_have_their_optical_thickness():
+    page = (DOCS / "howto" / "aerosol.md").read_text("utf-8")
+    found = [cells for name, cells in rows(page).items() if name.endswith(" km")]
+    assert len(found) == 5
+    for visibility, aot, _ in found:
+        air = fifesim.Atmosphere(visibility=float(visibility.removesuffix(" km")))
+        assert f"{air.aot:.2f}" == aot
+    assert "45 km of visibility" in page and fifesim.Scenario().atmosphere.visibility == 45

@@ -1,0 +1,108 @@
+"""Pictures, table and statements of the page on the scatter between NDVI and LAI follow from the budget."""
+
+import importlib
+import re
+from collections import Counter
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+
+import fifesim
+from fifesim.experiments.scatter.stages import STAGES
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+@pytest.fixture
+def why(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    yield importlib.import_module("make_why_scatter")
+    plt.close("all")
+
+
+@pytest.fixture
+def case(why):
+    """A small part of the scene without hills, which take more time than all else."""
+    sections = why.scenario(cells=108).model_dump(exclude_unset=True)
+    sections["terrain"], sections["landscape"]["covary"] = {"dem": "flat"}, {"soil": -0.3}
+    return fifesim.Scenario(**sections)
+
+
+def test_panels_and_rows_have_each_stage_once(why):
+    assert Counter(stage for stages in why.CAUSES.values() for stage in stages) == Counter(list(STAGES))
+    assert Counter(stage for stages in why.ROWS.values() for stage in stages) == Counter([*STAGES, "curvature"])
+
+
+def test_panels_are_the_budget_of_their_scene(why, case):
+    found = why.panels(case)
+    budget = fifesim.budget(case, realisations=1, cells=108).isel(realisation=0).sel(variable="lai")
+    assert found[0].r2 == pytest.approx(1 - float(budget["curvature"]), abs=1e-9)
+    assert found[-1].r2 == pytest.approx(1 - float(budget["total"]), abs=1e-9)
+    assert len({panel.r2 for panel in found}) >= 5
+    figure = why.draw_panels(found)
+    for panel, axis in zip(found, figure.axes, strict=True):
+        assert panel.r2 == pytest.approx(np.corrcoef(panel.lai, panel.ndvi)[0, 1] ** 2, abs=1e-9)
+        assert axis.texts[0].get_text() == f"R² = {panel.r2:.2f}"
+        points, line = axis.get_lines()
+        np.testing.assert_array_equal(points.get_xydata().T, [panel.ndvi, panel.lai])
+        slope = np.diff(line.get_ydata()) / np.diff(line.get_xdata())
+        assert slope[0] == pytest.approx(np.polyfit(panel.ndvi, panel.lai, 1)[0])
+
+
+def test_mixed_pixel_has_the_ndvi_of_its_mean_reflectance(why):
+    area, ndvi, (low, high, mean), (at_low, at_high, even), mixed = why.mixed_pixel()
+    assert mean == (low + high) / 2 and np.all(np.diff(ndvi) > 0)
+    assert np.interp([low, high, mean], area, ndvi) == pytest.approx([at_low, at_high, even], abs=1e-3)
+    assert at_low < mixed < even - 0.1
+
+
+def test_displaced_pixel_is_typical(why, case):
+    figure = why.draw_pixel(case)
+    truth, pixel = (patch.get_label() for patch in figure.axes[1].patches)
+    difference = abs(np.subtract(*(float(re.search(r"[\d.]+$", text)[0]) for text in (truth, pixel))))
+    lai = fifesim.simulate(case)["scene"]["lai"].values
+    means = [
+        lai[9 + shift : 99 + shift, 9 + shift : 99 + shift].reshape(10, 9, 10, 9).mean(axis=(1, 3)) for shift in (0, 3)
+    ]
+    assert difference == pytest.approx(np.sqrt(np.mean((means[0] - means[1]) ** 2)), abs=0.03)
+    corners = [patch.get_xy() for patch in figure.axes[1].patches]
+    assert corners[0] == (0, 0) and corners[1] == pytest.approx((10, -10))
+
+
+def test_table_sums_to_the_total_of_the_budget(why):
+    found, table = why.shares(), pd.read_csv(why.TABLE)
+    total = table.query("variable == 'lai' and stage == 'total'").set_index("instrument")["share"]
+    for name, column in found.items():
+        assert column.loc[list(why.ROWS)].sum() == pytest.approx(column["total"], abs=0.1)
+        assert column["total"] == pytest.approx(100 * total[name])
+    lines = why.share_table().splitlines()
+    assert len(lines) == 2 + len(why.ROWS) + 2
+    assert lines[2].startswith(f"| geolocation error | {found.loc['geolocation error', 'TM']:.1f} % |")
+    assert "−" in why.share_table() and "-0.0" not in why.share_table() and "−0.0" not in why.share_table()
+
+
+def test_statements_of_the_page_on_the_table(why):
+    found = why.shares()
+    causes = found.loc[list(why.ROWS)]
+    for name in ("TM", "MSI"):
+        assert list(causes[name].nlargest(2).index) == ["geolocation error", "soil, dead leaves and litter"]
+    assert causes.loc["variation of LAI within pixels"].abs().max() < 1
+    assert causes.loc[["terrain", "atmosphere"]].abs().max().max() < 2
+    assert found.loc["total"].idxmin() == "MODIS"
+    part = found.loc["sub-pixel variation"] / found.loc["total"]
+    assert part["TM"] == pytest.approx(1 / 3, abs=0.05) and part[["MSI", "MODIS"]].abs().max() < 0.02
+    assert causes.loc["correlation of LAI with soil and terrain", ["TM", "MSI"]].max() < -3
+
+
+def test_statements_of_the_page_on_the_panels(why):
+    """Of the very scene of the picture."""
+    page = (DOCS / "why_scatter.md").read_text("utf-8")
+    assert "most in panels 3 and 5" in page
+    found = why.panels(why.scenario())
+    falls = -np.diff([panel.r2 for panel in found])
+    assert set(np.argsort(falls)[-2:]) == {1, 3} and falls[[1, 3]].min() > 0.05
+    assert np.abs(falls[[0, 4]]).max() < 0.03
+    assert found[2].lai.std() > 1.1 * found[1].lai.std()
