@@ -68,7 +68,7 @@ def fit_line(pixels, levels, seed, *, red_and_near_infrared):
 
 def by_line(tables, reflectance, angles, levels):
     """Prediction and prediction intervals of a line on NDVI."""
-    red, near = tables["bands"]
+    red, near = tables["bands"].astype(int)
     ndvi = normalized_difference(reflectance[:, near], reflectance[:, red])
     middle, spread, quantiles = [], [], []
     for row in tables["line"]:

@@ -24,8 +24,8 @@ StudyOrDataset = Annotated[
     Kind("the path of a study, a fifesim.Study, or a dataset of chips as fifesim.dataset gives it", dimensions=0),
 ]
 
-# Pixels of a part that are used, more do not improve a network of this size.
-_PIXELS = 100_000
+# Pixels of the training that are used, more do not improve a network of this size, and of the other parts.
+_PIXELS, _UNSEEN = 100_000, 20_000
 
 _LEVELS = (0.5, 0.8, 0.95)
 
@@ -188,7 +188,7 @@ def _chosen_bands(dataset, bands):
 
 
 def _pixels(dataset, variable, bands, names, part, seed):
-    """Valid pixels of one part of a dataset, at most 100,000."""
+    """Valid pixels of one part of a dataset, a random choice of them if there are many."""
     own = dataset.isel(chip=np.flatnonzero(dataset["split"].values == part)).sel(band=list(bands))
     light = np.asarray(own[variable].transpose("chip", "y", "x", "band").values, float)
     chips, rows, columns, width = light.shape
@@ -203,7 +203,7 @@ def _pixels(dataset, variable, bands, names, part, seed):
     valid = np.flatnonzero(np.isfinite(flat).all(1) & np.isfinite(true).all(1))
     if not valid.size:
         raise ValueError(f"no pixel of the part {part} has both reflectance and truth")
-    chosen = np.sort(np.random.default_rng(seed).permutation(valid)[:_PIXELS])
+    chosen = np.sort(np.random.default_rng(seed).permutation(valid)[: _PIXELS if part == "train" else _UNSEEN])
     whole = chip[chosen]
     return methods.Pixels(flat[chosen], angles[whole], true[chosen], whole, own["landscape"].values[whole])
 
