@@ -48,7 +48,8 @@ def lookup(measured, members, states, probabilities):
     (True, True)
     """
     orders = np.argsort(states, axis=0, kind="stable").T.copy()
-    return _lookup(*(np.ascontiguousarray(each, float) for each in (measured, members.T, states)), orders, probabilities)
+    arrays = (np.ascontiguousarray(each, float) for each in (measured, members.T, states))
+    return _lookup(*arrays, orders, np.asarray(probabilities, float))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -199,7 +200,9 @@ def optimal_estimation(
         inverse = gain @ slope[active] + sharpness
         downhill = np.einsum("nkm,nm->nk", gain, measured[active] - modelled[active])
         downhill -= (state[active] - prior) @ sharpness
-        step = np.linalg.solve(inverse + damping[active, None, None] * sharpness, downhill[..., None])[..., 0]
+        # Marquardt's scaling by the diagonal works for weak priors too.
+        damped = inverse * (1 + damping[active, None, None] * np.eye(size))
+        step = np.linalg.solve(damped, downhill[..., None])[..., 0]
         tried = np.clip(state[active] + step, lowest, highest)
         moved = tried - state[active]
         values, slopes = forward(tried, active)
@@ -210,7 +213,7 @@ def optimal_estimation(
         state[at], modelled[at], slope[at], cost[at] = tried[better], values[better], slopes[better], found[better]
         damping[active] = np.where(better, damping[active] * _LESS_DAMPING, damping[active] * _MORE_DAMPING)
         # Where no step lowers the cost any more, rounding is reached.
-        converged[active] = length < tolerance
+        converged[active] = (length < tolerance) & (better | (damping[active] > 1))
         active = active[~converged[active] & (damping[active] < _LARGEST_DAMPING)]
     inverse = np.swapaxes(slope, 1, 2) @ weight @ slope + sharpness
     covariance = np.linalg.inv(inverse)

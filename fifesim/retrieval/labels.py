@@ -9,7 +9,8 @@ from typing import Annotated
 import numpy as np
 import xarray as xr
 
-from fifesim.base.arguments import Kind, described
+from fifesim.base.arguments import Kind
+from fifesim.base.files import shown
 from fifesim.grids import cf, chunks, swaths
 from fifesim.retrieval.description import ANGLE_MARGIN, OUTSIDE, Retrieval
 from fifesim.retrieval.methods import relative_azimuth
@@ -43,20 +44,18 @@ RetrievalLike = Annotated[
 ]
 
 
-def retrieve(
-    image: xr.DataArray, retrieval: RetrievalLike, intervals: Sequence[float] | None = None
-) -> xr.Dataset:
+def retrieve(image: xr.DataArray, retrieval: RetrievalLike, intervals: Sequence[float] | None = None) -> xr.Dataset:
     """
     Estimate leaf area and related quantities of each pixel, with intervals and a flag.
 
     Parameters
     ----------
     image : xarray.DataArray, dims (band, y, x)
-        Reflectance, at the level for which the retrieval was trained, with the coordinates ``sza``, ``saa``, ``vza`` and
-        ``vaa``, as images of `sense`, `open_landsat` and `open_sentinel2` have them. [1]
+        Reflectance, at the level for which the retrieval was trained, with the coordinates ``sza``, ``saa``, ``vza``
+        and ``vaa``, as images of `sense`, `open_landsat` and `open_sentinel2` have them. [1]
     retrieval : Retrieval or "sl2p"
-        From `train` or `read_retrieval`; or the networks of ESA's Level-2 prototype processor for surface reflectance of
-        Sentinel-2, which have no intervals.
+        From `train` or `read_retrieval`; or the networks of ESA's Level-2 prototype processor for surface reflectance
+        of Sentinel-2, which have no intervals.
     intervals : sequence of float, optional
         Levels of the central intervals, some of those of the training; by default all. [1]
 
@@ -65,7 +64,8 @@ def retrieve(
     estimates : xarray.Dataset, dims (y, x)
         For each quantity, such as ``lai``: its median, the standard deviation ``lai_sd``, and the ends ``lai_low`` and
         ``lai_high`` of intervals, with a first dimension ``level``. ``flag`` has the bits 1, outside of the training
-        inputs, 2, at the edge of the prior, and 4, no convergence, as described by its CF attributes; use pixels with 0.
+        inputs, 2, at the edge of the prior, and 4, no convergence, as described by its CF attributes; use pixels with
+        flag 0.
         SL2P gives ``lai``, ``fpar``, ``fcover`` and ``flag``. Lazy if the image is.
 
     Raises
@@ -125,9 +125,10 @@ def _levels(retrieval, intervals):
     """Levels of the intervals, increasing."""
     wanted = retrieval.levels if intervals is None else tuple(sorted(float(level) for level in intervals))
     if not wanted or not set(wanted) <= set(retrieval.levels):
+        known = ", ".join(f"{level:g}" for level in retrieval.levels)
         raise ValueError(
-            f"intervals must be among the levels of the training, {', '.join(f'{each:g}' for each in retrieval.levels)}, "
-            f"got {described(intervals)}: train with levels=[...] for others"
+            f"intervals must be among the levels of the training, {known}, got {shown(list(wanted))}: train with "
+            "levels=[...] for others"
         )
     return wanted
 

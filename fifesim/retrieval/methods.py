@@ -143,9 +143,7 @@ def fit_quantiles(pixels, levels, seed):
     spread = np.where(spread > 1e-6, spread, np.inf)
     centre, scale = pixels.truth.mean(0), pixels.truth.std(0)
     scale = np.where(scale > 0, scale, 1.0)
-    layers = train_quantiles(
-        (inputs - mean) / spread, (pixels.truth - centre) / scale, probabilities_of(levels), seed
-    )
+    layers = train_quantiles((inputs - mean) / spread, (pixels.truth - centre) / scale, probabilities_of(levels), seed)
     found = {"input_mean": mean, "input_spread": spread, "centre": centre, "scale": scale}
     for number, (weight, bias) in enumerate(zip(layers.weights, layers.biases, strict=True)):
         found |= {f"weight{number}": weight, f"bias{number}": bias}

@@ -1,5 +1,6 @@
 """Small feed-forward networks: evaluation, training for quantiles, and ESA's networks for Sentinel-2."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -76,7 +77,7 @@ def train_quantiles(inputs, targets, probabilities, seed, weights=None, epochs=6
     Returns
     -------
     layers : Layers
-        Its outputs are quantiles by target and probability, flattened in this order. They may cross slightly: sort them.
+        Its outputs are quantiles by target and probability, flattened in this order. They may cross slightly.
 
     References
     ----------
@@ -85,7 +86,7 @@ def train_quantiles(inputs, targets, probabilities, seed, weights=None, epochs=6
     rng = np.random.default_rng(seed)
     count, width = targets.shape[1], len(probabilities)
     sizes = (inputs.shape[1], _HIDDEN, _HIDDEN, count * width)
-    found = [rng.normal(0, 1 / np.sqrt(a), (a, b)) for a, b in zip(sizes[:-1], sizes[1:], strict=True)]
+    found = [rng.normal(0, 1 / np.sqrt(a), (a, b)) for a, b in pairwise(sizes)]
     # Quantiles of the targets are a good first guess without any input.
     found[-1] *= 0.1
     first = np.quantile(targets, probabilities, axis=0).T.ravel()
@@ -145,7 +146,10 @@ class _Sl2p(NamedTuple):
 
 @cached(1, "networks of SL2P")
 def _sl2p_networks():
-    weights, ranges = files.table("sl2p/weights.csv"), files.table("sl2p/ranges.csv").set_index(["variable", "quantity"])
+    weights, ranges = (
+        files.table("sl2p/weights.csv"),
+        files.table("sl2p/ranges.csv").set_index(["variable", "quantity"]),
+    )
     names, found = (*SL2P_BANDS, *_ANGLES), {}
     for variable in SL2P_QUANTITIES:
         own, its = weights[weights.variable == variable], ranges.loc[variable]
