@@ -36,7 +36,7 @@ def retrieval(request, chips):
 
 @pytest.fixture(scope="module")
 def image():
-    return fifesim.simulate(CHIP.replace(width=600, height=450, **{"ground.seed": 1234}))
+    return fifesim.simulate(CHIP.replace(width=300, height=240, **{"ground.seed": 1234}))
 
 
 def test_intervals_hold_on_unseen_landscapes(retrieval):
