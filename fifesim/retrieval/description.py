@@ -15,7 +15,7 @@ from fifesim.base.annotations import FilePath
 from fifesim.base.files import check_regular, in_a_line
 from fifesim.retrieval import methods
 
-QUANTITIES = {"lai": (0.0, 20.0), "fpar": (0.0, 1.0), "green_fpar": (0.0, 1.0)}
+RETRIEVED = {"lai": (0.0, 20.0), "fpar": (0.0, 1.0), "green_fpar": (0.0, 1.0)}
 """Quantities that a retrieval may estimate, and their physical ranges."""
 
 FORMAT = 1
@@ -28,7 +28,7 @@ OUTSIDE, EDGE, NOT_CONVERGED = 1, 2, 4
 """Bits of the flag."""
 
 
-class Retrieved(NamedTuple):
+class Estimated(NamedTuple):
     """Estimates of pixels with intervals and flags."""
 
     median: np.ndarray
@@ -87,7 +87,7 @@ class Retrieval:
     score: xr.Dataset | None = field(default=None, repr=False)
     _in_words: ClassVar[str] = "a fifesim.Retrieval, as fifesim.train gives it"
 
-    def estimate(self, reflectance, angles) -> Retrieved:
+    def estimate(self, reflectance, angles) -> Estimated:
         """
         Estimate the quantities of pixels.
 
@@ -99,7 +99,7 @@ class Retrieval:
 
         Returns
         -------
-        retrieved : Retrieved
+        estimates : Estimated
             NaN for pixels with NaN.
         """
         known = np.isfinite(reflectance).all(1) & np.isfinite(angles).all(1)
@@ -110,7 +110,7 @@ class Retrieval:
         if known.any():
             light, own = reflectance[known], angles[known]
             found = methods.ESTIMATORS[self.method](self.tables, light, own, levels=self.levels)
-            allowed = np.array([QUANTITIES[name] for name in self.quantities]).T
+            allowed = np.array([RETRIEVED[name] for name in self.quantities]).T
             median[known], sd[known] = np.clip(found.median, *allowed), found.sd
             for at, level in enumerate(self.levels):
                 ends = methods.ends_of(found.quantiles, self.levels, level)
@@ -126,7 +126,7 @@ class Retrieval:
         # Factors differ by level; a wider interval contains the narrower ones.
         np.minimum.accumulate(low, axis=2, out=low)
         np.maximum.accumulate(high, axis=2, out=high)
-        return Retrieved(median, sd, low, high, flag)
+        return Estimated(median, sd, low, high, flag)
 
     def to_netcdf(self, path: FilePath):
         """

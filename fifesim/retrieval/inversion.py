@@ -10,7 +10,7 @@ import numpy as np
 _NEGLIGIBLE = 20.0
 
 
-def lookup(measured, members, states, probabilities):
+def table_posterior(measured, members, states, probabilities):
     """
     Posterior mean, standard deviation and quantiles from the likelihood of the members of a table.
 
@@ -43,18 +43,18 @@ def lookup(measured, members, states, probabilities):
     --------
     >>> import numpy as np
     >>> prior = np.random.default_rng(1).normal(0, 1, (20_000, 1))
-    >>> mean, sd, _, _ = lookup(np.array([[2.0]]), prior, prior, np.array([0.5]))
+    >>> mean, sd, _, _ = table_posterior(np.array([[2.0]]), prior, prior, np.array([0.5]))
     >>> abs(mean[0, 0] - 1) < 0.02, abs(sd[0, 0] - 0.5**0.5) < 0.02
     (True, True)
     """
     orders = np.argsort(states, axis=0, kind="stable").T.copy()
     arrays = (np.ascontiguousarray(each, float) for each in (measured, members.T, states))
-    return _lookup(*arrays, orders, np.asarray(probabilities, float))
+    return _table_posterior(*arrays, orders, np.asarray(probabilities, float))
 
 
 @numba.njit(cache=True, nogil=True)
-def _lookup(measured, members, states, orders, probabilities):
-    """Body of `lookup`, with members of shape (m, k) and their order along each quantity."""
+def _table_posterior(measured, members, states, orders, probabilities):
+    """Body of `table_posterior`, with members of shape (m, k) and their order along each quantity."""
     count, width = measured.shape
     size, kinds = states.shape
     mean, sd = np.empty((count, kinds)), np.empty((count, kinds))

@@ -1,7 +1,6 @@
 """Methods of retrieval on arrays of pixels: how each is fitted to training pixels, and how it estimates."""
 
 import math
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -9,10 +8,8 @@ from scipy import stats
 
 from fifesim.analysis import regression
 from fifesim.analysis.indices import normalized_difference
-from fifesim.retrieval.inversion import lookup
-from fifesim.retrieval.networks import Layers, network, train_quantiles
-
-Tables = Mapping[str, np.ndarray]
+from fifesim.retrieval.inversion import table_posterior
+from fifesim.retrieval.networks import Network, network, train_quantiles
 
 
 class Pixels(NamedTuple):
@@ -132,7 +129,7 @@ def by_lookup(tables, reflectance, angles, levels):
     """Posterior of the members of a lookup table."""
     measured = np.hstack([reflectance @ tables["scale"], angles[:, tables["varies"].astype(bool)] / _ANGLE])
     wanted = probabilities_of(levels)
-    _, sd, quantiles, _ = lookup(measured, tables["members"], tables["states"], wanted)
+    _, sd, quantiles, _ = table_posterior(measured, tables["members"], tables["states"], wanted)
     return Estimates(quantiles[..., len(levels)], sd, quantiles)
 
 
@@ -159,7 +156,7 @@ def by_quantiles(tables, reflectance, angles, levels):
     """Quantiles of a network."""
     inputs = (_inputs(reflectance, angles) - tables["input_mean"]) / tables["input_spread"]
     names = sorted(name for name in tables if name.startswith("weight"))
-    layers = Layers(
+    layers = Network(
         tuple(tables[name] for name in names), tuple(tables[name.replace("weight", "bias")] for name in names)
     )
     wanted = probabilities_of(levels)

@@ -9,7 +9,7 @@ from fifesim.base import files
 from fifesim.base.caches import cached
 
 
-class Layers(NamedTuple):
+class Network(NamedTuple):
     """Weights and biases of a network by layer, shapes (inputs, outputs) and (outputs,)."""
 
     weights: tuple[np.ndarray, ...]
@@ -24,7 +24,7 @@ def network(inputs, layers):
     ----------
     inputs : array, shape (n, inputs)
         Normalised inputs.
-    layers : Layers
+    layers : Network
 
     Returns
     -------
@@ -33,7 +33,7 @@ def network(inputs, layers):
     Examples
     --------
     >>> import numpy as np
-    >>> layers = Layers((np.ones((2, 1)), np.full((1, 1), 3.0)), (np.zeros(1), np.ones(1)))
+    >>> layers = Network((np.ones((2, 1)), np.full((1, 1), 3.0)), (np.zeros(1), np.ones(1)))
     >>> network(np.array([[0.5, -0.5]]), layers).tolist()
     [[1.0]]
     """
@@ -76,7 +76,7 @@ def train_quantiles(inputs, targets, probabilities, seed, weights=None, epochs=6
 
     Returns
     -------
-    layers : Layers
+    layers : Network
         Its outputs are quantiles by target and probability, flattened in this order. They may cross slightly.
 
     References
@@ -108,7 +108,7 @@ def train_quantiles(inputs, targets, probabilities, seed, weights=None, epochs=6
                 mean[at] += (1 - _MEAN) * (slope - mean[at])
                 square[at] += (1 - _SQUARE) * (slope * slope - square[at])
                 found[at] = found[at] - pace * mean[at] / (np.sqrt(square[at]) + _TINY)
-    return Layers(tuple(found[:3]), tuple(found[3:]))
+    return Network(tuple(found[:3]), tuple(found[3:]))
 
 
 def _slopes(found, inputs, targets, probabilities, share):
@@ -136,7 +136,7 @@ _ANGLES = ("cos_vza", "cos_sza", "cos_raa")
 class _Sl2p(NamedTuple):
     """Network of a quantity, and ranges for normalisation and domain."""
 
-    layers: Layers
+    layers: Network
     inputs: np.ndarray  # (2, 11)
     output: np.ndarray  # (2,)
     domain: np.ndarray  # (2, 8)
@@ -156,7 +156,7 @@ def _sl2p_networks():
         hidden = own[own.layer == "hidden"].pivot(index="input", columns="neuron", values="weight")
         output = own[own.layer == "output"].set_index("input").weight
         neurons = [f"hidden{number}" for number in hidden.columns]
-        layers = Layers(
+        layers = Network(
             (hidden.loc[list(names)].to_numpy(), output[neurons].to_numpy()[:, None]),
             (hidden.loc["bias"].to_numpy(), output[["bias"]].to_numpy()),
         )

@@ -15,7 +15,7 @@ from fifesim.base.arguments import Kind, described
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
 from fifesim.output.chips.store import chip_arrays, layout_of
 from fifesim.retrieval import methods
-from fifesim.retrieval.description import FORMAT, QUANTITIES, Retrieval
+from fifesim.retrieval.description import FORMAT, RETRIEVED, Retrieval
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.studies import Study, read_study
 
@@ -141,9 +141,9 @@ def train(
 def _check(method, names, levels):
     if method not in methods.FITS:
         raise ValueError(f"method must be one of {', '.join(methods.FITS)}, got {method!r}")
-    wrong = [name for name in names if name not in QUANTITIES]
+    wrong = [name for name in names if name not in RETRIEVED]
     if wrong or not names or len(set(names)) < len(names):
-        raise ValueError(f"quantities must be different names among {', '.join(QUANTITIES)}, got {described(names)}")
+        raise ValueError(f"quantities must be different names among {', '.join(RETRIEVED)}, got {described(names)}")
     if not len(levels) or not all(0 < each < 1 for each in levels) or len(set(levels)) < len(levels):
         raise ValueError(f"levels must be different numbers between 0 and 1, got {described(levels)}")
 
@@ -168,7 +168,7 @@ def _check_dataset(dataset, variable, names):
         cure = "give chips as fifesim.dataset makes them"
         if "surface_reflectance" in lacking:
             cure = "add the corrected reflectance of your processor to the dataset, or use level='toa'"
-        if set(lacking) <= set(QUANTITIES):
+        if set(lacking) <= set(RETRIEVED):
             cure = "choose other quantities"
         raise ValueError(f"the dataset has no {', '.join(lacking)}: {cure}")
     parts = set(np.unique(dataset["split"].values).tolist())

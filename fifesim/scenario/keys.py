@@ -368,7 +368,7 @@ class AirKeys(Section):
         return values | {"visibility": values.get("visibility")} if by_aot else values
 
 
-SHIFTS = ("down", "across")
+OFFSET_PARTS = ("down", "across")
 """Names of the two parts of ``sensor.offset``, each of which a study may draw."""
 
 
@@ -425,9 +425,9 @@ class SensorKeys(Section):
     @classmethod
     def _named_offset(cls, value):
         if isinstance(value, dict):
-            if set(value) != set(SHIFTS):
-                raise ValueError(f"must have {' and '.join(SHIFTS)}, or be a list of both")
-            return [value[name] for name in SHIFTS]
+            if set(value) != set(OFFSET_PARTS):
+                raise ValueError(f"must have {' and '.join(OFFSET_PARTS)}, or be a list of both")
+            return [value[name] for name in OFFSET_PARTS]
         return value
 
     @field_validator("offset")

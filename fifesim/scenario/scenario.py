@@ -23,7 +23,7 @@ from fifesim.grids.sites import on_fife_site
 from fifesim.ground.landscape.classes import SHARES, CoverClass, fife_classes
 from fifesim.ground.landscape.distribution import treatments
 from fifesim.scenario.ground import check_leaf_area, drawn_properties
-from fifesim.scenario.keys import COVARIATES, EXTENT, SHIFTS, ByName, GridKeys, Keys
+from fifesim.scenario.keys import COVARIATES, EXTENT, OFFSET_PARTS, ByName, GridKeys, Keys
 from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
 from fifesim.scenario.toml import full_path, load_values, mistakes
 from fifesim.sensor.description.fields import false_colour_bands
@@ -570,7 +570,7 @@ def _has(section, parts):
         return False
     if len(parts) != 2:
         return len(parts) == 1
-    return section.model_fields[parts[0]].annotation == ByName or (parts[0] == "offset" and parts[1] in SHIFTS)
+    return section.model_fields[parts[0]].annotation == ByName or (parts[0] == "offset" and parts[1] in OFFSET_PARTS)
 
 
 def values_of(scenario):

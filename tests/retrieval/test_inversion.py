@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from fifesim.retrieval.inversion import lookup, optimal_estimation
+from fifesim.retrieval.inversion import optimal_estimation, table_posterior
 
 LINEAR = pd.read_csv(Path(__file__).parents[1] / "data" / "optimal_estimation_linear.csv", comment="#")
 PROBLEMS = {
@@ -87,7 +87,7 @@ def test_lookup_converges_to_the_normal_posterior_as_the_root_of_the_members():
         found = []
         for _ in range(60):
             states = rng.normal(0, spread, (count, 1))
-            found.append(lookup(measured, states @ slope.T, states, np.array([0.1, 0.5, 0.9])))
+            found.append(table_posterior(measured, states @ slope.T, states, np.array([0.1, 0.5, 0.9])))
         errors[count] = np.sqrt(np.mean([(each[0][0, 0] - mean) ** 2 for each in found]))
         deviations[count] = np.mean([each[1][0, 0] for each in found])
     assert errors[400] / errors[6400] == pytest.approx(4, rel=0.35)
@@ -101,7 +101,7 @@ def test_lookup_by_brute_force():
     rng = np.random.default_rng(4)
     members, states, measured = rng.normal(size=(30, 2)), rng.normal(size=(30, 2)), rng.normal(size=(5, 2))
     wanted = np.array([0.05, 0.4, 0.5, 0.95])
-    mean, sd, quantiles, chi_square = lookup(measured, members, states, wanted)
+    mean, sd, quantiles, chi_square = table_posterior(measured, members, states, wanted)
     for pixel in range(5):
         distance = ((measured[pixel] - members) ** 2).sum(1)
         weight = np.exp(-0.5 * distance)
@@ -117,5 +117,5 @@ def test_lookup_by_brute_force():
 
 
 def test_lookup_of_a_missing_measurement_is_missing():
-    found = lookup(np.array([[np.nan, 0.0]]), np.zeros((3, 2)), np.ones((3, 1)), np.array([0.5]))
+    found = table_posterior(np.array([[np.nan, 0.0]]), np.zeros((3, 2)), np.ones((3, 1)), np.array([0.5]))
     assert all(np.isnan(each).all() for each in found)

@@ -91,7 +91,7 @@ def test_slopes_are_the_derivatives_of_the_loss():
     wanted = np.array([0.2, 0.7])
 
     def loss(values):
-        outputs = networks.network(inputs, networks.Layers(tuple(values[:3]), tuple(values[3:])))
+        outputs = networks.network(inputs, networks.Network(tuple(values[:3]), tuple(values[3:])))
         error = targets - outputs
         return (np.maximum(wanted * error, (wanted - 1) * error).sum(1) * share).mean()
 
