@@ -74,25 +74,30 @@ def cells(name):
 
 
 def readme(found):
-    """Speed in a few lines."""
+    """Speed in three points."""
     (size, level), (_, hills), scene = *(speeds(found[name]) for name in (LEVEL, HILLS)), found[LANDSAT]
     clock, memory = float(scene["on the clock [s]"]), float(scene["peak memory [GB]"])
     elsewhere = "" if machine(scene) == machine(found[LEVEL]) else f" (measured on an {machine(scene)})"
-    text = f"""On one core ({machine(found[LEVEL])}) fifesim simulates {level} million ground cells per second on level
+    lines = [
+        f"""On one core ({machine(found[LEVEL])}), fifesim simulates {level} million ground cells per second on level
         ground and {hills} million on hills, from random field to digital numbers in two bands ({size} million cells of
-        3.33 m). A Landsat scene of 185 km ({cells(LANDSAT)} million cells) takes {clock:.0f} s and {memory:.1f} GB
-        on two cores{elsewhere}."""
+        3.33 m).""",
+        f"""A Landsat scene of 185 km ({cells(LANDSAT)} million cells) takes {clock:.0f} s and {memory:.1f} GB on two
+        cores{elsewhere}.""",
+    ]
     if EACH in found and INTERPOLATED in found:
         ours, other = "fifesim: million cells/s", "other: million cells/s"
-        text += f""" SAIL in each cell reaches {found[EACH][ours]} million cells per second
-            (radiative-transfer-models: {found[EACH][other]}); interpolated in LAI, with an error below 1e-6, it reaches
+        lines.append(
+            f"""SAIL in each cell reaches {found[EACH][ours]} million cells per second (radiative-transfer-models:
+            {found[EACH][other]}). Interpolated in LAI, with an error below 1e-6, it reaches
             {found[INTERPOLATED][ours]} million."""
-    return filled(text)
+        )
+    return "\n".join(filled(f"- {line}", subsequent_indent="  ") for line in lines)
 
 
-def filled(text):
+def filled(text, **options):
     """Text in lines of equal length."""
-    return textwrap.fill(" ".join(text.split()), 118)
+    return textwrap.fill(" ".join(text.split()), 118, **options)
 
 
 def large_scenes(found):

@@ -20,11 +20,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 import docstrings
 import make_api
 import make_bounds
+import make_explorer
 import make_tables
 import make_why_scatter
 
 make_api.write()
 make_bounds.write()
+make_explorer.write()
 make_tables.write()
 make_why_scatter.write()
 
@@ -50,9 +52,12 @@ exclude_patterns = [
     "tables/*",
     "gallery/**/*.ipynb",
     "gallery/*.ipynb",
+    "**sg_execution_times.rst",
 ]
 templates_path = ["_templates"]
 default_role = "py:obj"
+# Modules that are not on these pages refer to publications, too.
+suppress_warnings = ["ref.citation"]
 
 html_theme = "furo"
 html_title = f"fifesim {version}"
@@ -62,6 +67,29 @@ html_theme_options = {
 html_static_path = ["_static"]
 html_css_files = ["gallery.css"]
 html_copy_source = False
+html_domain_indices = False
+
+# Words to search for, and the page that the search lists first.
+SEARCH_WORDS = {
+    "benchmarks": ["accuracy", "accurate", "how accurate", "validation", "verify"],
+    "changes": ["changelog", "release notes", "what changed"],
+    "cite": ["citation", "cite", "how to cite", "bibtex", "doi"],
+    "howto/aerosol": ["aerosol", "which aerosol", "visibility", "smoke", "dust"],
+    "howto/haze": ["haze"],
+    "howto/my_dem": ["my dem", "dem", "elevation"],
+    "howto/my_image": ["my image", "landsat", "sentinel-2"],
+    "howto/my_map": ["my map", "lai map"],
+    "howto/my_sensor": ["noise", "add noise", "sensor noise", "my sensor"],
+    "howto/paper": ["reproduce", "table 2", "reproduce table 2", "friedl"],
+    "howto/scenario": ["toml"],
+    "howto/score": ["score"],
+    "install": ["installation", "pip", "conda", "windows"],
+    "large_scenes": ["cluster", "slurm", "memory", "resume"],
+    "command_line": ["command", "option"],
+    "scenario_keys": ["key", "scenario key"],
+    "why_scatter": ["scatter"],
+    "nomenclature": ["fpar", "symbols", "units"],
+}
 
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
@@ -86,6 +114,7 @@ sphinx_gallery_conf = {
     "capture_repr": (),
     "show_memory": False,
     "show_signature": False,
+    "write_computation_times": False,
     "min_reported_time": 1000,
     "default_thumb_file": None,
 }
@@ -156,6 +185,19 @@ def _link_identifiers(app, docname, source):
         )
 
 
+def _index_words(app, docname, source):
+    """Entries of the index below the title of a page, which the search lists before all else."""
+    if words := SEARCH_WORDS.get(docname):
+        entries = ", ".join(f"! {word}" for word in words)
+        source[0] = re.sub(
+            r"^# .*\n",
+            rf"\g<0>\n```{{index}} {entries}\n```\n",
+            source[0],
+            count=1,
+            flags=re.MULTILINE,
+        )
+
+
 def _signature(app, what, name, obj, options, signature, returns):
     """
     Signatures to read: defaults that are made anew and functions as `...`.
@@ -170,6 +212,7 @@ def _signature(app, what, name, obj, options, signature, returns):
 def setup(app):
     app.connect("autodoc-process-signature", _signature)
     app.connect("source-read", _link_identifiers)
+    app.connect("source-read", _index_words)
     app.connect(
         "autodoc-process-docstring", _docstring, priority=100
     )  # before numpydoc reads it

@@ -3,14 +3,11 @@
 import re
 from importlib import import_module
 
-import make_api
-
 import fifesim
 from fifesim.accessor import PUBLIC
 
 _PATH = re.compile(r"\bfifesim(?:\.\w+)*\.(\w+)\.(\w+)\b")
 _MODULE = re.compile(r"(?<![`.\w])`?\b(\w+)\.([A-Z]\w+)\b(?=`?)")
-_LINK = re.compile(r"(?<!`)`(\w+)\.(\w+)`(?!`)")
 _BRACKET = re.compile(r"\[[^\]\[`\"']*\]")
 _UNIT = re.compile(r"\b(m|km|cm|um|sr|g|kg|ug|K|pixel)(-?[1-4])\b")
 _RAISED = str.maketrans("-1234", "⁻¹²³⁴")
@@ -40,10 +37,7 @@ def _is_code(line):
 
 def _linked(line):
     line = _PATH.sub(_public, line)
-    line = _MODULE.sub(lambda found: _of_module(found) or found[0], line)
-    return _LINK.sub(
-        lambda found: f"`.{found[1]}.{found[2]}`" if _known(found[1]) else found[0], line
-    )
+    return _MODULE.sub(_of_module, line)
 
 
 def _public(found):
@@ -62,13 +56,9 @@ def _public(found):
 
 def _of_module(found):
     """A class of the package by its module's last name, `models.Atmosphere`."""
-    if found[0].startswith("`") or not _known(found[1]) or found[2] not in PUBLIC:
-        return None
+    if found[0].startswith("`") or found[2] not in PUBLIC:
+        return found[0]
     return f"fifesim.{found[2]}"
-
-
-def _known(module):
-    return any(name.endswith(f".{module}") for name in make_api.modules())
 
 
 def raised(line):

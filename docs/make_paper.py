@@ -1,8 +1,8 @@
 """
 Compute paper.json and write paper.md from it and paper.md.j2.
 
-Run as ``python docs/make_paper.py``; it takes a quarter of an hour of a processor. ``--only scenes`` computes one part
-and keeps the other numbers, ``--text`` computes none and writes the page.
+``python docs/make_paper.py`` takes a quarter of an hour of processor time. ``--only scenes`` computes one part
+and keeps the other numbers. ``--text`` computes nothing and writes the page.
 """
 
 import argparse
@@ -35,10 +35,10 @@ DOCS = Path(__file__).parent
 NUMBERS, TEMPLATE, PAGE = DOCS / "paper.json", DOCS / "paper.md.j2", DOCS / "paper.md"
 
 REALISATIONS = 20
-# Changes share their random numbers, and need fewer.
+# Effects of changes need fewer, because they share their random numbers.
 FEW = 4
 
-# Noise and range are printed with so many digits, and percentages are of what is printed.
+# Digits of printed noise and range; percentages are computed from the printed values.
 DIGITS = 3
 
 
@@ -93,7 +93,7 @@ PARTS = {
 
 
 def words(case):
-    """Numbers and text that need no simulation: origins, the number of fitted inputs, readings and pixel sizes."""
+    """Numbers and text without simulation: origins, the number of fitted inputs, readings and pixel sizes."""
     return {
         "origins": [source._asdict() for source in effects.number_sources(case)],
         "fitted": effects.fitted_count(case),
@@ -118,7 +118,7 @@ def spread(case, seeds):
     Returns
     -------
     spread : dict of str to dict of str to float
-        By variable and arp, the mean over realisations of the standard deviation over the mean. [1]
+        By variable and arp, the mean over realisations of the standard deviation divided by the mean. [1]
     """
     driver, min_valid = Driver(case.setup), case.setup.min_valid
     found = {name: {} for name in VARIABLES}
@@ -136,7 +136,7 @@ def spread(case, seeds):
 
 
 def growth_deviation(found):
-    """Standard deviation of how slopes of LAI grow from the least to the largest arp, in samples of 200 pixels."""
+    """Standard deviation of the growth of LAI slopes from the smallest to the largest arp, in samples of 200 pixels."""
     slope = found["slope_200"].sel(reading=NATIVE.name, variable="lai")
     growth = (slope.sel(arp=max(ARPS)) / slope.sel(arp=min(ARPS))).mean("distribution")
     return float(growth.std(("realisation", "draw"), ddof=1))
@@ -144,7 +144,7 @@ def growth_deviation(found):
 
 def scaling(case, found):
     """
-    Eq. 2 and Fig. 8, which nothing was fitted to, by arp.
+    Eq. 2 and Fig. 8 by arp, to which no input was fitted.
 
     Parameters
     ----------
@@ -155,8 +155,8 @@ def scaling(case, found):
     Returns
     -------
     scaling : list of dict
-        ``correlation``, that of Eq. 2 over the cells of a scene, and the mean and largest size of NDVI of the mean
-        reflectance less the mean NDVI of the cells.
+        ``correlation`` of Eq. 2 over the cells of a scene, and the mean and largest difference between NDVI of the
+        mean reflectance and mean NDVI of the cells.
     """
     rows = []
     for arp in ARPS:
@@ -176,12 +176,12 @@ def scaling(case, found):
 
 def text(values):
     """
-    The page.
+    Text of the page.
 
     Parameters
     ----------
     values : dict
-        From `numbers`.
+        Result of `numbers`.
 
     Returns
     -------
@@ -199,14 +199,14 @@ def text(values):
 
 
 def nine(reading, name):
-    """The nine values of LAI of a row of readings: ``r2``, ``slope``, or these of the paper, an array."""
+    """Array of the nine values ``r2`` or ``slope`` of LAI of a reading, or of the paper."""
     return np.array(
         [reading[f"{name} {treatment} {arp:g}"] for treatment, arp in friedl1995.scenes()]
     )
 
 
 def highest(reading):
-    """The highest of the nine slopes of LAI of a row of readings, and its treatment and arp."""
+    """Highest of the nine slopes of LAI of a reading, with its treatment and arp."""
     slopes = nine(reading, "slope")
     treatment, arp = friedl1995.scenes()[slopes.argmax()]
     return {"slope": slopes.max(), "treatment": treatment, "arp": arp}
@@ -214,7 +214,7 @@ def highest(reading):
 
 def noise(values):
     """
-    Mean relative equivalent noise compared with the paper's.
+    Mean relative equivalent noise compared with the paper.
 
     Parameters
     ----------
@@ -224,9 +224,9 @@ def noise(values):
     Returns
     -------
     rows : list of dict
-        By ``variable`` and ``arp``: the ``paper``'s; by reading, ``native`` and ``aligned``, the noise as counted in
-        increments, its ``deviation`` over realisations, its relative ``difference`` from the paper's, the
-        ``estimate`` from R2 and the spread of the variable, and the noise ``by_other`` regression line, R2 times as
+        By ``variable`` and ``arp``: the value of the ``paper``, and for the readings ``native`` and ``aligned`` the
+        noise over increments, its ``deviation`` between realisations, its relative ``difference`` from the paper, the
+        ``estimate`` from R2 and the spread of the variable, and the noise ``by_other`` regression, R2 times as
         large. [1]
     """
     counted = {name: _of_quantity(rows, "ren") for name, rows in values["text"].items()}
@@ -259,9 +259,9 @@ def expected_noise(r2, spread):
     Parameters
     ----------
     r2 : float
-        Of the regression of NDVI on the variable. [1]
+        R2 of the regression of NDVI on the variable. [1]
     spread : float
-        Standard deviation of the variable over its mean. [1]
+        Standard deviation of the variable divided by its mean. [1]
 
     Returns
     -------
@@ -270,7 +270,7 @@ def expected_noise(r2, spread):
 
     Notes
     -----
-    The deviation of NDVI about its line is :math:`s_N \sqrt{1 - R^2}` and the slope :math:`\sqrt{R^2} s_N / s_L`, so
+    The residual standard deviation of NDVI is :math:`s_N \sqrt{1 - R^2}` and the slope :math:`\sqrt{R^2} s_N / s_L`, so
     that Eq. 7 gives :math:`\sqrt{(1 - R^2) / R^2}\, s_L / \bar{L}`.
 
     Examples
@@ -283,7 +283,7 @@ def expected_noise(r2, spread):
 
 def range_kept(values):
     """
-    Share of the cells' range that pixels keep, compared with the paper's.
+    Share of the cells' range that pixels keep, compared with the paper.
 
     Parameters
     ----------
@@ -293,8 +293,8 @@ def range_kept(values):
     Returns
     -------
     rows : list of dict
-        By ``variable`` and ``arp``: the ``paper``'s, rows of the ``native`` and ``aligned`` reading, and the
-        ``difference`` and ``relative`` difference of the native reading from the paper's. [1]
+        By ``variable`` and ``arp``: the value of the ``paper``, rows of the ``native`` and ``aligned`` reading, and
+        the ``difference`` and ``relative`` difference of the native reading from the paper. [1]
     """
     kept = {name: _of_quantity(rows, "range_kept") for name, rows in values["text"].items()}
     found = []
@@ -308,7 +308,7 @@ def range_kept(values):
 
 
 def _of_quantity(rows, quantity):
-    """Rows of a quantity that the paper states, by variable and arp."""
+    """Rows of a quantity with a value in the paper, by variable and arp."""
     return {
         (row["variable"], row["arp"]): row
         for row in rows
@@ -317,7 +317,7 @@ def _of_quantity(rows, quantity):
 
 
 def between(reading, other):
-    """What tells one row of readings from another: mean change of R2 and mean relative change of slopes of LAI."""
+    """Mean change of R2 and mean relative change of LAI slopes from one reading to another."""
     r2 = nine(reading, "r2") - nine(other, "r2")
     return {
         "r2": r2.mean(),
@@ -338,7 +338,7 @@ def main():
 
 
 def _plain(value):
-    """What JSON knows, numbers with five digits; None for what is not a number."""
+    """Values that JSON can hold: numbers with five digits, None for NaN and infinity."""
     if isinstance(value, dict):
         return {key: _plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""How large the deviations from Friedl et al. (1995) are, for the page `paper.md`."""
+"""Effects of the deviations from Friedl et al. (1995), for the page `paper.md`."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -31,18 +31,18 @@ def fits(
     case, seeds, change=None, method="periodic", reflectance=reflectance_of, land=(None, None)
 ):
     """
-    Lines of LAI on NDVI of the nine scenes, where something is otherwise.
+    Regressions of LAI on NDVI of the nine scenes with a change.
 
     Parameters
     ----------
     case : fifesim.experiments.friedl1995.case.Case
     seeds : sequence of int
     change : dict, optional
-        Fields of the `fifesim.Setup` that are otherwise.
+        Changed fields of the `fifesim.Setup`.
     method : str, optional
-        Of the field.
+        Method of the random field.
     reflectance : callable, optional
-        What makes reflectance of a setup and of LAI.
+        Function of a setup and LAI that returns reflectance.
     land : (xarray.DataArray, xarray.DataArray), optional
         Elevation and horizon.
 
@@ -66,19 +66,19 @@ def fits(
 
 
 def effect(lines, base):
-    """What a change does to the nine rows of LAI: mean and largest change of R2, mean relative change of slopes."""
-    now, was = lines.mean(axis=0), base.mean(axis=0)
-    r2 = now[:, 2] - was[:, 2]
+    """Effect of a change on the nine rows of LAI: mean and largest change of R2, mean relative change of slopes."""
+    after, before = lines.mean(axis=0), base.mean(axis=0)
+    r2 = after[:, 2] - before[:, 2]
     return {
         "r2": r2.mean(),
         "r2_largest": np.abs(r2).max(),
-        "slope": np.mean(now[:, 1] / was[:, 1] - 1),
+        "slope": np.mean(after[:, 1] / before[:, 1] - 1),
     }
 
 
 def deviations(seeds):
     """
-    Sizes of the deviations that can be computed.
+    Effects of the deviations that can be computed.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def deviations(seeds):
 
     Returns
     -------
-    sizes : dict
+    effects : dict
     """
     case = Case()
     base = fits(case, seeds)
@@ -112,13 +112,13 @@ def deviations(seeds):
 
 def lengths():
     """
-    The process beside the paper's lengths.
+    Correlation of the process compared with the length scales of the paper.
 
     Returns
     -------
     lengths : list of dict
-        By ``arp``: the ``paper``'s length and that of fifesim [m], correlation of ``neighbour`` cells and at the
-        paper's length (``there``), and what is left of it from one cell to the next (``left``). [1]
+        By ``arp``: ``length`` in the ``paper`` and in fifesim [m], correlation of ``neighbour`` cells and at the
+        length in the paper (``there``), and the factor by which it falls from one cell to the next (``left``). [1]
     """
     found, cells = [], np.arange(12)
     for arp, length in LENGTHS.items():
@@ -137,7 +137,7 @@ def lengths():
 
 
 def blur(case, seeds):
-    """The widest blur over brighter soil: slopes of LAI over the paper's, and how they grow with arp."""
+    """Slopes of LAI with the widest blur over brighter soil, relative to the paper, and their growth with arp."""
     soil = {"TM3": 0.25, "TM4": 0.19}
     blurred = replace(case, reading=READINGS["blur-48.6"])
     slope = fits(
@@ -154,18 +154,19 @@ def blur(case, seeds):
 
 
 def sky(case):
-    """Share of skylight, and what it does to NDVI of the ground at the mean of the burned, grazed."""
+    """Fraction of skylight, and its effect on the mean NDVI of the ground (burned, grazed)."""
     setup, density = case.setup, case.densities["burned-grazed"]
     lai = lai_scene(case.grid, density, arp=0.15, seed=0)
-    mixed, alone = (
-        float(ndvi(make(setup, lai)).mean()) for make in (reflectance_of, _by_sunlight)
+    with_sky, without = (
+        float(ndvi(reflectance(setup, lai)).mean())
+        for reflectance in (reflectance_of, _by_sunlight)
     )
-    shares = dict(zip(("red", "nir"), map(float, _shares(setup)), strict=True))
-    return shares | {"ndvi": mixed - alone}
+    fractions = dict(zip(("red", "nir"), map(float, _sky_fractions(setup)), strict=True))
+    return fractions | {"ndvi": with_sky - without}
 
 
 def facet(dem):
-    """Eq. 5's factor at nadir, which is the cosine of the slope: at 20 degrees, and over the synthetic hills."""
+    """Factor of Eq. 5 at nadir, the cosine of the slope: at 20 degrees, and over the synthetic hills."""
     cosine = np.cos(np.radians(fifesim.slope(dem).values))
     return {
         "at_20": np.cos(np.radians(20)),
@@ -175,7 +176,7 @@ def facet(dem):
 
 
 def sun():
-    """Zenith angles and K at the assumed time of the overpass, and eight minutes to each side."""
+    """Solar zenith angle and K at the assumed time of the overpass, and eight minutes before and after."""
     found = []
     for minute in (27, 35, 43):
         sza = float(
@@ -194,21 +195,20 @@ def _polarized():
     return fifesim.Atmosphere(engine="successive-orders")
 
 
-def _shares(setup):
+def _sky_fractions(setup):
     bands = tuple(band.response for band in setup.instrument.select(setup.bands))
     atmosphere = setup.atmosphere or fifesim.Atmosphere()
     return diffuse_fraction(atmosphere, bands, setup.geometry or fifesim.fife_geometry())
 
 
 def _by_sunlight(setup, lai):
-    """Reflectance of level ground by SAIL for the directions of sun and view, without skylight."""
+    """Reflectance of level ground by SAIL for sunlight alone."""
     bands = setup.instrument.select(setup.bands)
     responses = tuple(band.response for band in bands)
-    own = setup.canopy
-    leaf = optics_labels.leaf_optics(responses, own.leaf_optics, lai, exact=False)
-    stand = BandCanopy(
-        own, leaf, None, optics_labels.background(responses, own.background, lai)
-    )
+    description = setup.canopy
+    leaf = optics_labels.leaf_optics(responses, description.leaf_optics, lai, exact=False)
+    ground = optics_labels.background(responses, description.background, lai)
+    stand = BandCanopy(description, leaf, None, ground)
     return canopy.level_reflectance(
         lai,
         bands,

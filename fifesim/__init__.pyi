@@ -106,6 +106,12 @@ from .analysis.scaling_labels import variogram as variogram  # method
 from .analysis.scaling_labels import regularized_variance as regularized_variance  # method
 from .chain.steps import index as index  # method
 
+# Retrieval
+from .retrieval.training import train as train
+from .retrieval.labels import retrieve as retrieve  # method
+from .retrieval.description import Retrieval as Retrieval
+from .retrieval.description import read_retrieval as read_retrieval
+
 # Pictures
 from .output.pictures import plot as plot  # method
 from .output.maps import rgb as rgb  # method

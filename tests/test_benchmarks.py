@@ -70,11 +70,11 @@ def test_figures_of_a_sample(load):
     summary = load("summary")
     found = summary.rows(SAMPLE)
     assert " ".join(summary.readme(found).split()) == (
-        "On one core (arm64 machine with 4 cores, 2 January 2027) fifesim simulates 16.7 million ground cells per "
+        "- On one core (arm64 machine with 4 cores, 2 January 2027), fifesim simulates 16.7 million ground cells per "
         "second on level ground and 7.3 million on hills, from random field to digital numbers in two bands (4 million "
-        "cells of 3.33 m). A Landsat scene of 185 km (3,080 million cells) takes 68 s and 1.0 GB on two cores "
-        "(measured on an x86_64 machine with 2 cores, 22 November 2026). SAIL in each cell reaches 0.169 million cells "
-        "per second (radiative-transfer-models: 0.178); interpolated in LAI, "
+        "cells of 3.33 m). - A Landsat scene of 185 km (3,080 million cells) takes 68 s and 1.0 GB on two cores "
+        "(measured on an x86_64 machine with 2 cores, 22 November 2026). - SAIL in each cell reaches 0.169 million "
+        "cells per second (radiative-transfer-models: 0.178). Interpolated in LAI, "
         "with an error below 1e-6, it reaches 96.1 million."
     )
     table = summary.large_scenes(found).splitlines()

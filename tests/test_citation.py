@@ -14,9 +14,13 @@ def test_citation_names_the_project_as_its_package_does():
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert citation["cff-version"] == "1.2.0" and citation["message"] and citation["type"] == "software"
     assert citation["title"].startswith(PROJECT["name"]) and citation["license"] == PROJECT["license"]
-    assert citation["authors"] == PROJECT["authors"]
+    assert citation["authors"] == PROJECT["authors"] and citation["version"] == PROJECT["version"]
     doi = citation["references"][0]["doi"]
     assert doi in (ROOT / "docs" / "references.rst").read_text(encoding="utf-8")
+
+
+def test_readme_leads_to_the_page_on_citing():
+    assert "docs/cite.md" in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_every_work_that_the_paper_cites_is_in_its_bibliography():

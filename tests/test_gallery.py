@@ -9,7 +9,7 @@ import pytest
 
 from fifesim.accessor import DataArrayAccessor
 from fifesim.base.geometry import relative_azimuth, scattering_angle_cosine
-from fifesim.experiments.verification import benchmarks
+from fifesim.experiments.verification import atmosphere, benchmarks, canopy
 
 DOCS = Path(__file__).parents[1] / "docs"
 SIGNED = "positive toward the sun"
@@ -86,6 +86,35 @@ def test_table_of_the_hot_spot_is_that_of_its_picture():
     for name, there in rows.items():
         (printed,) = re.findall(rf"^\| {name} \| ([\d.]+) %", page, re.MULTILINE)
         assert f"{abs(percent[there]).max():.1f}" == printed
+
+
+def test_table_of_accuracy_has_the_deviations_of_the_checks():
+    """Errors of SAIL, of 5S in clear air, of successive orders and of the gases, rounded as the table has them."""
+    page = (DOCS / "benchmarks.md").read_text(encoding="utf-8")
+    cells = dict(re.findall(r"^\| (.+?) \| (.+?) \| .+ \|$", page, re.MULTILINE))
+    checks = (canopy._exact_transfer, atmosphere._five_s, atmosphere._successive_orders)
+    found = {each.what: each.deviation for check in checks for each in check()}
+
+    red, nadir, slant = (
+        found[name]
+        for name in (
+            "red reflectance at nadir and 45 degrees",
+            "near infrared reflectance at nadir",
+            "near infrared reflectance at 45 degrees",
+        )
+    )
+    assert cells["canopy reflectance (SAIL), red"] == f"{red:.1f} %"
+    expected = f"{nadir:.1f} % at nadir, {slant:.1f} % at a view zenith of 45°"
+    assert cells["canopy reflectance (SAIL), near infrared"] == expected
+    clear = [found[f"5S, clear and high sun, TM{band}, rms"] for band in (1, 2, 3, 4, 5, 7)]
+    expected = f"{clear[0]:.1f} % rms in TM1, {clear[1]:.1f} % in TM2, at most 0.6 % in TM3 to 7"
+    assert cells["the same in clear air (visibility from 23 km, sun to 45°, view to 20°)"] == expected
+    assert max(clear[2:]) < 0.6
+    assert max(found[f"5S, every aerosol and angle, TM{band}, rms"] for band in (1, 2, 3, 4, 5, 7)) < 3
+    orders = max(found[f"successive orders, TM{band}, toa, rms"] for band in (1, 2, 3, 4))
+    assert cells['the same 180 cases, `engine="successive-orders"`'] == f"0.09 to {orders:.2f} % rms in TM1 to 4"
+    gases = max(value for what, value in found.items() if what.startswith("gases"))
+    assert cells["two-way transmittance of gases in the TM bands"] == f"{gases:.3f}"
 
 
 def test_unknown_terms_of_an_instrument_are_hatched(drawn):

@@ -17,7 +17,7 @@ STAGES = ("ground", "atmosphere", "sensor", "analysis")
 LABEL_LIBRARIES = {"xarray", "dask", "odc", "rioxarray", "rasterio"}
 
 # The rule of imports: a folder imports from those before it, and from itself. The four stages are one step.
-ORDER = ("base", "grids", "stages", "chain", "scenario", "output", "experiments", "cli")
+ORDER = ("base", "grids", "stages", "chain", "scenario", "output", "retrieval", "experiments", "cli")
 
 FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix().replace("/", "."): path for path in PACKAGE.rglob("*.py")}
 TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FILES.items()}

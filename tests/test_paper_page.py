@@ -137,7 +137,7 @@ def test_passages_are_sentences_of_the_paper():
 
 def test_page_quotes_both_passages_before_it_explains_the_reading():
     page = in_a_line(DOCS / "paper.md")
-    reading = page[page.index("## How pixels lie") : page.index("## Relief")]
+    reading = page[page.index("## Registration") : page.index("## Relief")]
     for part in (page[: page.index("## Table 2")], reading[: reading.index("`fifesim reproduce` nevertheless")]):
         assert "for pixels that are aligned with the blocks" in part
         assert all(f'"{passage}" (*{section}*)' in part for section, passage in PASSAGES.items())

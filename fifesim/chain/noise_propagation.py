@@ -115,11 +115,15 @@ def noise_std(
     given = noise_models if check_kinds(noise) else NoiseModel(0.0, 0.0)
     models = sensor.noise_models(description, bands, noise, given)
     # A radiance has a noise whatever the sun.
-    converted = None if quantity == "radiance" and is_radiance(light) else _conversion(light, bands)
-    radiance = light if is_radiance(light) else converted(calibration.reflectance_to_radiance, light)
-    std = windows.located(partial(_std_by_band, models, scales), radiance)
-    if quantity != "radiance":
-        std = converted(calibration.radiance_to_reflectance, std)
+    spread = partial(_std_by_band, models, scales)
+    if quantity == "radiance" and is_radiance(light):
+        std = windows.located(spread, light)
+    else:
+        converted = _conversion(light, bands)
+        radiance = light if is_radiance(light) else converted(calibration.reflectance_to_radiance, light)
+        std = windows.located(spread, radiance)
+        if quantity != "radiance":
+            std = converted(calibration.radiance_to_reflectance, std)
     if quantity == "ndvi":
         reflectance = converted(calibration.radiance_to_reflectance, light) if is_radiance(light) else light
         pairs = [each.isel(band=k, drop=True) for each in (reflectance, std) for k in (0, 1)]

@@ -58,6 +58,8 @@ QUANTITIES = {
         label="FPAR", lowest=0, highest=1, colours="YlGn", ends=(0, 1)),
     "green_fpar": Quantity("1", "", "fraction of photosynthetically active radiation that green leaves absorb",
         label="FPAR of green leaves", lowest=0, highest=1, colours="YlGn", ends=(0, 1)),
+    "fcover": Quantity("1", "vegetation_area_fraction", "fraction of the ground covered by green vegetation",
+        label="vegetation cover", lowest=0, highest=1, colours="YlGn", ends=(0, 1)),
     "brown": Quantity("1", "", "dead share of the leaf area", lowest=0, highest=1, colours="copper_r"),
     "dissociation": Quantity("1", "", "how far dead leaves lie below green ones", "0 mixed, 1 below",
         label="dissociation", lowest=0, highest=1, colours="copper_r"),

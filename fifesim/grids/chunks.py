@@ -25,6 +25,8 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
     along_band = [bands is not None and "band" in array.dims for array in arrays]
     if bands is not None:
         core = {"input_core_dims": [["band"] * along for along in along_band], "output_core_dims": [["band"]]}
+        if any(along and array.sizes["band"] != bands for array, along in zip(arrays, along_band, strict=True)):
+            core["exclude_dims"] = {"band"}
 
     def call(*blocks):
         out = np.asarray(kernel(*blocks, **parameters), dtype)

@@ -154,7 +154,8 @@ def to_geotiff(
     Parameters
     ----------
     raster : xarray.DataArray, dims ([band], y, x), or xarray.Dataset of variables over (y, x)
-        The variables of a dataset become bands.
+        The variables of a dataset become bands; intervals by ``level`` become one band for each level, such as
+        ``lai_low_95``.
     path : str or path
     overwrite : bool, optional
         Replace an existing file.
@@ -294,8 +295,12 @@ def open_image(path: FilePath, chunks: Chunks | None = None, *, allow_remote: bo
 
 def _stacked(dataset):
     """Variables of a dataset as bands."""
-    names = [str(name) for name in dataset.data_vars]
-    bands = [dataset[name].drop_vars(["band"], errors="ignore") for name in names]
+    names, bands = [], []
+    for name, each in dataset.data_vars.items():
+        each = each.drop_vars(["band"], errors="ignore")
+        levels = each["level"].values.tolist() if "level" in each.dims else [None]
+        names += [str(name) if level is None else f"{name}_{100 * level:g}" for level in levels]
+        bands += [each if level is None else each.sel(level=level, drop=True) for level in levels]
     dim = xr.DataArray(names, dims="band", name="band")
     array = xr.concat(bands, dim, combine_attrs="drop", coords="minimal", compat="override")
     array.attrs = {"history": bands[0].attrs.get("history", "")}

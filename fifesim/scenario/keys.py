@@ -368,6 +368,10 @@ class AirKeys(Section):
         return values | {"visibility": values.get("visibility")} if by_aot else values
 
 
+SHIFTS = ("down", "across")
+"""Names of the two parts of ``sensor.offset``, each of which a study may draw."""
+
+
 class SensorKeys(Section):
     """The instrument."""
 
@@ -416,6 +420,15 @@ class SensorKeys(Section):
         if value in INTERVALS or (not isinstance(value, str) and 0 < value < math.inf):
             return value
         raise ValueError(f"must be {' or '.join(INTERVALS)}, or a positive distance between pixels in metres")
+
+    @field_validator("offset", mode="before")
+    @classmethod
+    def _named_offset(cls, value):
+        if isinstance(value, dict):
+            if set(value) != set(SHIFTS):
+                raise ValueError(f"must have {' and '.join(SHIFTS)}, or be a list of both")
+            return [value[name] for name in SHIFTS]
+        return value
 
     @field_validator("offset")
     @classmethod

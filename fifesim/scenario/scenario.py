@@ -23,7 +23,7 @@ from fifesim.grids.sites import on_fife_site
 from fifesim.ground.landscape.classes import SHARES, CoverClass, fife_classes
 from fifesim.ground.landscape.distribution import treatments
 from fifesim.scenario.ground import check_leaf_area, drawn_properties
-from fifesim.scenario.keys import COVARIATES, EXTENT, ByName, GridKeys, Keys
+from fifesim.scenario.keys import COVARIATES, EXTENT, SHIFTS, ByName, GridKeys, Keys
 from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
 from fifesim.scenario.toml import full_path, load_values, mistakes
 from fifesim.sensor.description.fields import false_colour_bands
@@ -371,7 +371,8 @@ class Scenario(Keys):
         >>> changed.ground.arp, changed.atmosphere.visibility, changed.sensor.seed, scenario.sensor.seed
         (0.24, 20.0, 3, 0)
         """
-        values, names = values_of(self), {}
+        values = values_of(self)
+        names: dict[Any, str] = {}
         for name, value in changes.items():
             key = find_key(name, called="replace:")
             if key.place[0] == "classes" and key.place[1] not in self.classes:
@@ -567,7 +568,9 @@ def _has(section, parts):
     """Whether a section has a key, and, if an entry is named, whether the key has entries."""
     if section is None or not parts or parts[0] not in section.model_fields or "" in parts:
         return False
-    return len(parts) == 1 or (len(parts) == 2 and section.model_fields[parts[0]].annotation == ByName)
+    if len(parts) != 2:
+        return len(parts) == 1
+    return section.model_fields[parts[0]].annotation == ByName or (parts[0] == "offset" and parts[1] in SHIFTS)
 
 
 def values_of(scenario):

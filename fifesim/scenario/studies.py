@@ -16,7 +16,7 @@ from fifesim.base.files import shown
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import nearest
 from fifesim.scenario.distributions import SEQUENCES, distribution_of
-from fifesim.scenario.keys import COVERS, LAND_FORMS
+from fifesim.scenario.keys import COVERS, LAND_FORMS, SHIFTS
 from fifesim.scenario.scenario import Scenario, find_key, grid_keys, parse_scenario, put, values_of
 from fifesim.scenario.toml import full_path, load_values, write_tables
 
@@ -292,6 +292,8 @@ def _settled(scenario, drawn):
         # If one band is drawn, values of the other bands are also needed.
         if any(path[:2] == ("ground", key) for path in drawn for key in keys if len(path) == 3):
             settled |= {("ground", key): dict(getattr(whole.ground, key)) for key in keys}
+    if any(path[:2] == ("sensor", "offset") for path in drawn):
+        settled[("sensor", "offset")] = dict(zip(SHIFTS, whole.sensor.offset, strict=True))
     for path, value in settled.items():
         put(values, path, value)
     return values

@@ -74,9 +74,9 @@ def test_replaced_keys_are_those_of_a_new_scenario():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"sensor.sed": 3}, r"replace: 'sensor\.sed' is no key of a scenario: did you mean 'sensor\.seed'"),
-        ({"visibilty": 3}, "replace: 'visibilty' is no key of a scenario: did you mean 'visibility'"),
-        ({"seed": 3}, r"replace: 'seed' is a key of several sections: write .*sensor\.seed"),
+        ({"sensor.sed": 3}, r"replace: 'sensor\.sed' is not a key of a scenario: did you mean 'sensor\.seed'"),
+        ({"visibilty": 3}, "replace: 'visibilty' is not a key of a scenario: did you mean 'visibility'"),
+        ({"seed": 3}, r"replace: 'seed' exists in several sections: use .*sensor\.seed"),
         ({"sensor.seed": -1}, r"sensor\.seed = -1: must be at least 0"),
         ({"sza": 30}, "sza and saa go together"),
         ({"leaf.chlorofyll": 30}, "unknown key 'chlorofyll': did you mean 'chlorophyll'"),

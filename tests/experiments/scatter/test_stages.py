@@ -1,5 +1,8 @@
 """Images with stages at their ideal."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -19,6 +22,14 @@ from fifesim.experiments.scatter.stages import (
 def of(seen, **at_work):
     """NDVI with the stages named at work, and those without a word ideal."""
     return seen.ndvi[tuple(int(at_work.get(stage.replace(" ", "_"), 0)) for stage in seen.stages)]
+
+
+def test_physics_page_lists_the_stages_and_the_ideal_ground():
+    page = (Path(__file__).parents[3] / "docs" / "physics.md").read_text(encoding="utf-8")
+    _, _, table = page.partition("| stage | ideal |\n|---|---|\n")
+    rows = dict(re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", table.partition("\n\n")[0], re.MULTILINE))
+    assert list(rows) == list(STAGES)
+    assert {name: rows[name] for name in IDEAL_PROPERTIES} == IDEAL_PROPERTIES
 
 
 def test_all_stages_at_work_are_the_simulation(rough):

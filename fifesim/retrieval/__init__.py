@@ -1,0 +1,1 @@
+"""Retrieval of LAI and FPAR from images, with intervals and flags."""

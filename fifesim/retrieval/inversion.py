@@ -1,0 +1,233 @@
+"""Bayesian inversion: likelihood of the members of a lookup table, and optimal estimation."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+# Members whose log-likelihood is lower than the best one by more than this have no effect on a quantile.
+_NEGLIGIBLE = 20.0
+
+
+def lookup(measured, members, states, probabilities):
+    """
+    Posterior mean, standard deviation and quantiles from the likelihood of the members of a table.
+
+    The members are draws from the prior. Their weights are exp(-d² / 2), where d is the distance between measurement
+    and member in units of the error.
+
+    Parameters
+    ----------
+    measured : array, shape (n, m)
+        Measurements, multiplied by the inverse square root of the covariance of their error.
+    members : array, shape (k, m)
+        Simulated measurements without error, multiplied in the same way.
+    states : array, shape (k, q)
+        Quantities of the members.
+    probabilities : array, shape (p,)
+        Probabilities of the quantiles.
+
+    Returns
+    -------
+    mean, sd : array, shape (n, q)
+    quantiles : array, shape (n, q, p)
+    chi_square : array, shape (n,)
+        Squared distance to the nearest member.
+
+    References
+    ----------
+    [BevenBinley1992]_
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> prior = np.random.default_rng(1).normal(0, 1, (20_000, 1))
+    >>> mean, sd, _, _ = lookup(np.array([[2.0]]), prior, prior, np.array([0.5]))
+    >>> abs(mean[0, 0] - 1) < 0.02, abs(sd[0, 0] - 0.5**0.5) < 0.02
+    (True, True)
+    """
+    orders = np.argsort(states, axis=0, kind="stable").T.copy()
+    arrays = (np.ascontiguousarray(each, float) for each in (measured, members.T, states))
+    return _lookup(*arrays, orders, np.asarray(probabilities, float))
+
+
+@numba.njit(cache=True, nogil=True)
+def _lookup(measured, members, states, orders, probabilities):
+    """Body of `lookup`, with members of shape (m, k) and their order along each quantity."""
+    count, width = measured.shape
+    size, kinds = states.shape
+    mean, sd = np.empty((count, kinds)), np.empty((count, kinds))
+    quantiles, best = np.empty((count, kinds, probabilities.size)), np.empty(count)
+    weight = np.empty(size)
+    for pixel in range(count):
+        # One measurement after the other, so that the loops over the members are vectorised.
+        weight[:] = 0.0
+        for at in range(width):
+            value = measured[pixel, at]
+            for member in range(size):
+                difference = value - members[at, member]
+                weight[member] += difference * difference
+        nearest = weight.min()
+        best[pixel] = nearest
+        if not np.isfinite(nearest):
+            best[pixel] = np.nan
+            mean[pixel], sd[pixel], quantiles[pixel] = np.nan, np.nan, np.nan
+            continue
+        total = 0.0
+        for member in range(size):
+            below = 0.5 * (weight[member] - nearest)
+            weight[member] = np.exp(-below) if below < _NEGLIGIBLE else 0.0
+            total += weight[member]
+        for kind in range(kinds):
+            first = second = 0.0
+            for member in range(size):
+                if weight[member] > 0:
+                    first += weight[member] * states[member, kind]
+            first /= total
+            for member in range(size):
+                if weight[member] > 0:
+                    second += weight[member] * (states[member, kind] - first) ** 2
+            mean[pixel, kind], sd[pixel, kind] = first, np.sqrt(second / total)
+            # Each member stands at the middle of its weight; between members the distribution is linear.
+            wanted, reached, last, at = 0, 0.0, states[orders[kind, 0], kind], 0.0
+            for place in range(size):
+                member = orders[kind, place]
+                if weight[member] == 0.0:
+                    continue
+                middle, value = (reached + 0.5 * weight[member]) / total, states[member, kind]
+                while wanted < probabilities.size and probabilities[wanted] <= middle:
+                    share = (probabilities[wanted] - at) / (middle - at) if reached > 0 else 1.0
+                    quantiles[pixel, kind, wanted] = last + share * (value - last)
+                    wanted += 1
+                reached, last, at = reached + weight[member], value, middle
+            while wanted < probabilities.size:
+                quantiles[pixel, kind, wanted] = last
+                wanted += 1
+    return mean, sd, quantiles, best
+
+
+class Estimate(NamedTuple):
+    """Result of optimal estimation by pixel."""
+
+    state: np.ndarray
+    """Shape (n, k)."""
+    covariance: np.ndarray
+    """Posterior covariance, shape (n, k, k)."""
+    averaging_kernel: np.ndarray
+    """Derivative of the estimate with respect to the true state, shape (n, k, k)."""
+    chi_square: np.ndarray
+    """Misfit to measurement and prior at the estimate, shape (n,)."""
+    converged: np.ndarray
+    """Shape (n,), bool."""
+
+    @property
+    def degrees_of_freedom(self):
+        """Degrees of freedom for signal, shape (n,)."""
+        return np.trace(self.averaging_kernel, axis1=-2, axis2=-1)
+
+    def information(self, prior_covariance):
+        """Information content, shape (n,). [nat]"""
+        return 0.5 * (np.linalg.slogdet(prior_covariance)[1] - np.linalg.slogdet(self.covariance)[1])
+
+
+# Factors on the damping after a step that lowers the cost, and after one that does not.
+_LESS_DAMPING, _MORE_DAMPING = 0.1, 10.0
+_FIRST_DAMPING = 1e-2
+_LARGEST_DAMPING = 1e8
+
+
+def optimal_estimation(
+    measured: np.ndarray,
+    forward: Callable,
+    prior: np.ndarray,
+    prior_covariance: np.ndarray,
+    error_covariance: np.ndarray,
+    *,
+    limits: tuple[np.ndarray, np.ndarray] | None = None,
+    first: np.ndarray | None = None,
+    iterations: int = 20,
+    tolerance: float = 1e-3,
+) -> Estimate:
+    """
+    Most probable states by the method of Levenberg and Marquardt, all pixels together.
+
+    Parameters
+    ----------
+    measured : array, shape (n, m)
+    forward : callable
+        ``forward(states, pixels)`` returns modelled measurements, shape (n, m), and their derivatives with respect to
+        the states, shape (n, m, k), of the pixels with these numbers.
+    prior : array, shape (k,)
+    prior_covariance : array, shape (k, k)
+    error_covariance : array, shape (m, m)
+        Covariance of the errors of measurement and model.
+    limits : pair of array, shape (k,), optional
+        Least and largest state; steps end there.
+    first : array, shape (n, k), optional
+        First guess, by default the prior.
+    iterations : int, optional
+        Largest number of steps.
+    tolerance : float, optional
+        A pixel has converged if its step is shorter than this share of the posterior standard deviation.
+
+    Returns
+    -------
+    estimate : Estimate
+
+    References
+    ----------
+    [Rodgers2000]_, Eqs. 2.27, 2.78, 2.80, 5.35 and 5.36
+    """
+    weight, sharpness = np.linalg.inv(error_covariance), np.linalg.inv(prior_covariance)
+    count, size = len(measured), len(prior)
+    lowest, highest = (np.full(size, -np.inf), np.full(size, np.inf)) if limits is None else limits
+    state = np.clip(np.broadcast_to(prior, (count, size)) if first is None else first, lowest, highest).astype(float)
+    is_known = np.isfinite(measured).all(axis=1)
+    converged, damping = np.zeros(count, bool), np.full(count, _FIRST_DAMPING)
+
+    def cost_of(states, modelled, at):
+        misfit, departure = measured[at] - modelled, states - prior
+        return _square(misfit, weight) + _square(departure, sharpness)
+
+    modelled, slope = (np.array(each, float) for each in forward(state, np.arange(count)))
+    cost = cost_of(state, modelled, np.arange(count))
+    active = np.flatnonzero(is_known)
+    for _ in range(iterations):
+        if not active.size:
+            break
+        gain = np.swapaxes(slope[active], 1, 2) @ weight
+        inverse = gain @ slope[active] + sharpness
+        downhill = np.einsum("nkm,nm->nk", gain, measured[active] - modelled[active])
+        downhill -= (state[active] - prior) @ sharpness
+        # Marquardt's scaling by the diagonal works for weak priors too.
+        damped = inverse * (1 + damping[active, None, None] * np.eye(size))
+        step = np.linalg.solve(damped, downhill[..., None])[..., 0]
+        tried = np.clip(state[active] + step, lowest, highest)
+        moved = tried - state[active]
+        values, slopes = forward(tried, active)
+        found = cost_of(tried, values, active)
+        length = np.sqrt(_square_each(moved, inverse) / size)
+        better = found <= cost[active]
+        at = active[better]
+        state[at], modelled[at], slope[at], cost[at] = tried[better], values[better], slopes[better], found[better]
+        damping[active] = np.where(better, damping[active] * _LESS_DAMPING, damping[active] * _MORE_DAMPING)
+        # Where no step lowers the cost any more, rounding is reached.
+        converged[active] = (length < tolerance) & (better | (damping[active] > 1))
+        active = active[~converged[active] & (damping[active] < _LARGEST_DAMPING)]
+    inverse = np.swapaxes(slope, 1, 2) @ weight @ slope + sharpness
+    covariance = np.linalg.inv(inverse)
+    kernel = covariance @ (inverse - sharpness)
+    for each in (state, cost, covariance, kernel):
+        each[~is_known] = np.nan
+    return Estimate(state, covariance, kernel, cost, converged)
+
+
+def _square(vectors, matrix):
+    """Quadratic forms of vectors with one symmetric matrix."""
+    return np.einsum("ni,ij,nj->n", vectors, matrix, vectors, optimize=True)
+
+
+def _square_each(vectors, matrices):
+    """Quadratic forms of vectors, each with its matrix."""
+    return np.einsum("ni,nij,nj->n", vectors, matrices, vectors)

@@ -1,0 +1,253 @@
+"""Methods of retrieval on arrays of pixels: how each is fitted to training pixels, and how it estimates."""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from fifesim.analysis import regression
+from fifesim.analysis.indices import normalized_difference
+from fifesim.retrieval.inversion import lookup
+from fifesim.retrieval.networks import Layers, network, train_quantiles
+
+Tables = Mapping[str, np.ndarray]
+
+
+class Pixels(NamedTuple):
+    """Training pixels."""
+
+    reflectance: np.ndarray
+    """Shape (n, bands)."""
+    angles: np.ndarray
+    """Zenith angles of sun and view and the relative azimuth, shape (n, 3). [degree]"""
+    truth: np.ndarray
+    """Shape (n, quantities)."""
+    chip: np.ndarray
+    """Number of the chip, shape (n,)."""
+    landscape: np.ndarray
+    """Number of the landscape, shape (n,)."""
+
+    def where(self, chosen):
+        """Pixels chosen by a mask or by their numbers."""
+        return Pixels(*(each[chosen] for each in self))
+
+
+class Estimates(NamedTuple):
+    """Estimates by pixel and quantity."""
+
+    median: np.ndarray
+    """Shape (n, quantities)."""
+    sd: np.ndarray
+    """Shape (n, quantities)."""
+    quantiles: np.ndarray
+    """Shape (n, quantities, probabilities)."""
+
+
+def probabilities_of(levels):
+    """Increasing probabilities of the ends of central intervals, with the median in their middle."""
+    tails = np.sort((1 - np.asarray(levels, float)) / 2)
+    return np.concatenate([tails, [0.5], 1 - tails[::-1]])
+
+
+# Line on NDVI: the parameters of fifesim.analysis.regression.Regression for each quantity.
+_LINE = ("slope", "intercept", "r2", "n", "residual_deviation", "x_mean", "x_sum_of_squares")
+
+
+def fit_line(pixels, levels, seed, *, red_and_near_infrared):
+    """Table of a line on NDVI for each quantity."""
+    red, near = red_and_near_infrared
+    ndvi = normalized_difference(pixels.reflectance[:, near], pixels.reflectance[:, red])
+    fits = []
+    for values in pixels.truth.T:
+        sums = regression.row_sums(values[None], ndvi[None], values.mean(), ndvi.mean())
+        fits.append(regression.fit(sums, values.mean(), ndvi.mean()))
+    return {"line": np.array([[getattr(fit, name) for name in _LINE] for fit in fits]), "bands": np.array([red, near])}
+
+
+def by_line(tables, reflectance, angles, levels):
+    """Prediction and prediction intervals of a line on NDVI."""
+    red, near = tables["bands"].astype(int)
+    ndvi = normalized_difference(reflectance[:, near], reflectance[:, red])
+    middle, spread, quantiles = [], [], []
+    for row in tables["line"]:
+        fit = regression.Regression(**dict(zip(_LINE, row, strict=True)))
+        middle.append(fit.predict(ndvi))
+        ends = {level: fit.prediction_interval(ndvi, level) for level in levels}
+        quantiles.append([*(ends[each][0] for each in sorted(levels, reverse=True)), middle[-1]])
+        quantiles[-1] += [ends[each][1] for each in sorted(levels)]
+        low, high = fit.prediction_interval(ndvi, 0.5)
+        spread.append((high - low) / (2 * stats.norm.ppf(0.75)))
+    return Estimates(np.stack(middle, 1), np.stack(spread, 1), np.moveaxis(np.array(quantiles), 2, 0))
+
+
+# Least number of pixels of a chip by which the error within it is known, and largest number of members.
+_FEWEST_PIXELS = 9
+_MEMBERS = 20_000
+
+# Uncertainty of the angles of a member, where they vary. [degree]
+_ANGLE = 2.0
+
+
+def fit_lookup(pixels, levels, seed):
+    """
+    Members of a lookup table, and the inverse square root of the covariance of their error.
+
+    Within a chip, atmosphere, leaves and soil are the same. The reflectance of a member is a parabola in the first
+    quantity, fitted to the pixels of its chip; what remains is noise, blur, registration and other effects of the
+    chain, whose covariance is pooled over all chips.
+    """
+    fitted, total, freedom = np.empty_like(pixels.reflectance), 0.0, 0
+    order = np.argsort(pixels.chip, kind="stable")
+    for at in np.split(order, np.flatnonzero(np.diff(pixels.chip[order])) + 1):
+        if len(at) < _FEWEST_PIXELS:
+            raise ValueError(
+                f"lookup needs chips of at least {_FEWEST_PIXELS} pixels, got one of {len(at)}: its error is estimated "
+                "from the pixels of each chip; use larger chips"
+            )
+        first = pixels.truth[at, 0]
+        design = np.vander((first - first.mean()) / (first.std() or 1.0), 3)
+        fitted[at] = design @ np.linalg.lstsq(design, pixels.reflectance[at], rcond=None)[0]
+        rest = pixels.reflectance[at] - fitted[at]
+        total, freedom = total + rest.T @ rest, freedom + len(at) - 3
+    values, vectors = np.linalg.eigh(total / freedom)
+    # Bands that are nearly equal keep their noise.
+    scale = vectors / np.sqrt(np.maximum(values, 1e-6 * values.max()))
+    chosen = np.random.default_rng(seed).permutation(len(fitted))[:_MEMBERS]
+    members = np.hstack([fitted[chosen] @ scale, _scaled_angles(pixels.angles[chosen], pixels.angles)])
+    return {"members": members, "states": pixels.truth[chosen], "scale": scale, "varies": _varies(pixels.angles)}
+
+
+def _varies(angles):
+    """Which angles vary between training pixels."""
+    return np.ptp(angles, axis=0) > _ANGLE
+
+
+def _scaled_angles(angles, training):
+    return angles[:, _varies(training)] / _ANGLE
+
+
+def by_lookup(tables, reflectance, angles, levels):
+    """Posterior of the members of a lookup table."""
+    measured = np.hstack([reflectance @ tables["scale"], angles[:, tables["varies"].astype(bool)] / _ANGLE])
+    wanted = probabilities_of(levels)
+    _, sd, quantiles, _ = lookup(measured, tables["members"], tables["states"], wanted)
+    return Estimates(quantiles[..., len(levels)], sd, quantiles)
+
+
+def fit_quantiles(pixels, levels, seed):
+    """Weights of a network that gives quantiles."""
+    inputs = _inputs(pixels.reflectance, pixels.angles)
+    mean, spread = inputs.mean(0), inputs.std(0)
+    spread = np.where(spread > 1e-6, spread, np.inf)
+    centre, scale = pixels.truth.mean(0), pixels.truth.std(0)
+    scale = np.where(scale > 0, scale, 1.0)
+    layers = train_quantiles((inputs - mean) / spread, (pixels.truth - centre) / scale, probabilities_of(levels), seed)
+    found = {"input_mean": mean, "input_spread": spread, "centre": centre, "scale": scale}
+    for number, (weight, bias) in enumerate(zip(layers.weights, layers.biases, strict=True)):
+        found |= {f"weight{number}": weight, f"bias{number}": bias}
+    return found
+
+
+def _inputs(reflectance, angles):
+    """Inputs of a network: reflectance and cosines of angles."""
+    return np.hstack([reflectance, np.cos(np.radians(angles))])
+
+
+def by_quantiles(tables, reflectance, angles, levels):
+    """Quantiles of a network."""
+    inputs = (_inputs(reflectance, angles) - tables["input_mean"]) / tables["input_spread"]
+    names = sorted(name for name in tables if name.startswith("weight"))
+    layers = Layers(
+        tuple(tables[name] for name in names), tuple(tables[name.replace("weight", "bias")] for name in names)
+    )
+    wanted = probabilities_of(levels)
+    outputs = network(inputs, layers).reshape(len(inputs), -1, len(wanted))
+    quantiles = np.sort(outputs, axis=-1) * tables["scale"][:, None] + tables["centre"][:, None]
+    # Standard deviation of a normal distribution with the interval nearest to its own.
+    at = int(np.argmin(np.abs(np.asarray(levels) - 0.68)))
+    level = sorted(levels, reverse=True).index(levels[at])
+    width = quantiles[..., len(wanted) - 1 - level] - quantiles[..., level]
+    return Estimates(quantiles[..., len(levels)], width / (2 * stats.norm.ppf((1 + levels[at]) / 2)), quantiles)
+
+
+FITS = {"line": fit_line, "lookup": fit_lookup, "quantiles": fit_quantiles}
+"""Functions that fit a method to training pixels, by its name."""
+
+ESTIMATORS = {"line": by_line, "lookup": by_lookup, "quantiles": by_quantiles}
+"""Functions that estimate with the tables of a method, by its name."""
+
+
+def stretch_factors(estimates, truth, landscape, levels):
+    """
+    Factors on both halves of each interval, by which it holds its share of unseen landscapes.
+
+    Parameters
+    ----------
+    estimates : Estimates
+        Of pixels that were not used to fit the method.
+    truth : array, shape (n, quantities)
+    landscape : array, shape (n,)
+        Every landscape has the same weight.
+    levels : sequence of float
+
+    Returns
+    -------
+    factors : array, shape (quantities, levels)
+
+    References
+    ----------
+    Conformalised quantile regression, [RomanoPattersonCandes2019]_, relative to the half-widths
+    """
+    _, number, count = np.unique(landscape, return_inverse=True, return_counts=True)
+    weight = 1 / count[number]
+    found = np.empty((truth.shape[1], len(levels)))
+    for kind in range(truth.shape[1]):
+        for at, level in enumerate(levels):
+            low, high = ends_of(estimates.quantiles, levels, level)
+            low, high = (estimates.median - low)[:, kind], (high - estimates.median)[:, kind]
+            error = truth[:, kind] - estimates.median[:, kind]
+            half = np.maximum(np.where(error < 0, low, high), 1e-9)
+            share = np.abs(error) / half
+            order = np.argsort(share, kind="stable")
+            reached = np.cumsum(weight[order]) / weight.sum()
+            found[kind, at] = share[order][min(np.searchsorted(reached, level), len(order) - 1)]
+    return found
+
+
+def ends_of(quantiles, levels, level):
+    """Ends of the interval of a level, shapes (n, quantities)."""
+    at = sorted(levels, reverse=True).index(level)
+    return quantiles[..., at], quantiles[..., quantiles.shape[-1] - 1 - at]
+
+
+def domain_of(reflectance):
+    """
+    Mean, inverse square root of the covariance and largest distance of the training spectra.
+
+    The distance is Mahalanobis'; one in a thousand training pixels is farther away.
+    """
+    mean = reflectance.mean(0)
+    values, vectors = np.linalg.eigh(np.atleast_2d(np.cov(reflectance.T)))
+    scale = vectors / np.sqrt(np.maximum(values, 1e-8 * values.max()))
+    distance = np.sqrt((((reflectance - mean) @ scale) ** 2).sum(1))
+    return {"domain_mean": mean, "domain_scale": scale, "domain_radius": np.array(np.quantile(distance, 0.999))}
+
+
+def is_outside(tables, reflectance):
+    """Whether spectra are outside of the training spectra."""
+    distance = (((reflectance - tables["domain_mean"]) @ tables["domain_scale"]) ** 2).sum(1)
+    return np.sqrt(distance) > tables["domain_radius"]
+
+
+def relative_azimuth(saa, vaa):
+    """Angle between two azimuths, 0 to 180. [degree]"""
+    return np.abs((np.asarray(vaa) - saa + 180) % 360 - 180)
+
+
+def held_out_folds(landscape, seed, parts=5):
+    """Number of a fold for each pixel, such that all pixels of a landscape are in one fold."""
+    names, number = np.unique(landscape, return_inverse=True)
+    fold = np.random.default_rng(seed).permutation(len(names)) % min(parts, len(names))
+    return fold[number], math.ceil(min(parts, len(names)))

@@ -1,0 +1,121 @@
+"""Optimal estimation against closed solutions, and the lookup table against the normal posterior."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from fifesim.retrieval.inversion import lookup, optimal_estimation
+
+LINEAR = pd.read_csv(Path(__file__).parents[1] / "data" / "optimal_estimation_linear.csv", comment="#")
+PROBLEMS = {
+    case: {
+        what: part.pivot(index="row", columns="column", values="value").to_numpy()
+        for what, part in rows.groupby("what")
+    }
+    for case, rows in LINEAR.groupby("case")
+}
+
+
+def forward_of(slope):
+    return lambda states, pixels: (states @ slope.T, np.broadcast_to(slope, (len(states), *slope.shape)))
+
+
+def test_linear_problems_have_the_closed_solution():
+    for own in PROBLEMS.values():
+        found = optimal_estimation(
+            own["y"].T, forward_of(own["K"]), own["xa"][:, 0], own["Sa"], own["Se"], tolerance=1e-9
+        )
+        assert found.converged.all()
+        assert found.state[0] == pytest.approx(own["x_hat"][:, 0], abs=1e-9)
+        assert found.covariance[0] == pytest.approx(own["S_hat"], abs=1e-9)
+        assert found.averaging_kernel[0] == pytest.approx(own["A"], abs=1e-9)
+        assert found.degrees_of_freedom[0] == pytest.approx(own["dof"][0, 0], abs=1e-9)
+        assert found.information(own["Sa"])[0] == pytest.approx(own["information_nat"][0, 0], abs=1e-9)
+        assert found.chi_square[0] == pytest.approx(own["cost"][0, 0], abs=1e-9)
+
+
+def saturating(states, pixels):
+    """Two measurements that saturate with one state, as reflectance does with leaf area."""
+    decay = np.exp(-states)
+    return np.hstack([0.4 - 0.3 * decay, 0.05 + 0.1 * decay]), np.stack([0.3 * decay, -0.1 * decay], axis=1)
+
+
+def test_saturating_problem_recovers_the_state_without_noise():
+    true = np.linspace(0.2, 4, 20)[:, None]
+    measured, _ = saturating(true, None)
+    found = optimal_estimation(
+        measured, saturating, np.array([2.0]), np.array([[1e4]]), 1e-10 * np.eye(2), tolerance=1e-6, iterations=50
+    )
+    assert found.converged.all()
+    assert found.state == pytest.approx(true, abs=1e-3)
+
+
+def test_estimate_is_the_least_of_the_cost():
+    measured = np.array([[0.31, 0.09], [0.2, 0.14]])
+    prior, spread, error = np.array([1.0]), np.array([[0.5]]), np.diag([1e-4, 4e-4])
+    found = optimal_estimation(measured, saturating, prior, spread, error, tolerance=1e-8)
+    states = np.linspace(0, 5, 50_001)[:, None]
+    for pixel in range(2):
+        rest = measured[pixel] - saturating(states, None)[0]
+        cost = np.einsum("ni,ij,nj->n", rest, np.linalg.inv(error), rest) + (states[:, 0] - prior) ** 2 / spread[0, 0]
+        assert found.state[pixel, 0] == pytest.approx(states[cost.argmin(), 0], abs=2e-4)
+        assert found.chi_square[pixel] == pytest.approx(cost.min(), rel=1e-6)
+
+
+def test_missing_measurements_and_limits():
+    measured = np.array([[np.nan, 0.09], [0.5, 0.0]])
+    found = optimal_estimation(
+        measured, saturating, np.array([1.0]), np.array([[10.0]]), 1e-6 * np.eye(2),
+        limits=(np.array([0.0]), np.array([3.0])),
+    )  # fmt: skip
+    assert np.isnan(found.state[0, 0]) and not found.converged[0]
+    assert found.state[1, 0] == 3.0
+
+
+def test_lookup_converges_to_the_normal_posterior_as_the_root_of_the_members():
+    """Root mean square error of the posterior mean over 60 tables, by the number of members."""
+    slope, spread = np.array([[1.0], [0.5]]), 1.0
+    whole = 1 / (1 / spread**2 + (slope**2).sum())
+    measured = np.array([[0.8, -0.2]])
+    mean = whole * (measured @ slope)[0, 0]
+    errors, deviations = {}, {}
+    for count in (400, 6400):
+        rng = np.random.default_rng(9)
+        found = []
+        for _ in range(60):
+            states = rng.normal(0, spread, (count, 1))
+            found.append(lookup(measured, states @ slope.T, states, np.array([0.1, 0.5, 0.9])))
+        errors[count] = np.sqrt(np.mean([(each[0][0, 0] - mean) ** 2 for each in found]))
+        deviations[count] = np.mean([each[1][0, 0] for each in found])
+    assert errors[400] / errors[6400] == pytest.approx(4, rel=0.35)
+    assert deviations[6400] == pytest.approx(np.sqrt(whole), rel=0.01)
+    quantiles = np.mean([each[2][0, 0] for each in found], axis=0)
+    assert quantiles == pytest.approx(stats.norm(mean, np.sqrt(whole)).ppf([0.1, 0.5, 0.9]), abs=0.02)
+
+
+def test_lookup_by_brute_force():
+    """Weights and quantiles of a small table, written out."""
+    rng = np.random.default_rng(4)
+    members, states, measured = rng.normal(size=(30, 2)), rng.normal(size=(30, 2)), rng.normal(size=(5, 2))
+    wanted = np.array([0.05, 0.4, 0.5, 0.95])
+    mean, sd, quantiles, chi_square = lookup(measured, members, states, wanted)
+    for pixel in range(5):
+        distance = ((measured[pixel] - members) ** 2).sum(1)
+        weight = np.exp(-0.5 * distance)
+        weight /= weight.sum()
+        assert chi_square[pixel] == pytest.approx(distance.min())
+        assert mean[pixel] == pytest.approx(weight @ states, rel=1e-6)
+        assert sd[pixel] == pytest.approx(np.sqrt(weight @ (states - weight @ states) ** 2), rel=1e-6)
+        for kind in range(2):
+            order = np.argsort(states[:, kind])
+            middle = np.cumsum(weight[order]) - 0.5 * weight[order]
+            expected = np.interp(wanted, middle, states[order, kind])
+            assert quantiles[pixel, kind] == pytest.approx(expected, abs=1e-6)
+
+
+def test_lookup_of_a_missing_measurement_is_missing():
+    found = lookup(np.array([[np.nan, 0.0]]), np.zeros((3, 2)), np.ones((3, 1)), np.array([0.5]))
+    assert all(np.isnan(each).all() for each in found)

@@ -1,0 +1,229 @@
+"""Training on a study, and retrieval from images: intervals, flags, files and refusals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fifesim
+from fifesim.retrieval import methods, training
+from fifesim.retrieval.description import Retrieval
+from tests.lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
+
+CHIP = fifesim.Scenario(
+    grid={"width": 300, "height": 300},
+    terrain={"dem": "flat"},
+    sensor={"instrument": "MSI", "bands": ["MSI3", "MSI4", "MSI8"]},
+)
+STUDY = fifesim.Study(
+    CHIP,
+    {"visibility": {"uniform": [20, 60]}, "soil": {"normal": [0, 0.02], "within": [-0.1, 0.1]}},
+    landscapes=24,
+    split={"train": 0.5, "validation": 0.25, "test": 0.25},
+)
+
+
+@pytest.fixture(scope="module")
+def chips():
+    return training._made(STUDY, 96)
+
+
+@pytest.fixture(scope="module", params=["line", "lookup", "quantiles"])
+def retrieval(request, chips):
+    return fifesim.train(chips, request.param)
+
+
+@pytest.fixture(scope="module")
+def image():
+    return fifesim.simulate(CHIP.replace(width=300, height=240, **{"ground.seed": 1234}))
+
+
+def test_intervals_hold_on_unseen_landscapes(retrieval):
+    """The part for testing has 6 landscapes, so coverage is known to some percent."""
+    score = retrieval.score
+    assert float(score.rmse.sel(quantity="lai")) < 0.25
+    for level in (0.5, 0.8, 0.95):
+        found = score.sel(quantity="lai", level=level)
+        assert abs(float(found.coverage) - level) < 0.05 + 3 * float(found.coverage_se)
+
+
+def test_retrieved_map_is_near_the_truth_and_on_its_grid(retrieval, image):
+    light = image["image"]["dn"].fifesim.to_reflectance()
+    found, truth = light.fifesim.retrieve(retrieval), image["truth"]["lai"]
+    score = fifesim.score(found, truth)
+    assert float(score.rmse) < 0.25
+    assert found.rio.crs == truth.rio.crs and np.array_equal(found.x, truth.x)
+    inside = found.where(found.flag >= 0)
+    assert bool((inside.lai_low <= inside.lai_high).where(inside.lai.notnull(), True).all())
+    assert bool((inside.lai_low.diff("level") <= 0).where(inside.lai.notnull(), True).all())
+    assert found.flag.dtype == np.int8
+    missing = light.isnull().any("band")
+    assert np.array_equal(found.flag.values == -1, missing.values) and np.array_equal(found.lai.isnull(), missing)
+
+
+def test_retrieve_is_lazy_and_the_same_in_any_chunks(retrieval, image):
+    light = image["image"]["dn"].fifesim.to_reflectance().compute()
+    light.attrs.pop("_FillValue", None)
+    for name, values in light.fifesim.retrieve(retrieval).data_vars.items():
+        for chunks in (CHUNKS, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}):
+            with no_compute():
+                lazy = in_chunks(light, chunks).fifesim.retrieve(retrieval)[name]
+            xr.testing.assert_identical(lazy.compute(), values)
+
+
+def test_training_is_repeated_to_the_bit(chips):
+    chips = chips.isel(chip=slice(24))
+    one, two = (fifesim.train(chips, "quantiles", seed=3) for _ in range(2))
+    assert all(np.array_equal(one.tables[name], two.tables[name]) for name in one.tables)
+    other = fifesim.train(chips, "quantiles", seed=4)
+    assert not np.array_equal(one.tables["weight0"], other.tables["weight0"])
+
+
+def test_file_keeps_the_retrieval(retrieval, image, tmp_path):
+    retrieval.to_netcdf(tmp_path / "mine.nc")
+    again = fifesim.read_retrieval(tmp_path / "mine.nc")
+    assert replace(again, tables={}, score=None) == replace(retrieval, tables={}, score=None)
+    light = image["image"]["dn"].fifesim.to_reflectance()
+    assert again.score.coverage.values == pytest.approx(retrieval.score.coverage.values)
+    assert light.fifesim.retrieve(again).identical(light.fifesim.retrieve(retrieval))
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.nc"]
+
+
+def test_geotiff_has_a_layer_for_each_level(retrieval, image, tmp_path):
+    found = image["image"]["dn"].fifesim.to_reflectance().fifesim.retrieve(retrieval, intervals=[0.5, 0.95])
+    path = found.fifesim.to_geotiff(tmp_path / "lai.tif")
+    again = fifesim.open_image(path)
+    names = again.band.values.tolist()
+    assert names[:6] == ["lai", "lai_sd", "lai_low_50", "lai_low_95", "lai_high_50", "lai_high_95"]
+    assert np.array_equal(again.sel(band="lai_low_95"), found.lai_low.sel(level=0.95), equal_nan=True)
+
+
+def test_foreign_spectra_and_the_edge_of_the_prior_are_flagged(retrieval, image):
+    light = image["image"]["dn"].fifesim.to_reflectance().compute()
+    water = light.copy(data=np.broadcast_to(np.array([0.03, 0.02, 0.01])[:, None, None], light.shape).copy())
+    assert (water.fifesim.retrieve(retrieval).flag.values & 1).all()
+    assert float((light.fifesim.retrieve(retrieval).flag > 0).mean()) < 0.1
+    # Dense grass: brighter in the near infrared and darker in red than any pixel of the training.
+    dense = light.where(light.band == "MSI8", 0.04).where(light.band != "MSI8", 0.42)
+    assert (dense.fifesim.retrieve(retrieval).flag.values[1:-1, 1:-1] > 0).all()
+
+
+def test_stretch_gives_every_landscape_the_same_weight():
+    """Intervals of one landscape are too narrow, of the other too wide; the first has ten times the pixels."""
+    rng = np.random.default_rng(0)
+    landscape = np.repeat([0, 1], [10_000, 1000])
+    truth = rng.normal(size=(11_000, 1)) * np.where(landscape == 0, 3.0, 0.5)[:, None]
+    z = np.array([-1.2816, 0, 1.2816])
+    estimates = methods.Estimates(np.zeros((11_000, 1)), np.ones((11_000, 1)), np.tile(z, (11_000, 1, 1)))
+    factor = methods.stretch_factors(estimates, truth, landscape, (0.8,))[0, 0]
+    inside = np.abs(truth[:, 0]) <= factor * 1.2816
+    assert (inside[landscape == 0].mean() + inside[landscape == 1].mean()) / 2 == pytest.approx(0.8, abs=0.002)
+    assert inside.mean() < 0.7
+
+
+def test_lookup_knows_the_covariance_of_the_error_within_chips():
+    rng = np.random.default_rng(1)
+    chip = np.repeat(np.arange(40), 100)
+    lai = rng.uniform(0, 4, 4000)
+    error = rng.multivariate_normal([0, 0], [[4e-4, 3e-4], [3e-4, 9e-4]], 4000)
+    light = (
+        np.stack([0.1 - 0.01 * lai, 0.2 + 0.05 * lai - 0.004 * lai**2], axis=1)
+        + rng.normal(0, 0.1, (40, 2))[chip]
+        + error
+    )
+    pixels = methods.Pixels(light, np.zeros((4000, 3)), lai[:, None], chip, chip)
+    scale = methods.fit_lookup(pixels, (0.5,), 0)["scale"]
+    assert np.linalg.inv(scale @ scale.T) == pytest.approx(np.array([[4e-4, 3e-4], [3e-4, 9e-4]]), rel=0.1)
+
+
+def test_sl2p_maps_sentinel_2_reflectance(image):
+    names = [f"MSI{name}" for name in ("3", "4", "5", "6", "7", "8A", "11", "12")]
+    spectrum = [0.058, 0.0079, 0.0936, 0.2585, 0.2825, 0.3087, 0.1708, 0.0698]
+    grid = image["truth"]["lai"].isel(x=slice(2), y=slice(3)).compute()
+    light = (grid * 0 + xr.DataArray(spectrum, dims="band", coords={"band": names})).transpose("band", "y", "x")
+    light = light.assign_coords(
+        sza=np.degrees(np.arccos(0.40581)), vza=np.degrees(np.arccos(0.98434)), saa=10.0,
+        vaa=10.0 + np.degrees(np.arccos(-0.55142)),
+    )  # fmt: skip
+    light.attrs["standard_name"] = "surface_bidirectional_reflectance"
+    light[:, 0, 0] = np.nan
+    found = light.fifesim.retrieve("sl2p")
+    assert list(found.data_vars) == ["lai", "fpar", "fcover", "flag"]
+    assert found.lai.values[1, 1] == pytest.approx(1.49, abs=0.01)  # the first published case, rounded
+    assert np.isnan(found.lai.values[0, 0]) and found.flag.values[0, 0] == -1 and found.flag.values[1, 1] == 0
+    with pytest.raises(ValueError, match="lacks MSI5"):
+        light.sel(band=["MSI3", "MSI4"]).fifesim.retrieve("sl2p")
+    with pytest.raises(ValueError, match="needs reflectance of the surface"):
+        light.assign_attrs(standard_name="toa_bidirectional_reflectance").fifesim.retrieve("sl2p")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda light: light.sel(band=["MSI3", "MSI4"]), "lacks MSI8"),
+        (lambda light: light.drop_vars("vaa"), "no coordinate vaa"),
+        (lambda light: light.assign_coords(sza=50.0), r"sza of the image is 50\.0 degrees, the training had 28\.5"),
+        (lambda light: light.assign_attrs(standard_name="surface_bidirectional_reflectance"), "top of the atmosphere"),
+        (lambda light: light.assign_coords(wavelength=("band", [0.56, 0.66, 0.9])), "band MSI8 of the image is at 0.9"),
+        (lambda light: light.isel(band=0, drop=True), "no dimension band"),
+    ],
+)
+def test_images_that_do_not_fit_are_refused(chips, image, change, message):
+    retrieval = fifesim.train(chips, "line")
+    with pytest.raises(ValueError, match=message):
+        change(image["image"]["dn"].fifesim.to_reflectance()).fifesim.retrieve(retrieval)
+
+
+def test_digital_numbers_and_unknown_levels_are_refused(chips, image):
+    retrieval = fifesim.train(chips, "line")
+    with pytest.raises(ValueError, match="digital numbers"):
+        image["image"]["dn"].fifesim.retrieve(retrieval)
+    light = image["image"]["dn"].fifesim.to_reflectance()
+    with pytest.raises(ValueError, match=r"among the levels of the training, 0\.5, 0\.8, 0\.95, got \[0\.9\]"):
+        light.fifesim.retrieve(retrieval, intervals=[0.9])
+    with pytest.raises(ValueError, match=r"'sl2p' or from fifesim\.train"):
+        light.fifesim.retrieve("s2lp")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"method": "trees"}, "method must be one of|'line'"),
+        ({"quantities": "lia"}, "different names among lai, fpar, green_fpar"),
+        ({"quantities": "green_fpar"}, "no green_fpar"),
+        ({"levels": [0.5, 1.0]}, "between 0 and 1"),
+        ({"bands": "MSI2"}, "no band MSI2, they have MSI3, MSI4, MSI8"),
+        ({"level": "surface"}, "no surface_reflectance: add the corrected reflectance"),
+        ({"method": "line", "bands": ["MSI3", "MSI4"]}, "needs a red and a near infrared band"),
+    ],
+)
+def test_impossible_training_is_refused(chips, options, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.train(chips, **options)
+
+
+def test_training_needs_every_part(chips):
+    with pytest.raises(ValueError, match="no chips of validation"):
+        fifesim.train(chips.isel(chip=np.flatnonzero(chips.split.values != "validation")))
+
+
+def test_files_that_are_no_retrieval_are_refused(tmp_path, chips):
+    with pytest.raises(ValueError, match="no such file"):
+        fifesim.read_retrieval(tmp_path / "none.nc")
+    xr.Dataset({"a": 1.0}).to_netcdf(tmp_path / "other.nc")
+    with pytest.raises(ValueError, match="is not a retrieval"):
+        fifesim.read_retrieval(tmp_path / "other.nc")
+    (tmp_path / "text.nc").write_text("no")
+    with pytest.raises(ValueError, match="cannot read the retrieval"):
+        fifesim.read_retrieval(tmp_path / "text.nc")
+    newer = replace(fifesim.train(chips, "line"), version=2)
+    newer.to_netcdf(tmp_path / "newer.nc")
+    with pytest.raises(ValueError, match="has the format 2"):
+        fifesim.read_retrieval(tmp_path / "newer.nc")
+
+
+def test_a_retrieval_is_a_public_description(chips):
+    retrieval = fifesim.train(chips, "line")
+    assert isinstance(retrieval, Retrieval)
+    assert "lai mean" in retrieval.prior and "12 landscapes" in retrieval.prior

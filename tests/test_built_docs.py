@@ -1,0 +1,79 @@
+"""The built documentation: what its search finds first, its sidebar, and the page with sliders."""
+
+import asyncio
+import json
+import os
+import re
+from pathlib import Path
+
+import pytest
+from browser import CHROMIUM, opened
+
+from fifesim.accessor import PUBLIC
+
+DOCS = Path(__file__).parents[1] / "docs"
+HTML = Path(os.environ.get("FIFESIM_HTML", DOCS / "_build" / "html"))
+
+pytestmark = pytest.mark.skipif(not (HTML / "searchindex.js").exists(), reason=f"no documentation is built in {HTML}")
+
+# Questions of readers, and the page that answers each.
+ANSWERS = {
+    "noise": "howto/my_sensor",
+    "my DEM": "howto/my_dem",
+    "accuracy": "benchmarks",
+    "how accurate": "benchmarks",
+    "citation": "cite",
+    "cite": "cite",
+    "aerosol": "howto/aerosol",
+    "cluster": "large_scenes",
+    "Table 2": "howto/paper",
+    "what changed": "changes",
+    "scenario key": "scenario_keys",
+    "FPAR": "nomenclature",
+    "regress": "api/names/fifesim.regress",
+}
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
+def test_search_lists_the_page_that_answers_first(tmp_path):
+    ready = "typeof Search !== 'undefined' && Search._index !== null"
+    query = "Search._performSearch(...Search._parseQuery({})).pop()[0]"
+
+    async def search():
+        async with opened(HTML / "search.html", tmp_path) as page:
+            await page.until(ready)
+            return {words: await page.evaluate(query.format(json.dumps(words))) for words in ANSWERS}
+
+    assert asyncio.run(search()) == ANSWERS
+
+
+def test_reference_has_no_page_of_an_internal_module():
+    index = (HTML / "searchindex.js").read_text(encoding="utf-8")
+    pages = json.loads(index.removeprefix("Search.setIndex(").removesuffix(")"))["docnames"]
+    names = {page.removeprefix("api/names/fifesim.") for page in pages if page.startswith("api/")}
+    assert names == {*PUBLIC, "atmosphere.spectrum", "api/functions"}
+
+
+def test_sidebar_has_at_most_40_links():
+    numbers = {}
+    for page in HTML.rglob("*.html"):
+        tree = re.search(r'<div class="sidebar-tree">(.*?)</div>', page.read_text(encoding="utf-8"), re.DOTALL)
+        if tree:
+            numbers[page.relative_to(HTML).as_posix()] = tree[1].count("<a ")
+    assert numbers["index.html"] > 5 and {page: n for page, n in numbers.items() if n > 40} == {}
+
+
+def test_first_link_of_the_index_is_the_page_with_sliders():
+    text = (HTML / "index.html").read_text(encoding="utf-8")
+    article = text[text.index("<article") :]
+    links = [link for link in re.findall(r'href="([^"#]+)"', article) if not link.startswith("#")]
+    assert links[0] == "_static/explore.html"
+    assert "<title>" in (HTML / links[0]).read_text(encoding="utf-8")
+
+
+def test_words_to_search_for_are_of_pages_that_exist():
+    source = (DOCS / "conf.py").read_text(encoding="utf-8")
+    pages = re.findall(
+        r'^    "([\w/]+)": \["', source[source.index("SEARCH_WORDS") :].partition("}\n")[0], re.MULTILINE
+    )
+    assert pages and [page for page in pages if not (DOCS / f"{page}.md").exists()] == []
