@@ -74,7 +74,7 @@ SEARCH_WORDS = {
     "benchmarks": ["accuracy", "accurate", "how accurate", "validation", "verify"],
     "changes": ["changelog", "release notes", "what changed"],
     "cite": ["citation", "cite", "how to cite", "bibtex", "doi"],
-    "howto/aerosol": ["aerosol", "which aerosol", "visibility", "smoke", "dust"],
+    "howto/aerosol": ["aerosol", "which aerosol", "visibility", "aot", "smoke", "dust"],
     "howto/haze": ["haze"],
     "howto/my_dem": ["my dem", "dem", "elevation"],
     "howto/my_image": ["my image", "landsat", "sentinel-2"],
@@ -85,9 +85,10 @@ SEARCH_WORDS = {
     "howto/score": ["score"],
     "install": ["installation", "pip", "conda", "windows"],
     "large_scenes": ["cluster", "slurm", "memory", "resume"],
-    "command_line": ["command", "option"],
+    "command_line": ["command", "command line", "cli", "option"],
+    "instruments": ["instrument", "which instrument"],
     "scenario_keys": ["key", "scenario key"],
-    "why_scatter": ["scatter"],
+    "why_scatter": ["scatter", "why scatter"],
     "nomenclature": ["fpar", "symbols", "units"],
 }
 
