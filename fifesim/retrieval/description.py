@@ -71,6 +71,15 @@ class Retrieval:
         Version of the file format.
     score : xarray.Dataset or None
         Scores on the landscapes that were not used in training, dims (quantity, level).
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> chip = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
+    >>> study = fifesim.Study(chip, {"visibility": {"uniform": [10, 60]}}, landscapes=10)
+    >>> retrieval = fifesim.train(study, "line", chips=10)
+    >>> retrieval.bands, retrieval.level, retrieval.levels
+    (('TM3', 'TM4'), 'toa', (0.5, 0.8, 0.95))
     """
 
     method: str
@@ -87,7 +96,7 @@ class Retrieval:
     score: xr.Dataset | None = field(default=None, repr=False)
     _in_words: ClassVar[str] = "a fifesim.Retrieval, as fifesim.train gives it"
 
-    def estimate(self, reflectance, angles) -> Estimated:
+    def estimate(self, reflectance: np.ndarray, angles: np.ndarray) -> Estimated:
         """
         Estimate the quantities of pixels.
 
@@ -128,7 +137,7 @@ class Retrieval:
         np.maximum.accumulate(high, axis=2, out=high)
         return Estimated(median, sd, low, high, flag)
 
-    def to_netcdf(self, path: FilePath):
+    def to_netcdf(self, path: FilePath) -> None:
         """
         Write the retrieval to a NetCDF file.
 

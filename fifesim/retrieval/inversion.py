@@ -107,7 +107,7 @@ def _table_posterior(measured, members, states, orders, probabilities):
     return mean, sd, quantiles, best
 
 
-class Estimate(NamedTuple):
+class Solution(NamedTuple):
     """Result of optimal estimation by pixel."""
 
     state: np.ndarray
@@ -148,7 +148,7 @@ def optimal_estimation(
     first: np.ndarray | None = None,
     iterations: int = 20,
     tolerance: float = 1e-3,
-) -> Estimate:
+) -> Solution:
     """
     Most probable states by the method of Levenberg and Marquardt, all pixels together.
 
@@ -173,7 +173,7 @@ def optimal_estimation(
 
     Returns
     -------
-    estimate : Estimate
+    estimate : Solution
 
     References
     ----------
@@ -220,7 +220,7 @@ def optimal_estimation(
     kernel = covariance @ (inverse - sharpness)
     for each in (state, cost, covariance, kernel):
         each[~is_known] = np.nan
-    return Estimate(state, covariance, kernel, cost, converged)
+    return Solution(state, covariance, kernel, cost, converged)
 
 
 def _square(vectors, matrix):

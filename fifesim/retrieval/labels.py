@@ -13,7 +13,7 @@ from fifesim.base.arguments import Kind
 from fifesim.base.files import shown
 from fifesim.grids import cf, chunks, swaths
 from fifesim.retrieval.description import ANGLE_MARGIN, OUTSIDE, Retrieval
-from fifesim.retrieval.methods import relative_azimuth
+from fifesim.retrieval.methods import azimuth_difference
 from fifesim.retrieval.networks import SL2P_BANDS, sl2p
 
 _ANGLES = ("sza", "saa", "vza", "vaa")
@@ -184,7 +184,7 @@ def _check_angles(angles, retrieval):
         return
     sza, saa, vza, vaa = (float(each) for each in angles)
     first, last = retrieval.tables["angle_range"]
-    own = sza, vza, float(relative_azimuth(saa, vaa)) if vza >= _NADIR else 0.0
+    own = sza, vza, float(azimuth_difference(saa, vaa)) if vza >= _NADIR else 0.0
     for name, value, low, high in zip(("sza", "vza", "relative azimuth"), own, first, last, strict=True):
         if not low - ANGLE_MARGIN <= value <= high + ANGLE_MARGIN:
             raise ValueError(
@@ -201,7 +201,7 @@ def _angles_of(light, sza, saa, vza, vaa):
     """Zenith angles and relative azimuth of the pixels of a block, shape (n, 3). [degree]"""
     shape = light.shape[:-1]
     sza, saa, vza, vaa = (np.broadcast_to(each, shape).ravel() for each in (sza, saa, vza, vaa))
-    return np.stack([sza, vza, np.where(vza < _NADIR, 0.0, relative_azimuth(saa, vaa))], axis=1)
+    return np.stack([sza, vza, np.where(vza < _NADIR, 0.0, azimuth_difference(saa, vaa))], axis=1)
 
 
 def _estimates(light, sza, saa, vza, vaa, *, retrieval, places):

@@ -1,6 +1,5 @@
 """Methods of retrieval on arrays of pixels: how each is fitted to training pixels, and how it estimates."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from fifesim.retrieval.inversion import table_posterior
 from fifesim.retrieval.networks import Network, network, train_quantiles
 
 
-class Pixels(NamedTuple):
+class TrainingPixels(NamedTuple):
     """Training pixels."""
 
     reflectance: np.ndarray
@@ -27,8 +26,8 @@ class Pixels(NamedTuple):
     """Number of the landscape, shape (n,)."""
 
     def where(self, chosen):
-        """Pixels chosen by a mask or by their numbers."""
-        return Pixels(*(each[chosen] for each in self))
+        """TrainingPixels chosen by a mask or by their numbers."""
+        return TrainingPixels(*(each[chosen] for each in self))
 
 
 class Estimates(NamedTuple):
@@ -88,13 +87,10 @@ _ANGLE = 2.0
 
 
 def fit_lookup(pixels, levels, seed):
-    """
-    Members of a lookup table, and the inverse square root of the covariance of their error.
-
-    Within a chip, atmosphere, leaves and soil are the same. The reflectance of a member is a parabola in the first
-    quantity, fitted to the pixels of its chip; what remains is noise, blur, registration and other effects of the
-    chain, whose covariance is pooled over all chips.
-    """
+    """Members of a lookup table, and the inverse square root of the covariance of their error."""
+    # Within a chip, atmosphere, leaves and soil are the same. The reflectance of a member is a parabola in the first
+    # quantity, fitted to the pixels of its chip. The rest is noise, blur, registration and other effects of the chain,
+    # whose covariance is pooled over all chips.
     fitted, total, freedom = np.empty_like(pixels.reflectance), 0.0, 0
     order = np.argsort(pixels.chip, kind="stable")
     for at in np.split(order, np.flatnonzero(np.diff(pixels.chip[order])) + 1):
@@ -220,11 +216,8 @@ def ends_of(quantiles, levels, level):
 
 
 def domain_of(reflectance):
-    """
-    Mean, inverse square root of the covariance and largest distance of the training spectra.
-
-    The distance is Mahalanobis'; one in a thousand training pixels is farther away.
-    """
+    """Mean, inverse square root of the covariance and largest Mahalanobis distance of the training spectra."""
+    # One in a thousand training pixels is farther away.
     mean = reflectance.mean(0)
     values, vectors = np.linalg.eigh(np.atleast_2d(np.cov(reflectance.T)))
     scale = vectors / np.sqrt(np.maximum(values, 1e-8 * values.max()))
@@ -238,13 +231,6 @@ def is_outside(tables, reflectance):
     return np.sqrt(distance) > tables["domain_radius"]
 
 
-def relative_azimuth(saa, vaa):
+def azimuth_difference(saa, vaa):
     """Angle between two azimuths, 0 to 180. [degree]"""
     return np.abs((np.asarray(vaa) - saa + 180) % 360 - 180)
-
-
-def held_out_folds(landscape, seed, parts=5):
-    """Number of a fold for each pixel, such that all pixels of a landscape are in one fold."""
-    names, number = np.unique(landscape, return_inverse=True)
-    fold = np.random.default_rng(seed).permutation(len(names)) % min(parts, len(names))
-    return fold[number], math.ceil(min(parts, len(names)))

@@ -24,7 +24,7 @@ StudyOrDataset = Annotated[
     Kind("the path of a study, a fifesim.Study, or a dataset of chips as fifesim.dataset gives it", dimensions=0),
 ]
 
-# Pixels of the training that are used, more do not improve a network of this size, and of the other parts.
+# TrainingPixels of the training that are used, more do not improve a network of this size, and of the other parts.
 _PIXELS, _UNSEEN = 100_000, 20_000
 
 _LEVELS = (0.5, 0.8, 0.95)
@@ -170,11 +170,11 @@ def _check_dataset(dataset, variable, names):
             cure = "add the corrected reflectance of your processor to the dataset, or use level='toa'"
         if set(lacking) <= set(RETRIEVED):
             cure = "choose other quantities"
-        raise ValueError(f"the dataset has no {', '.join(lacking)}: {cure}")
+        raise ValueError(f"source has no {', '.join(lacking)}: {cure}")
     parts = set(np.unique(dataset["split"].values).tolist())
     if missing := {"train", "validation", "test"} - parts:
         raise ValueError(
-            f"the dataset has no chips of {', '.join(sorted(missing))}: a retrieval is fitted on train, its intervals "
+            f"source has no chips of {', '.join(sorted(missing))}: a retrieval is fitted on train, its intervals "
             "are set on validation and it is scored on test; make more chips or landscapes"
         )
 
@@ -194,7 +194,7 @@ def _pixels(dataset, variable, bands, names, part, seed):
     chips, rows, columns, width = light.shape
     truth = np.stack([np.asarray(own[name].transpose("chip", "y", "x").values, float) for name in names], axis=-1)
     angles = np.stack(
-        [own["sza"].values, own["vza"].values, methods.relative_azimuth(own["saa"].values, own["vaa"].values)], axis=1
+        [own["sza"].values, own["vza"].values, methods.azimuth_difference(own["saa"].values, own["vaa"].values)], axis=1
     )
     # A view at nadir has no azimuth.
     angles[:, 2] = np.where(angles[:, 1] < 0.5, 0.0, angles[:, 2])
@@ -205,7 +205,7 @@ def _pixels(dataset, variable, bands, names, part, seed):
         raise ValueError(f"no pixel of the part {part} has both reflectance and truth")
     chosen = np.sort(np.random.default_rng(seed).permutation(valid)[: _PIXELS if part == "train" else _UNSEEN])
     whole = chip[chosen]
-    return methods.Pixels(flat[chosen], angles[whole], true[chosen], whole, own["landscape"].values[whole])
+    return methods.TrainingPixels(flat[chosen], angles[whole], true[chosen], whole, own["landscape"].values[whole])
 
 
 def _prior(pixels, names):

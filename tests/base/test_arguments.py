@@ -37,7 +37,16 @@ NO_ARGUMENTS = {
 }
 
 # Tests of scenarios, instruments and products try wrong content of these; a Regression is the result of `regress`.
-TESTED_ELSEWHERE = {"Instrument", "Regression", "Scenario", "Setup", "Study", "open_landsat", "open_sentinel2"}
+TESTED_ELSEWHERE = {
+    "Instrument",
+    "Regression",
+    "Retrieval",
+    "Scenario",
+    "Setup",
+    "Study",
+    "open_landsat",
+    "open_sentinel2",
+}
 
 KINDS = ("numpy", "list", "none", "str", "dataset", "empty", "1-d", "crs")
 
@@ -71,6 +80,7 @@ ACCEPTED = {
     # Names of three bands, which a raster without bands does not need; two limits; None where it says something.
     ("plot", "composite"): LIST, ("plot", "limits"): LIST, ("plot_comparison", "limits"): LIST,
     ("plot", "stretch"): LIST,
+    ("train", "levels"): LIST, ("retrieve", "intervals"): LIST, ("train", "path"): {"str"},
     ("score", "by"): LIST, ("score", "truth"): {"crs"}, ("rgb", "stretch"): LIST,
     ("calibrate", "saturated"): {"none"}, ("simulate", "chunks"): {"none"},
 }  # fmt: skip
@@ -124,6 +134,9 @@ def calls(tmp_path_factory):
     radiance = placed(np.full((1, *wide.shape), 80.0), wide, "toa_radiance").assign_coords(band=["MODIS1"])
     radiance.attrs |= {"instrument": "MODIS", "units": "W m-2 sr-1 um-1"}
     swath = fifesim.sense_swath(radiance, "MODIS", min_valid=0.1)
+    many = fifesim.Study(tiny, {"visibility": {"uniform": [10, 60]}}, landscapes=3)
+    chips = fifesim.dataset(many, folder / "training.zarr", 3)
+    retrieval = fifesim.train(chips, "line", path=folder / "line.nc")
     given = {
         "CoverClass": {"name": "grass", "lai": 2.0, "arp": 0.1, "canopy": fifesim.Canopy(), "code": 3},
         "Field": {"mean": 1.0, "sd": 0.1, "arp": 0.1, "coarser": 1},
@@ -220,6 +233,10 @@ def calls(tmp_path_factory):
                                       "pair": "coordinates"},
         "invert": {"ndvi": ndvi, "fit": fifesim.regress(lai, ndvi), "quantity": "lai", "level": 0.95},
         "inversion_error": {"estimate": lai, "truth": lai, "pair": "coordinates"},
+        "train": {"source": chips, "method": "line", "bands": ["TM3", "TM4"], "quantities": ["lai"], "level": "toa",
+                  "levels": [0.5], "seed": 0},
+        "retrieve": {"image": rho.drop_attrs(), "retrieval": retrieval, "intervals": [0.5]},
+        "read_retrieval": {"path": folder / "line.nc"},
         "score": {"estimate": fifesim.invert(ndvi, fit), "truth": lai.isel(y=slice(6), x=slice(6)), "pair": "index"},
         "noise_std": {"image": image, "instrument": "TM", "noise_models": fifesim.NoiseModel(1.0, 0.1)},
         "share_kept": {"pixels": lai, "cells": lai},

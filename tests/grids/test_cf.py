@@ -20,6 +20,7 @@ STANDARD_NAMES = {
     "ground_slope_direction": "degree",
     "leaf_area_index": "1",
     "normalized_difference_vegetation_index": "1",
+    "vegetation_area_fraction": "1",
     "sensor_azimuth_angle": "degree",
     "sensor_band_central_radiation_wavelength": "um",
     "sensor_zenith_angle": "degree",

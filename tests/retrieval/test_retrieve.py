@@ -132,7 +132,7 @@ def test_lookup_knows_the_covariance_of_the_error_within_chips():
         + rng.normal(0, 0.1, (40, 2))[chip]
         + error
     )
-    pixels = methods.Pixels(light, np.zeros((4000, 3)), lai[:, None], chip, chip)
+    pixels = methods.TrainingPixels(light, np.zeros((4000, 3)), lai[:, None], chip, chip)
     scale = methods.fit_lookup(pixels, (0.5,), 0)["scale"]
     assert np.linalg.inv(scale @ scale.T) == pytest.approx(np.array([[4e-4, 3e-4], [3e-4, 9e-4]]), rel=0.1)
 
