@@ -154,8 +154,8 @@ class Retrieval:
             values = np.asarray(values, float)
             found[f"table_{name}"] = tuple(f"{name}_{axis}" for axis in range(values.ndim)), values
         if self.score is not None:
-            for name, values in self.score.data_vars.items():
-                found[f"score_{name}"] = values.drop_vars("quantity", errors="ignore")
+            for name, scores in self.score.drop_vars("quantity").data_vars.items():
+                found[f"score_{name}"] = scores
         path = Path(path)
         partial_path = path.with_name(f".{path.name}.partial")
         try:
@@ -205,8 +205,9 @@ def read_retrieval(path: FilePath) -> Retrieval:
             f"{name} has the format {own['fifesim_retrieval']} of a retrieval, this fifesim reads format {FORMAT}: "
             "train it again"
         )
-    tables = {key.removeprefix("table_"): found[key].values for key in found.data_vars if key.startswith("table_")}
-    scores = {key.removeprefix("score_"): found[key] for key in found.data_vars if key.startswith("score_")}
+    names = [str(name).partition("_") for name in found.data_vars]
+    tables = {name: found[f"table_{name}"].values for kind, _, name in names if kind == "table"}
+    scores = {name: found[f"score_{name}"] for kind, _, name in names if kind == "score"}
     quantities = tuple(own["quantities"].split())
     return Retrieval(
         method=own["method"],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Annotated, Literal
 
@@ -104,7 +104,7 @@ def train(
     parts = {part: _pixels(dataset, variable, chosen, names, part, seed) for part in ("train", "validation", "test")}
     learned, levels = parts["train"], tuple(sorted(float(each) for each in levels))
     wavelengths = tuple(float(each) for each in dataset["wavelength"].sel(band=list(chosen)).values)
-    fit = methods.FITS[method]
+    fit: Callable = methods.FITS[method]
     if method == "line":
         places = tuple(nearest_band(wavelengths, window) for window in (RED, NEAR_INFRARED))
         if None in places:
