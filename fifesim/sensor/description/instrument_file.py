@@ -48,9 +48,12 @@ class Noise:
         Ratio of signal to noise there. [1]
     nedl : float, optional
         Noise equivalent radiance there, standard deviation; instead of the ratio. [W m-2 sr-1 um-1]
+    high_radiance, high_snr : float, optional
+        A second, higher radiance and the ratio there. Both ratios determine the shot noise and the constant noise.
+        [W m-2 sr-1 um-1], [1]
     shot : float, optional
-        Share of the variance there that grows in proportion to the signal; the rest is constant. Where it is not
-        given it is not known, and all of the noise is taken as constant. [1]
+        Share of the variance at `radiance` that grows in proportion to the signal (shot noise); the rest is constant.
+        By default 1: the noise is limited by shot noise. Leave it out with two radiances. [1]
     gain_spread : float, optional
         Standard deviation of the detectors' relative gain: fixed pattern, which stripes the image. [1]
     offset_spread : float, optional
@@ -59,12 +62,15 @@ class Noise:
     Raises
     ------
     pydantic.ValidationError
-        Unless one of the ratio and the noise is given.
+        Unless one of the ratio and the noise is given, or if the second point is incomplete, lower than the first, or
+        needs a negative variance.
     """
 
     radiance: Positive
     snr: Positive | None = None
     nedl: Positive | None = None
+    high_radiance: Positive | None = None
+    high_snr: Positive | None = None
     shot: Annotated[float, Field(strict=True, ge=0, le=1)] | None = None
     gain_spread: Annotated[float, Field(strict=True, ge=0, lt=1)] = 0.0
     offset_spread: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 0.0
@@ -72,16 +78,24 @@ class Noise:
     def __post_init__(self):
         if (self.snr is None) == (self.nedl is None):
             raise ValueError("give either snr or nedl [W m-2 sr-1 um-1], at the radiance")
+        if (self.high_radiance is None) != (self.high_snr is None):
+            raise ValueError("high_radiance and high_snr belong together: give both or neither")
+        if self.high_radiance is not None and self.high_radiance <= self.radiance:
+            raise ValueError(f"high_radiance must be above radiance = {self.radiance:g}, got {self.high_radiance:g}")
+        # Raises if the points and the share do not fit together.
+        self.model()
 
     @property
     def equivalent_radiance(self):
         """Noise equivalent radiance at `radiance`, as a standard deviation. [W m-2 sr-1 um-1]"""
         return self.radiance / self.snr if self.nedl is None else self.nedl
 
-    def model(self, detectors, along):
+    def model(self, detectors=1, along="rows"):
         """Noise model at every radiance."""
-        snr, shot = self.radiance / self.equivalent_radiance, self.shot or 0.0
-        model = NoiseModel.from_snr(self.radiance, snr, shot, detectors=detectors, along=along)
+        radiance, snr = [self.radiance], [self.radiance / self.equivalent_radiance]
+        if self.high_radiance is not None:
+            radiance, snr = [*radiance, self.high_radiance], [*snr, self.high_snr]
+        model = NoiseModel.from_snr(radiance, snr, self.shot, detectors=detectors, along=along)
         return replace(model, gain_spread=self.gain_spread, offset_spread=self.offset_spread)
 
 

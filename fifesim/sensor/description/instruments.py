@@ -33,7 +33,7 @@ from fifesim.sensor.description.spatial_response import with_response
 
 # Keys that are suggested for misspelt ones, including keys of short files.
 _KEYS = {key.name for kind in (Instrument, InstrumentBand, Noise, Product, Scan, ScanZone) for key in fields(kind)}
-_KEYS |= {"center", "width", "shape", "snr", "snr_radiance", "snr_shot"}
+_KEYS |= {"center", "width", "shape", "snr", "snr_radiance", "snr_shot", "high_snr", "high_snr_radiance"}
 
 
 def instrument(

@@ -147,6 +147,8 @@ def _radiometry(instrument):
         noise = ""
         if band.noise is not None:
             noise = f"{band.noise.radiance / band.noise.equivalent_radiance:>9.0f} at {band.noise.radiance:g}"
+            if band.noise.high_snr is not None:
+                noise += f", {band.noise.high_snr:.0f} at {band.noise.high_radiance:g}"
         gain = f"  {band.gain} gain; also {', '.join(band.gains)}" if band.gains else ""
         gain += f"  {band.compression} scale" if band.compression else ""
         lines.append(

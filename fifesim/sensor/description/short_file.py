@@ -22,7 +22,10 @@ _REFERENCES = {
     _SPECTRUM: "ASTM G173-03, extraterrestrial spectrum, as distributed with pvlib, over the band's response",
     _WHITE: "taken for a white surface below an overhead sun of ASTM G173-03, and 0 for digital number 0",
 }
-_NOISE = {"snr": "snr", "snr_radiance": "radiance", "snr_shot": "shot"}
+_NOISE = {
+    "snr": "snr", "snr_radiance": "radiance", "snr_shot": "shot",
+    "high_snr": "high_snr", "high_snr_radiance": "high_radiance",
+}  # fmt: skip
 
 # Made once: making it takes longer than what it does.
 _ADAPTER: TypeAdapter = TypeAdapter(SpectralResponse)

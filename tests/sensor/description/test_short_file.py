@@ -84,6 +84,13 @@ def test_share_of_shot_noise_stands_beside_the_ratio(tmp_path):
     assert (red.noise.equivalent_radiance, red.noise.shot) == (0.5, 0.75)
 
 
+def test_two_ratios_determine_the_noise_at_every_radiance(tmp_path):
+    second = "snr_radiance = 100.0, high_snr = 350.0, high_snr_radiance = 250.0"
+    camera = read(tmp_path, CAMERA.replace("snr_radiance = 100.0", second))
+    model = camera.noise_model(camera.bands[0])
+    assert model.snr([100.0, 250.0]).tolist() == pytest.approx([200.0, 350.0], rel=1e-12)
+
+
 def test_scenario_sees_through_a_short_file(tmp_path):
     path = tmp_path / "camera.toml"
     path.write_text(CAMERA, encoding="utf-8")
