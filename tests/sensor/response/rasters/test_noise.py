@@ -117,7 +117,7 @@ def test_noise_that_is_not_described_is_refused():
 
 
 def test_each_requested_kind_must_exist_in_every_band():
-    """The noise of L4TM is the width of its digital levels, at any radiance; the other verbs refuse it as `sense` does."""
+    """The noise of L4TM is the same at any radiance; the other verbs refuse shot noise as `sense` does."""
     lai = fifesim.lai_scene(fifesim.fife_site(cell=10, window=((0, 60), (0, 60))), "burned-grazed", seed=7)
     said = "L4TM has no shot noise for TM3, only thermal; type noise='all'"
     with pytest.raises(ValueError, match=said):
