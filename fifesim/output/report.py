@@ -76,7 +76,8 @@ _PAPERS_INSTRUMENT = "TM"
 def pairing_rows(scenario, fits):
     """Published R2 for the ground of a run, and the reason for the difference, as two rows or none."""
     paper, own = _paper_r2(scenario), scenario.sensor
-    if paper is None or "lai" not in fits or own.interval != "product" or own.description.name != _PAPERS_INSTRUMENT:
+    of_paper = own.description.name == _PAPERS_INSTRUMENT and own.response == "paper"
+    if paper is None or "lai" not in fits or own.interval != "product" or not of_paper:
         return []
     interval = own.description.ground_intervals(own.description.select(own.bands)[0])[0]
     why = (

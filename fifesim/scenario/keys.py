@@ -389,7 +389,9 @@ class SensorKeys(Section):
         min_length=2,
         max_length=2,
     )
-    response: str | None = text(None, "spatial response: system, all known components; detector; or paper, for TM")
+    response: str | None = text(
+        None, "spatial response: system, the best known; detector, ideal; or paper, Table 1 for TM"
+    )
     noise: list[str] = text(
         [], "detector noise: shot, thermal, fixed-pattern; or all that are known for the instrument"
     )

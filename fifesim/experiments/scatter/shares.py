@@ -125,7 +125,7 @@ def _check_map(scenario):
 
 def budget_scenario():
     """Scenario of the paper, with pixels at the interval of Table 1."""
-    return Scenario(sensor={"interval": "native"})
+    return Scenario(sensor={"interval": "native", "response": "paper"})
 
 
 def budget_cases(scenario, *, realisations, cells, seed=None):

@@ -26,6 +26,7 @@ from fifesim.sensor.description.fields import (
     lookup,
     worded,
 )
+from fifesim.sensor.description.provenance import DescribedQuantity, Origin, Provenance, provenance_of
 from fifesim.sensor.description.spatial_response import SpatialResponse, View
 from fifesim.sensor.description.spectral_response import SpectralResponse
 from fifesim.sensor.response.noise import NoiseModel
@@ -220,7 +221,9 @@ class Scan:
 # Numbers that must be there and those that may; each that is there has a source.
 INSTRUMENT_NUMBERS = ("altitude", "gsd", "interval", "bits", "lsf")
 BAND_NUMBERS = ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance")
-OPTIONAL_NUMBERS = ("ifov", "detectors", "scan", "product", "noise", "gains", "limits", "geolocation", "compression")
+OPTIONAL_NUMBERS = (
+    "ifov", "detectors", "scan", "product", "noise", "gains", "limits", "geolocation", "compression", "paper_lsf",
+)  # fmt: skip
 
 # Publications by number.
 Sources = dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str]  # type: ignore[misc, valid-type]
@@ -257,6 +260,8 @@ class InstrumentBand:
         Scale of the digital numbers, which meets the linear one at both ends; that is linear by default.
     sources : dict
         Key of the instrument's references for each number that has another source than the instrument says.
+    origin : dict of Origin, optional
+        Origin of ``blur`` and ``noise`` where it differs from the instrument's.
 
     Raises
     ------
@@ -280,6 +285,7 @@ class InstrumentBand:
     gains: dict[str, Gain] = field(default_factory=dict, repr=False, hash=False)
     compression: Literal["square-root"] | None = None
     sources: Sources = field(default_factory=dict, repr=False, hash=False)  # type: ignore[valid-type]
+    origin: dict[Literal["blur", "noise"], Origin] = field(default_factory=dict, repr=False, hash=False)
 
     def __post_init__(self):
         Gain(self.full_scale_radiance, self.min_radiance)
@@ -357,8 +363,12 @@ class Instrument:
         Error of the gridded product's place, root mean square along each axis. [m]
     product : Product, optional
         Scale of the agency's product.
+    paper_lsf : response of both axes or TwoAxesResponse, optional
+        Spatial response of Friedl et al. (1995), which ``response="paper"`` selects.
+    origin : dict of Origin, optional
+        Origin of ``blur``, ``noise`` and ``geolocation``; see `fifesim.sensor.description.provenance`.
     not_found : dict, optional
-        Parts missing in ``noise`` and ``blur``, with their publisher.
+        Parts missing in ``noise``, ``blur`` and ``geolocation``, with their publisher or the search that was done.
     aliases : tuple of str, optional
         Other names.
 
@@ -390,7 +400,9 @@ class Instrument:
     scan: Scan | None = None
     geolocation: Positive | None = None
     product: Product | None = None
-    not_found: dict[Literal["noise", "blur"], str] = field(default_factory=dict, repr=False, hash=False)
+    paper_lsf: SpatialResponse | None = None
+    origin: dict[DescribedQuantity, Origin] = field(default_factory=dict, repr=False, hash=False)
+    not_found: dict[DescribedQuantity, str] = field(default_factory=dict, repr=False, hash=False)
     aliases: tuple[Name, ...] = ()
 
     def __post_init__(self):
@@ -413,6 +425,11 @@ class Instrument:
     def max_angle(self) -> float:
         """Largest scan angle from nadir, infinite where the file has no scan [degree]."""
         return np.inf if self.scan is None else self.scan.max_angle
+
+    @property
+    def provenance(self) -> tuple[Provenance, ...]:
+        """Origin, uncertainty and source of blur, noise and geolocation, one row for the bands that share them."""
+        return provenance_of(self)
 
     @property
     def line_spread(self) -> LineSpread:

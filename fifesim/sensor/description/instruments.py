@@ -49,8 +49,8 @@ def instrument(
         Name or alias in any case, such as ``"TM"`` or ``"Landsat 8"``; or the path of a file, which ends in
         ``.toml``. An Instrument passes through.
     response : {"system", "detector", "paper"}, optional
-        Spatial response, as `fifesim.sensor.description.spatial_response.with_response` takes it; by default what the
-        file has.
+        Spatial response, by default "system", the best that is known of the whole system. "detector" is the ideal case,
+        the detector alone; "paper" is Table 1 of Friedl et al. (1995), for TM.
 
     Returns
     -------
@@ -67,8 +67,8 @@ def instrument(
     --------
     >>> from fifesim import instrument
     >>> tm = instrument("tm")
-    >>> tm.name, round(tm.line_spread.width, 2), round(tm.ground_interval, 3)
-    ('TM', 30.32, 30.315)
+    >>> tm.name, round(tm.line_spread.fwhm, 2), round(tm.ground_interval, 3)
+    ('TM', 36.01, 30.315)
     """
     found = name if isinstance(name, Instrument) else _found(name)
     return found if response is None else with_response(found, response)

@@ -248,11 +248,11 @@ def with_response(instrument, response):
         raise ValueError(f"response must be one of {', '.join(RESPONSES)}, got {response!r}")
     if response == "detector":
         return replace(instrument, lsf=_DETECTOR, bands=tuple(_sharp(instrument, band) for band in instrument.bands))
-    if response == "paper":
-        known = any(_kinds(instrument, band) == {"cosine"} for band in instrument.bands)
-    else:
-        known = any(knows_blur(instrument, band) for band in instrument.bands)
-    if not known:
+    if response == "paper" and instrument.paper_lsf is not None:
+        sources = instrument.sources | {"lsf": instrument.sources["paper_lsf"]}
+        origin = {key: value for key, value in instrument.origin.items() if key != "blur"}
+        return replace(instrument, lsf=instrument.paper_lsf, sources=sources, origin=origin)
+    if response == "paper" or not any(knows_blur(instrument, band) for band in instrument.bands):
         raise ValueError(
             f"the description of {instrument.name} has no {response!r} response: type response='detector', or give an "
             "instrument whose file has it"

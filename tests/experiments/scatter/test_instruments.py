@@ -24,8 +24,8 @@ def test_an_instrument_is_flown_with_all_that_is_known_of_it():
     msi = instrument_scenario("Sentinel-2", arp=0.24)
     assert msi.sensor.bands == ["MSI4", "MSI8"] and msi.sensor.size == 10.0 and msi.ground.arp == 0.24
     assert msi.sensor.offset == pytest.approx([0.33, 0.33]) and msi.sensor.noise == ["all"]
-    hrv = instrument_scenario("HRV")
-    assert hrv.sensor.offset == [0.0, 0.0] and hrv.sensor.noise == [] and hrv.terrain.dem == "flat"
+    mss = instrument_scenario("MSS")
+    assert mss.sensor.offset == [0.0, 0.0] and mss.sensor.noise == [] and mss.terrain.dem == "flat"
 
 
 def test_windows_hold_twelve_pixels():
@@ -46,14 +46,14 @@ def test_blur_and_place_take_the_most_from_sentinel_2(make_instruments):
 
 
 def test_terms_that_no_source_states_are_unknown_and_so_is_their_total(make_instruments):
-    """Of OLI the blur is unknown; of HRV blur, noise and place are."""
-    found = make_instruments.compare_instruments(["OLI", "HRV"], arps=(0.15,), realisations=2)
+    """Of EMIT the place is unknown; of MSS blur, noise and place are."""
+    found = make_instruments.compare_instruments(["EMIT", "MSS"], arps=(0.15,), realisations=2)
     unknown = found[found["share"].isna() & found["alone"].isna()]
     by_name = unknown[unknown["variable"] == "lai"].groupby("instrument")["stage"].agg(set)
     total = {"total", "sub-pixel variation"}
     assert by_name.to_dict() == {
-        "OLI": {"point spread"} | total,
-        "HRV": {"point spread", "registration", "noise"} | total,
+        "EMIT": {"registration"} | total,
+        "MSS": {"point spread", "registration", "noise"} | total,
     }
     numbers = unknown.select_dtypes("number").columns.difference(["arp", "pixel"])
     assert unknown[numbers].isna().all(axis=None) and len(numbers) == 6
@@ -84,9 +84,9 @@ def test_a_budget_of_an_instrument_from_the_command_line(tmp_path, monkeypatch):
     from fifesim.cli import app
 
     monkeypatch.chdir(tmp_path)
-    made = CliRunner().invoke(app, ["budget", "--sensor", "HRV", "-o", "out", "--realisations", "1"])
+    made = CliRunner().invoke(app, ["budget", "--sensor", "MSS", "-o", "out", "--realisations", "1"])
     assert made.exit_code == 0, made.output
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "only the detector of XS2, XS3 is known" in page
+    assert "only the detector of MSS5, MSS7 is known" in page
     both = CliRunner().invoke(app, ["budget", "x.toml", "--sensor", "HRV"])
     assert both.exit_code == 2

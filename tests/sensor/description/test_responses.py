@@ -10,8 +10,9 @@ from fifesim.sensor.description.spatial_response import knows_blur, with_respons
 
 def test_responses_that_can_be_asked_for():
     tm, msi = instrument("TM"), instrument("MSI")
-    assert instrument("TM", "paper") == tm
-    assert instrument("MSI", "system") == msi
+    paper = instrument("TM", "paper")
+    assert paper.lsf == tm.paper_lsf and "Friedl" in paper.source("lsf") and "blur" not in paper.origin
+    assert instrument("MSI", "system") == msi and instrument("TM", "system") == tm
     for description in (tm, msi):
         sharp = with_response(description, "detector")
         for band, own in zip(sharp.bands, description.bands, strict=True):
@@ -19,7 +20,8 @@ def test_responses_that_can_be_asked_for():
             widths = fields if fields.along else intervals
             assert [spread.width for spread in sharp.line_spreads(band)] == list(widths)
             assert not knows_blur(sharp, band)
-    assert [band.name for band in msi.bands if not knows_blur(msi, band)] == ["MSI10"]
+    dove = instrument("SuperDove")
+    assert not any(knows_blur(dove, band) for band in dove.bands) and all(knows_blur(msi, band) for band in msi.bands)
 
 
 def test_a_sharp_band_has_the_sources_of_what_it_keeps():
@@ -32,7 +34,7 @@ def test_a_sharp_band_has_the_sources_of_what_it_keeps():
 @pytest.mark.parametrize(
     ("name", "response", "said"),
     [
-        ("OLI", "system", "OLI has no 'system' response: type response='detector'"),
+        ("SuperDove", "system", "SuperDove has no 'system' response: type response='detector'"),
         ("MSI", "paper", "MSI has no 'paper' response"),
         ("TM", "sharp", "response must be one of system, detector, paper, got 'sharp'"),
     ],

@@ -11,10 +11,10 @@ from fifesim.sensor.instrument_labels import noise_equivalent_radiance, snr
 
 
 def test_ratio_is_that_of_the_specification_and_follows_the_share_of_shot_noise():
-    """MSI4: 142 at 108 W m-2 sr-1 um-1. What is left of the variance at none of the light is not shot noise."""
+    """MSI4: 223 at 108 W m-2 sr-1 um-1. What is left of the variance at none of the light is not shot noise."""
     (band,) = instrument("MSI").select("MSI4")
-    assert float(snr("MSI", "msi4", 108.0)) == pytest.approx(142.0, rel=1e-12)
-    full = (108.0 / 142.0) ** 2
+    assert float(snr("MSI", "msi4", 108.0)) == pytest.approx(223.0, rel=1e-12)
+    full = (108.0 / 223.0) ** 2
     found = noise_equivalent_radiance("MSI", "MSI4", np.array([108.0, 54.0, 0.0])) ** 2
     np.testing.assert_allclose(found, full * (1 - band.noise.shot * np.array([0.0, 0.5, 1.0])), rtol=1e-12)
 
