@@ -373,9 +373,17 @@ def test_tm_of_landsat_4_passes_half_at_the_measured_effective_field_of_view():
 
 def test_tm_of_the_paper_keeps_its_cosine():
     """By hand, Eq. of the cosine at half a cycle per interval: 0.69."""
-    tm = instrument("TM")
+    tm = instrument("TM", "paper")
     np.testing.assert_allclose(tm.line_spread.width, 30.31641, rtol=1e-12)
-    np.testing.assert_allclose(nyquist("TM", "TM4"), 0.6928, atol=1e-3)
+    np.testing.assert_allclose(tm.line_spread.mtf(0.5 / 30.315), 0.6928, atol=1e-3)
+
+
+def test_tm_blurs_as_its_twin_was_measured_in_flight():
+    """40.8 m passes half of the modulation: 2^-(40.8 / 30.315)^2 at half a cycle per interval."""
+    np.testing.assert_allclose(nyquist("TM", "TM4"), 2.0 ** -((40.8 / 30.315) ** 2), rtol=1e-3)
+    np.testing.assert_allclose(nyquist("TM", "TM4"), nyquist("L4TM", "TM4"), rtol=1e-12)
+    row = band_provenance(instrument("TM"), "blur", band("TM", "TM4"))
+    assert row.origin == "in-flight" and row.uncertainty == 0.12 and "San Mateo" in row.source
 
 
 @pytest.mark.parametrize(("name", "which"), [("OLI", "OLI4"), ("MSI", "MSI10"), ("HRV", "XS1"), ("ETM+", "ETM8")])

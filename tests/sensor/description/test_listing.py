@@ -12,7 +12,7 @@ from fifesim.sensor.description.spatial_response import knows_blur
 
 def test_thematic_mapper_in_words():
     """Table 1: 43 urad from 705 km; the cosine keeps 0.69 at half a cycle per interval; 205.5 / 255 a count."""
-    text = instrument_in_words(instrument("TM"))
+    text = instrument_in_words(instrument("TM", "paper"))
     lines = text.splitlines()
     assert lines[0] == "TM  Landsat-5 Thematic Mapper"
     assert "  altitude 705 km, 8 bits" in lines and "  whiskbroom, 7.47 degrees to either side, swath 185 km" in text
@@ -79,7 +79,8 @@ def test_a_line_says_which_bands_lack_noise_or_blur_and_who_published_it():
     assert "sharper" not in blur_in_words(instrument("MSI"), ["MSI4"])
     # The cosine of Table 1 passes more than its detector, as wide as the field of view, does.
     said = "0.69; the detector alone has 0.64: the image of TM3 is sharper"
-    assert blur_in_words(instrument("TM"), ["TM3"]).endswith(said)
+    assert blur_in_words(instrument("TM", "paper"), ["TM3"]).endswith(said)
+    assert blur_in_words(instrument("TM"), ["TM3"]).startswith("modulation transfer at the Nyquist frequency 0.28")
     # A file of one's own need not say it.
     own = dataclasses.replace(dove, not_found={})
     assert noise_in_words(own, ["PS6"]).endswith("the noise of PS6 is unknown")

@@ -16,7 +16,7 @@ from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.labels import noisy
 from fifesim.sensor.response.noise import NoiseModel, add_noise
 
-TM = instrument("TM")
+TM = instrument("TM", "paper")
 # Figures of a test, of no real instrument.
 SOURCES = TM.sources | {"noise": "Friedl1995", "detectors": "Friedl1995"}
 NOISY = replace(

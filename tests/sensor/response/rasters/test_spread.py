@@ -9,11 +9,11 @@ import fifesim
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.spatial_response import BoxcarResponse, CosineResponse, TwoAxesResponse
 
-TM = instrument("TM")
+TM = instrument("TM", "paper")
 
 
 def test_psf_holds_the_whole_response():
-    spread = fifesim.psf("TM", "TM4")
+    spread = fifesim.psf(TM, "TM4")
     step = float(spread["x"][1] - spread["x"][0])
     assert float(spread.sum()) * step**2 == pytest.approx(1.0, rel=1e-12)
     np.testing.assert_allclose(spread, spread.T, rtol=1e-12)
