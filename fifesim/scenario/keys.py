@@ -389,9 +389,7 @@ class SensorKeys(Section):
         min_length=2,
         max_length=2,
     )
-    response: str | None = text(
-        None, "spatial response: system, the best known; detector, ideal; or paper, Table 1 for TM"
-    )
+    response: str | None = text(None, "spatial response: system, sharpest, softest, detector, or paper (TM)")
     noise: list[str] = text(
         [], "detector noise: shot, thermal, fixed-pattern; or all that are known for the instrument"
     )

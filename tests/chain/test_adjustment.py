@@ -321,7 +321,7 @@ def test_contrast_is_that_of_the_other_instrument_alone(target, period):
 
 
 def test_ndvi_from_a_recorded_scene_is_nearer_to_the_instruments_own():
-    """Over FIFE's field: R2 with the paper's TM's own NDVI is 0.98 instead of 0.96 from MSI's quantised and noisy image."""
+    """Over FIFE's field: R2 with the NDVI of the paper's TM is 0.98 instead of 0.96 from MSI's noisy image."""
     grid = fifesim.fife_site(30 / 9, window=((0, 270), (0, 270)))
     field = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7)
     paper = fifesim.instrument("TM", response="paper")

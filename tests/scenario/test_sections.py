@@ -97,7 +97,7 @@ def test_response_of_a_scenario_is_that_of_python():
     assert Sensor(response="system").description == Sensor().description
     assert Sensor(response="paper").description == fifesim.instrument("TM", response="paper")
     for name, response, said in (
-        ("TM", "sharp", "response must be one of system, detector, paper, got 'sharp'"),
+        ("TM", "sharp", "response must be one of system, detector, paper, sharpest, softest, got 'sharp'"),
         ("MSI", "paper", "MSI has no 'paper' response: type response='detector'"),
     ):
         with pytest.raises(ValueError, match=said):

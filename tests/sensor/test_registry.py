@@ -304,7 +304,7 @@ def test_avhrr_count_of_the_dark_is_no_albedo_and_full_scale_is_the_slope():
         ("HRV", "XS2", 20.0, 20.0),
         ("MODIS", "MODIS1", 250.0, 250.0),
         ("MODIS-Aqua", "MODIS3", 500.0, 500.0),
-        ("AVHRR", "AVHRR1", 1090.0, 791.0),
+        ("AVHRR", "AVHRR1", 1090.0 * 860 / 833, 791.0 * 860 / 833),
         ("MSS", "MSS5", 79.0, 57.0),
         ("MSS2", "MSS4", 79.0, 57.0),
         ("MSS3", "MSS7", 79.0, 57.0),
@@ -329,7 +329,7 @@ def test_avhrr_oversamples_by_the_published_1_362_and_its_field_is_1_09_km():
     item = instrument("AVHRR")
     field, interval = item.ground_fields(item.bands[0]), item.ground_intervals(item.bands[0])
     np.testing.assert_allclose(field.across / interval.across, 1.362, rtol=6e-3)
-    np.testing.assert_allclose(field.across, np.radians(0.07449) * 833e3, rtol=1e-3)
+    np.testing.assert_allclose(field.across, np.radians(0.07449) * item.altitude, rtol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -349,7 +349,7 @@ def test_scan_covers_the_published_swath(name):
 def test_scan_of_avhrr_covers_more_than_the_plane_of_noaas_guide():
     """2399 km in the guide is 2 h tan(55.4 degrees), within 1 %; stations that receive it say more than 2600 km."""
     item = instrument("AVHRR")
-    np.testing.assert_allclose(2 * item.altitude * np.tan(np.radians(item.scan.max_angle)), 2399e3, rtol=0.01)
+    np.testing.assert_allclose(2 * 833e3 * np.tan(np.radians(item.scan.max_angle)), 2399e3, rtol=0.01)
     assert swath_width(item.altitude, item.scan.max_angle) > 2600e3
 
 
@@ -570,7 +570,38 @@ def test_mss_of_landsat_5_passes_half_at_its_effective_field_of_view():
     np.testing.assert_allclose([along.mtf(0.5 / 72.5), across.mtf(0.5 / 80.5)], 0.5, rtol=1e-3)
 
 
+# Revolutions a day of two-line elements; mean altitude above the equatorial radius by Kepler's third law [km].
+ORBITS = {"AVHRR": (14.1136, 852), "AVHRR10": (14.2248, 814), "AVHRR11": (14.1280, 847)}
+
+
+@pytest.mark.parametrize("name", ORBITS)
+def test_avhrr_flies_as_its_two_line_elements_say(name):
+    """At 39 degrees north the ellipsoid lies 8 km below the equatorial radius; the orbit varies by 10 km."""
+    revolutions, above_equator = ORBITS[name]
+    axis = (398600.4418 * (86400 / revolutions / (2 * np.pi)) ** 2) ** (1 / 3)
+    # The oblateness of the earth lowers the mean orbit by 3 km.
+    assert axis - 6378.137 - 3.0 == pytest.approx(above_equator, abs=1.0)
+    assert instrument(name).altitude / 1000 == pytest.approx(axis - 6370.0, abs=10.0)
+
+
 # -------------------------------------------------------------------------------------------- later instruments
+
+# Centroid and equivalent width [nm] of Sentinel-2C's responses at 1 nm, issue 4.0.
+S2C = {"MSI1": (444.2, 19.1), "MSI2": (489.0, 59.0), "MSI3": (560.6, 34.2), "MSI4": (666.5, 29.8)}
+S2C |= {"MSI5": (707.1, 15.2), "MSI6": (741.1, 15.3), "MSI7": (784.7, 19.9), "MSI8": (834.6, 79.4)}
+S2C |= {"MSI8A": (865.6, 19.6), "MSI9": (947.2, 19.0), "MSI10": (1372.2, 32.9), "MSI11": (1612.0, 89.4)}
+S2C |= {"MSI12": (2191.3, 173.9)}
+
+
+@pytest.mark.parametrize("which", S2C)
+def test_sentinel_2c_has_its_own_responses(which):
+    """To three digits and without tails, within 0.15 nm."""
+    response = band("MSI-C", which).response
+    wavelength, values = 1000 * np.array(response.wavelength), np.array(response.response)
+    area = np.trapezoid(values, wavelength)
+    found = np.trapezoid(values * wavelength, wavelength) / area, area
+    np.testing.assert_allclose(found, S2C[which], rtol=0, atol=0.15)
+
 
 # Transfer at the Nyquist frequency along and across the track, measured in flight in 2024.
 SENTINEL_2C = {"MSI2": (0.31, 0.35), "MSI4": (0.21, 0.31), "MSI8": (0.18, 0.26), "MSI8A": (0.26, 0.43)}

@@ -93,7 +93,7 @@ def budget(
     >>> scenario = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
     >>> shares = fifesim.budget(scenario, realisations=1, cells=90)
     >>> round(float(shares["total"].sel(variable="lai").mean()), 2)
-    0.05
+    0.24
     """
     scenario = budget_scenario() if scenario is None else scenario
     if not isinstance(scenario, Scenario):
@@ -241,8 +241,8 @@ _PIXELS = 12  # minimum along a window, for coarse instruments
 _CELLS = 333  # minimum along a window
 
 
-def instrument_scenario(name, *, arp=0.15):
-    """Scenario of the paper on level ground as seen by an instrument."""
+def instrument_scenario(name, *, arp=0.15, response=None):
+    """Scenario of the paper's ground, level, as seen by an instrument with a spatial response."""
     # Red and near infrared on the grid of its product, with its noise, displaced along both axes by the root mean
     # square error of its geolocation.
     description = instrument(name)
@@ -250,6 +250,7 @@ def instrument_scenario(name, *, arp=0.15):
     shift = (description.geolocation or 0.0) / description.pixel(bands[0])
     noise = ["all"] if all(band.noise for band in bands) else []
     sensor = {"instrument": name, "bands": [band.name for band in bands], "noise": noise, "offset": [shift, shift]}
+    sensor |= {} if response is None else {"response": response}
     return Scenario(sensor=sensor, ground={"arp": arp}, terrain={"dem": "flat"})
 
 
