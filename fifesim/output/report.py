@@ -21,6 +21,7 @@ from fifesim.scenario.ensemble import realise
 from fifesim.scenario.scenario import grid_keys, is_on_site, summary, time_in_words
 from fifesim.scenario.simulation import setup_of
 from fifesim.sensor.description.listing import blur_in_words, noise_in_words, sensor_in_words
+from fifesim.sensor.description.provenance import origins_in_words
 from fifesim.sensor.description.spatial_response import knows_blur
 from fifesim.sensor.labels import to_reflectance
 
@@ -433,6 +434,7 @@ def _summary(scenario, image, truth, reasons):
         ("Sensor", sensor_in_words(own.description, own.bands)),
         ("Blur", blur_in_words(own.description, own.bands)),
         ("Noise", noise_in_words(own.description, own.bands, own.noise)),
+        ("Origin of the description", origins_in_words(own.description, own.bands)),
         ("Sun", f"zenith {float(pixels['sza']):.1f} degrees, azimuth {float(pixels['saa']):.1f} degrees from north"),
     ]
     for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:

@@ -98,3 +98,45 @@ def uncertainty_in_words(row):
         "geolocation": f"± {row.uncertainty:g} m",
     }
     return forms[row.quantity]
+
+
+# Shown in tables for a quantity that is unknown.
+DASH = "–"
+
+
+def origin_text(instrument, quantity, bands=None):
+    """Origin of a quantity in some bands with its uncertainty, as text; a dash if it is unknown in all of them."""
+    rows = [row for row in provenance_of(instrument, bands) if row.quantity == quantity]
+    found = {}
+    for row in rows:
+        found.setdefault((row.origin, uncertainty_in_words(row)), []).extend(row.bands)
+    if set(found) == {(UNKNOWN, "")}:
+        return DASH
+    texts = [" ".join(filter(None, key)) for key in found]
+    if len(texts) == 1:
+        return texts[0]
+    return "; ".join(f"{text} ({', '.join(names)})" for text, names in zip(texts, found.values(), strict=True))
+
+
+def origins_in_words(instrument, bands=None):
+    """Origins of blur, noise and geolocation of some bands, in one line."""
+    return "; ".join(f"{quantity} {origin_text(instrument, quantity, bands)}" for quantity in _NUMBERS)
+
+
+def mixed_origins(selected, quantities):
+    """Message about quantities whose origin differs among instruments, from pairs of them and bands; empty if none."""
+    parts = []
+    for quantity in quantities:
+        by_origin = {}
+        for instrument, bands in selected:
+            origins = {row.origin for row in provenance_of(instrument, bands) if row.quantity == quantity}
+            by_origin.setdefault(" and ".join(sorted(origins)), []).append(instrument.name)
+        if len(by_origin) > 1:
+            texts = [f"{origin} ({', '.join(names)})" for origin, names in by_origin.items()]
+            parts.append(f"{quantity} {', '.join(texts)}")
+    if not parts:
+        return ""
+    return (
+        f"the descriptions of the instruments have different origins: {'; '.join(parts)}. A difference between images "
+        "may be a difference in knowledge: compare response='sharpest' and 'softest' of each, see fifesim.instrument"
+    )

@@ -66,7 +66,7 @@ def _used(content):
 
 
 def _blur(item):
-    """Replace ``mtf_at_nyquist``, one number or one for each axis, by a Gaussian response of an instrument or a band."""
+    """Replace ``mtf_at_nyquist``, a number or one for each axis, by a Gaussian response of an instrument or a band."""
     transfer = item.pop("mtf_at_nyquist", None)
     if transfer is None:
         return

@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 
 import fifesim
-from fifesim.experiments.scatter.shares import instrument_scenario, window_cells
+from fifesim.experiments.scatter.report import bar_chart
+from fifesim.experiments.scatter.shares import budget_table, instrument_scenario, total_range, window_cells
 from fifesim.sensor.description.spatial_response import knows_blur
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -36,6 +37,8 @@ def test_windows_hold_twelve_pixels():
 def test_blur_and_place_take_the_most_from_sentinel_2(make_instruments):
     """At 10 m over burned-grazed ground, beside counts of twelve bits and the noise that they have."""
     found = make_instruments.compare_instruments(["MSI"], arps=(0.15,), realisations=2)
+    assert list(found["response"].unique()) == ["system", "sharpest", "softest"]
+    found = found[found["response"] == "system"]
     assert set(found["instrument"]) == {"MSI"} and found["blur"].all() and found["noise"].all() and found["place"].all()
     shares = found[found["variable"] == "lai"].set_index("stage")["share"]
     parts = shares.drop(["total", "sub-pixel variation"], errors="ignore")
@@ -78,6 +81,32 @@ def test_table_of_the_gallery_has_no_number_for_an_unknown_term(make_instruments
         assert tuple(known) == stated, name
 
 
+def test_budget_states_origins_and_no_zero_for_what_is_unknown():
+    """Of MSS, blur, geolocation and noise are unknown; its detector blurs by more than a pixel of 60 m."""
+    found = fifesim.budget(instrument_scenario("MSS"), realisations=1, cells=333, each=iter)
+    unknown = ["point spread", "registration", "noise"]
+    assert found["origin"].sel(stage=unknown).values.tolist() == ["–"] * 3
+    table = budget_table(found).set_index(["variable", "stage"])["share"]["lai"]
+    assert table[["registration", "noise"]].isna().all() and table[["point spread", "quantisation"]].notna().all()
+    known = fifesim.budget(instrument_scenario("TM"), realisations=1, cells=90, each=iter)
+    assert known["origin"].sel(stage="point spread") == "in-flight ± 0.12" and known["share"].notnull().all()
+    parts = (known["share"].sum("stage") + known["curvature"]).values
+    np.testing.assert_allclose(parts, known["total"].values, atol=1e-12)
+    chart = bar_chart(budget_table(found))
+    assert sum(text.get_text() == "unknown" for text in chart.axes[0].texts) == 4
+
+
+def test_range_of_a_trade_study_contains_its_total():
+    """Both ends of the uncertainty of the blur enclose the total."""
+    options = {"realisations": 2, "cells": 120, "each": iter}
+    for name in ("OLI", "TM"):
+        scenario = instrument_scenario(name)
+        total = fifesim.budget(scenario, **options)["total"].sel(variable="lai").mean()
+        low, high = total_range(scenario, **options)["lai"]
+        assert low < float(total) < high and high - low > 0.002
+    assert total_range(instrument_scenario("MSS"), **options) is None
+
+
 def test_a_budget_of_an_instrument_from_the_command_line(tmp_path, monkeypatch):
     from typer.testing import CliRunner
 
@@ -88,5 +117,7 @@ def test_a_budget_of_an_instrument_from_the_command_line(tmp_path, monkeypatch):
     assert made.exit_code == 0, made.output
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "only the detector of MSS5, MSS7 is known" in page
+    assert "<td>blur –; noise –; geolocation –</td>" in page
+    assert "leaves out what is unknown of the instrument: registration, noise" in page
     both = CliRunner().invoke(app, ["budget", "x.toml", "--sensor", "HRV"])
     assert both.exit_code == 2
