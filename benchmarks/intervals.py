@@ -12,7 +12,7 @@ import xarray as xr
 import fifesim
 from fifesim.retrieval import training
 
-BANDS = {"OLI": ["OLI2", "OLI3", "OLI4", "OLI5"], "MSI": ["MSI2", "MSI3", "MSI4", "MSI8"]}
+BANDS = {"OLI": ["OLI2", "OLI3", "OLI4", "OLI5", "OLI6", "OLI7"], "MSI": ["MSI2", "MSI3", "MSI4", "MSI8"]}
 SIDE = {"OLI": 30.0, "MSI": 10.0}
 
 
@@ -37,7 +37,8 @@ def study(instrument, pixels, landscapes, split, seed, covary, is_chain=True, di
             draws[f"sensor.offset.{axis}"] = {"normal": [0, 0.2], "within": [-1, 1]}
     scenario = fifesim.Scenario(
         grid={"width": side, "height": side, "cell": SIDE[instrument] / 5},
-        terrain={"dem": "flat"}, ground={"leaf": {"water": 0.015}, "seed": seed, "distribution": str(distribution)}, sensor=sensor, landscape=landscape,
+        ground={"leaf": {"water": 0.015}, "seed": seed, "distribution": str(distribution)},
+        terrain={"dem": "flat"}, sensor=sensor, landscape=landscape,
     )  # fmt: skip
     return fifesim.Study(scenario, draws, landscapes=landscapes, split=split, seed=seed)
 

@@ -28,6 +28,8 @@ RESPONSES = tuple(band.response for band in fifesim.instrument("TM").select(BAND
 
 # Both codes get the spherical distribution as Verhoef's formula approximates it, with his a and b.
 LEAF_ANGLES = (-0.35, -0.15)
+# TM with the response of Table 1 of the paper.
+PAPER = fifesim.instrument("TM", response="paper")
 LEAVES = {"TM3": (0.0691, 0.0357), "TM4": (0.4533, 0.4215)}
 SOIL = {"TM3": 0.15, "TM4": 0.19}
 NODES = 1024
@@ -236,7 +238,7 @@ def light_of(image):
 def sensor_work(side, resampled, neglected):
     """Against a mean or another resampling of the array to pixels, which is digitised as fifesim's image is."""
     toa = surface_of(side).fifesim.to_toa()
-    image = toa.fifesim.sense("TM")
+    image = toa.fifesim.sense(PAPER)
     gain, offset = (image[name].values[:, None, None] for name in ("gain", "offset"))
     scale, start = light_of(image) / gain, offset / gain
 
@@ -245,18 +247,18 @@ def sensor_work(side, resampled, neglected):
 
     def errors(ours, theirs):
         assert ours.shape == theirs.shape
-        exact = toa.fifesim.sense("TM", quantise=False)
+        exact = toa.fifesim.sense(PAPER, quantise=False)
         other = exact.copy(data=light_of(exact) * resampled(toa.values)).fifesim.ndvi()
         share = float(np.sqrt(((other - exact.fifesim.ndvi()) ** 2).mean()) / exact.fifesim.ndvi().std())
         return f"radiance, relative: {radiance_error(toa)}", f"NDVI: {share:.2g} sd ({neglected})"
 
-    return Work(lambda: toa.fifesim.sense("TM"), theirs, errors)
+    return Work(lambda: toa.fifesim.sense(PAPER), theirs, errors)
 
 
 def radiance_error(toa):
     """Largest relative error of the radiances of a corner, against the integral of the line spread function."""
     corner = toa[:, : 20 * RATIO, : 20 * RATIO]
-    found = corner.fifesim.sense("TM", quantise=False)
+    found = corner.fifesim.sense(PAPER, quantise=False)
     edges, middles = CELL * np.arange(20 * RATIO + 1), RATIO * CELL * (np.arange(20)[:, None] + 0.5)
     from_middle = np.clip(edges - middles, -WIDTH / 2, WIDTH / 2)
     weights = np.diff(np.sin(2 * np.pi * from_middle / (3 * WIDTH)))

@@ -351,7 +351,7 @@ def _default(paper):
     """Scenario used if none is given."""
     from fifesim.scenario.scenario import Scenario, default_scenario
 
-    return Scenario() if paper else default_scenario()
+    return Scenario(sensor={"response": "paper"}) if paper else default_scenario()
 
 
 def _check_spelling(scenario):

@@ -115,7 +115,8 @@ def test_image_lies_where_the_scenario_says(first):
         assert image.crs.to_epsg() == 26914
         assert tuple(image.bounds) == (704970.0, 4333620.0, 705870.0, 4334220.0)
         assert image.descriptions == ("TM2", "TM3", "TM4")
-        assert image.read().min() > 0
+        # Pixels at the edge see beyond the scene.
+        assert image.read()[:, 1:-1, 1:-1].min() > 0
 
 
 def test_running_the_written_scenario_gives_the_same_files(first, invoke, tmp_path):

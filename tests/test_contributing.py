@@ -136,6 +136,8 @@ RECIPES = {
         from pathlib import Path
 
         text = Path("data/instruments/tm.toml").read_text(encoding="utf-8").replace('"cosine"', '"triangle"')
+        text = text.replace("[lsf]", "[old]").replace("[paper_lsf]", "[lsf]").replace("paper_lsf =", "# paper_lsf =")
+        text = text[: text.index("[old]")] + text[text.index("[lsf]") :]
         file = Path("triangle.toml")
         file.write_text(text.replace("step = 4.778e-6", "width = 43e-6").replace("count = 9", ""), encoding="utf-8")
         transfer = fifesim.mtf(fifesim.read_instrument(file), "TM3", frequency=[0.0, 1 / (43e-6 * 705e3)])

@@ -670,12 +670,16 @@ ANALYSIS = [
 ]
 
 SENSORS = [
-    refused("noise that the instrument lacks", 'toa.fifesim.sense("TM", noise=["shot"])', "no noise for TM3"),
+    refused(
+        "noise that the instrument lacks",
+        'toa.fifesim.sense("TM", noise=["fixed-pattern"])',
+        "no fixed-pattern noise for TM3",
+    ),
     refused("an unknown noise", 'toa.fifesim.sense("TM", noise=["gaussian"])', "gaussian", "shot, thermal"),
     refused("noise as a switch", 'toa.fifesim.sense("TM", noise=True)', "noise", "got True", error=TypeError),
     refused(
         "noise that the instrument lacks, compared",
-        'fifesim.compare(lai, ["OLI"], fifesim.Setup(noise=("shot", "thermal")))',
+        'fifesim.compare(lai, ["L4TM"], fifesim.Setup(noise=("shot", "thermal")))',
         "shot",
     ),
     refused("a negative interval", 'toa.fifesim.sense("TM", interval=-30)', "positive metres", "got -30"),

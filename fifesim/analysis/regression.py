@@ -207,7 +207,8 @@ def fit(sums, y_origin=0.0, x_origin=0.0):
     if n < 3:
         raise ValueError(f"a regression needs at least 3 pairs of values, got {n:.0f}: do the rasters overlap?")
     sxx, sxy, syy = xx - x * x / n, xy - x * y / n, yy - y * y / n
-    if not sxx > 0:
+    # A smaller variance of x is rounding.
+    if not sxx > 1e-12 * xx:
         raise ValueError(f"all {n:.0f} values of x are {x_origin + x / n:g}: a regression needs x to vary")
     slope = sxy / sxx
     residual = max(syy - slope * sxy, 0.0)

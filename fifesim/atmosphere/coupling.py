@@ -306,7 +306,7 @@ def _corrected(toa, terms, out):
 # Wavelengths at which scattering is computed, equal to the wavelengths of the aerosol refractive indices. [um]
 WAVELENGTHS = np.array(
     [0.4, 0.412, 0.443, 0.47, 0.488, 0.515, 0.55, 0.59, 0.633, 0.67, 0.694, 0.76, 0.86]
-    + [1.24, 1.536, 1.65, 1.95, 2.25, 3.75]
+    + [1.24, 1.536, 1.65, 1.95, 2.25, 2.5, 3.75]
 )
 
 _TINY = 1e-30  # keeps logarithms finite without aerosol

@@ -20,6 +20,7 @@ from fifesim.base.annotations import Names, Numbers
 from fifesim.base.arguments import described
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
 from fifesim.base.geometry import fife_geometry
+from fifesim.base.messages import warn
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.chain.steps import ndvi
 from fifesim.grids import cf, directions
@@ -30,6 +31,8 @@ from fifesim.grids.sites import fife_site, made_on_site
 from fifesim.sensor import labels as sensor
 from fifesim.sensor.description.instrument_file import InstrumentsLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.description.provenance import DASH, mixed_origins, origin_text
+from fifesim.sensor.instrument_labels import carried_instrument
 
 
 def compare(
@@ -65,6 +68,12 @@ def compare(
     ValueError
         If an instrument is repeated, ``bands`` names an instrument that is not compared, or an input is invalid.
 
+    Warns
+    -----
+    UserWarning
+        If the blur of the instruments, or their noise where it is simulated, has different origins: measured for one
+        and assumed for another, for example. See `Instrument.provenance`.
+
     See Also
     --------
     comparison_table, plot_comparison, Setup
@@ -86,13 +95,16 @@ def compare(
     bands = {find_instrument(name).name if name not in names else name: each for name, each in (bands or {}).items()}
     if set(bands) - set(names):
         raise ValueError(f"bands are given for {', '.join(set(bands) - set(names))}, which is not compared")
-    nodes = {}
+    nodes, compared = {}, []
     for description in descriptions:
         given = bands.get(description.name)
         selected = description.red_and_near_infrared() if given is None else description.select(given)
         own = replace(setup, instrument=description, bands=tuple(band.name for band in selected))
         image = image_of(own, reflectance_of(own, lai))
         nodes[f"/{description.name}"] = image if isinstance(image, xr.DataTree) else image.to_dataset()
+        compared.append((description, own.bands))
+    if message := mixed_origins(compared, ("blur", "noise") if setup.noise and not setup.noise_models else ("blur",)):
+        warn(message)
     return xr.DataTree.from_dict(nodes)
 
 
@@ -110,9 +122,10 @@ def comparison_table(images: xr.DataTree, truth: xr.DataArray | None = None) -> 
     Returns
     -------
     table : pandas.DataFrame
-        One row per instrument: ``pixel`` [m], ``rows``, ``columns``, ``bands``, ``ndvi_mean`` and ``ndvi_sd``. With
-        `truth` also ``slope``, ``intercept``, ``r2`` and the number of pixels ``n`` of its regression on NDVI. NaN
-        without a red and a near infrared band.
+        One row per instrument: ``pixel`` [m], ``rows``, ``columns``, ``bands``; origin and uncertainty of ``blur``,
+        ``noise`` and ``geolocation`` of the instrument, a dash if unknown; ``ndvi_mean`` and ``ndvi_sd``. With `truth`
+        also ``slope``, ``intercept``, ``r2`` and the number of pixels ``n`` of its regression on NDVI. NaN without a
+        red and a near infrared band.
 
     Raises
     ------
@@ -136,7 +149,7 @@ def comparison_table(images: xr.DataTree, truth: xr.DataArray | None = None) -> 
     for name, image in recorded_images(images).items():
         grid = grids.geobox(image)
         row = {"pixel": grids.cell_size(grid)[0], "rows": grid.shape.y, "columns": grid.shape.x}
-        rows[name] = row | {"bands": ", ".join(map(str, image["band"].values))}
+        rows[name] = row | {"bands": ", ".join(map(str, image["band"].values))} | image_origins(image)
         if not shows_ndvi(image):
             continue
         # Compute once for mean, deviation and regression.
@@ -161,6 +174,13 @@ def recorded_images(images):
             raise ValueError(f"{name} has no dn or toa_radiance, but {holds}: give the result of compare")
         found[name] = node[variables[0]]
     return found
+
+
+def image_origins(image):
+    """Origin of blur, noise and geolocation of the instrument of an image, as text."""
+    description, bands = carried_instrument(image), [str(name) for name in image["band"].values]
+    quantities = ("blur", "noise", "geolocation")
+    return {each: DASH if description is None else origin_text(description, each, bands) for each in quantities}
 
 
 def shows_ndvi(image):

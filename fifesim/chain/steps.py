@@ -151,7 +151,7 @@ def ndvi(image: RasterOrDataset) -> xr.DataArray:
     >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
     >>> ndvi = image.fifesim.ndvi()
     >>> round(float(ndvi.mean()), 2)
-    0.36
+    0.37
     """
     return _index(image, "NDVI")
 

@@ -14,7 +14,7 @@ from fifesim.analysis.regression import Regression
 from fifesim.analysis.regression_labels import matched
 from fifesim.base.annotations import Pairing
 from fifesim.base.scan_pixels import corners
-from fifesim.chain.comparison import recorded_images, shows_ndvi
+from fifesim.chain.comparison import image_origins, recorded_images, shows_ndvi
 from fifesim.chain.steps import ndvi
 from fifesim.grids import grid as grids
 from fifesim.grids import swaths
@@ -213,7 +213,8 @@ def plot_comparison(images: xr.DataTree, *, limits: tuple[float, float] | None =
 
     Notes
     -----
-    Large images are subsampled; mean and standard deviation refer to the plotted pixels.
+    Large images are subsampled; mean and standard deviation refer to the plotted pixels. The title of a panel states
+    the origin and uncertainty of the blur of the instrument, a dash if it is unknown.
 
     Examples
     --------
@@ -247,7 +248,9 @@ def plot_comparison(images: xr.DataTree, *, limits: tuple[float, float] | None =
         drawn = _draw(axes, array, cmap=colours.colours_of("ndvi")[0], vmin=limits[0], vmax=limits[1])
         pixel = grids.cell_size(grids.geobox(recorded[name]))[0]
         mean, deviation = float(array.mean()), float(array.std())
-        axes.set_title(f"{name}, {pixel:g} m\nmean {mean:.3f}, sd {deviation:.3f}", fontsize="medium")
+        blur = image_origins(recorded[name])["blur"]
+        title = f"{name}, {pixel:g} m\nmean {mean:.3f}, sd {deviation:.3f}\nblur {blur}"
+        axes.set_title(title, fontsize="medium")
     for axes in panels[:, 1:].ravel():
         axes.set_ylabel("")
     figure.colorbar(drawn, ax=panels, shrink=0.8, label=colours.axis_label("ndvi"), extend="both")

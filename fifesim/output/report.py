@@ -21,6 +21,7 @@ from fifesim.scenario.ensemble import realise
 from fifesim.scenario.scenario import grid_keys, is_on_site, summary, time_in_words
 from fifesim.scenario.simulation import setup_of
 from fifesim.sensor.description.listing import blur_in_words, noise_in_words, sensor_in_words
+from fifesim.sensor.description.provenance import origins_in_words
 from fifesim.sensor.description.spatial_response import knows_blur
 from fifesim.sensor.labels import to_reflectance
 
@@ -76,7 +77,8 @@ _PAPERS_INSTRUMENT = "TM"
 def pairing_rows(scenario, fits):
     """Published R2 for the ground of a run, and the reason for the difference, as two rows or none."""
     paper, own = _paper_r2(scenario), scenario.sensor
-    if paper is None or "lai" not in fits or own.interval != "product" or own.description.name != _PAPERS_INSTRUMENT:
+    of_paper = own.description.name == _PAPERS_INSTRUMENT and own.response == "paper"
+    if paper is None or "lai" not in fits or own.interval != "product" or not of_paper:
         return []
     interval = own.description.ground_intervals(own.description.select(own.bands)[0])[0]
     why = (
@@ -432,6 +434,7 @@ def _summary(scenario, image, truth, reasons):
         ("Sensor", sensor_in_words(own.description, own.bands)),
         ("Blur", blur_in_words(own.description, own.bands)),
         ("Noise", noise_in_words(own.description, own.bands, own.noise)),
+        ("Origin of the description", origins_in_words(own.description, own.bands)),
         ("Sun", f"zenith {float(pixels['sza']):.1f} degrees, azimuth {float(pixels['saa']):.1f} degrees from north"),
     ]
     for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:

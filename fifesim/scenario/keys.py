@@ -395,7 +395,7 @@ class SensorKeys(Section):
         min_length=2,
         max_length=2,
     )
-    response: str | None = text(None, "spatial response: system, all known components; detector; or paper, for TM")
+    response: str | None = text(None, "spatial response: system, sharpest, softest, detector, or paper (TM)")
     noise: list[str] = text(
         [], "detector noise: shot, thermal, fixed-pattern; or all that are known for the instrument"
     )

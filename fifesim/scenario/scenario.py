@@ -180,7 +180,9 @@ _WHOLE = 1e-6
 
 class Scenario(Keys):
     """
-    Parameters of a simulation. The defaults are the case of the paper: one stand on the FIFE site.
+    Parameters of a simulation. The defaults are one stand of the paper on the FIFE site, and TM.
+
+    The response of TM is the one measured in flight; ``sensor={"response": "paper"}`` selects Table 1 of the paper.
 
     Parameters
     ----------

@@ -279,7 +279,7 @@ def mtf(
     >>> import fifesim
     >>> transfer = fifesim.mtf("TM", ["TM3"], frequency=[0.0, 1 / 60])
     >>> transfer.sel(direction="across").round(2).values
-    array([[1.  , 0.69]])
+    array([[1.  , 0.28]])
     """
     description = find_instrument(instrument)
     selected = description.select(bands)
@@ -380,7 +380,7 @@ def snr(instrument: InstrumentLike, band: str, radiance: Numbers) -> np.ndarray:
     --------
     >>> import fifesim
     >>> fifesim.snr("OLI", "OLI4", [22.0, 60.0]).round()
-    array([230., 627.])
+    array([230., 510.])
     """
     return _noise_of(instrument, band).snr(_checked(radiance))
 

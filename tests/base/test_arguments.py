@@ -124,7 +124,7 @@ def calls(tmp_path_factory):
     surface = {"atmosphere": None, "geometry": None, "instrument": "TM", "elevation": dem, "adjacency": False}
     sensed = {"toa": rho, "instrument": "TM", "noise": (), "seed": 0, "noise_models": None, "min_valid": 0.1}
     fit = fifesim.regress(lai, ndvi)
-    tiny = fifesim.Scenario(grid={"width": 60, "height": 60}, terrain={"dem": "flat"})
+    tiny = fifesim.Scenario(grid={"width": 60, "height": 60}, terrain={"dem": "flat"}, sensor={"response": "paper"})
     study = fifesim.Study(tiny, {"visibility": {"uniform": [10, 60]}}, landscapes=1, split={"train": 1.0})
     counts = image.drop_vars(["gain", "offset"])
     of_classes = placed(np.ones(grid.shape, np.uint8), grid, "cover")

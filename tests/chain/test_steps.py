@@ -138,7 +138,8 @@ def test_image_goes_back_to_the_surface_within_its_counts(whole):
 
 def test_hole_in_the_ground_is_no_data_in_the_image(lai):
     lai[18:27, 27:36] = np.nan
-    image = lai.fifesim.surface_reflectance("TM", bands=TM34).fifesim.to_toa().fifesim.sense("TM")
+    paper = fifesim.instrument("TM", response="paper")
+    image = lai.fifesim.surface_reflectance("TM", bands=TM34).fifesim.to_toa().fifesim.sense(paper)
     holes = image == 0
     assert holes[:, 2, 3].all() and int(holes.sum()) == 2
     np.testing.assert_array_equal(np.isnan(image.fifesim.ndvi()), holes[0])

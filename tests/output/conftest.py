@@ -10,7 +10,7 @@ TRAVELLED = {
     "grid": {"width": 900, "height": 600},
     "ground": {"arp": 0.24, "seed": 3},
     "terrain": {"dem": "flat"},
-    "sensor": {"bands": ["TM2", "TM3", "TM4"]},
+    "sensor": {"bands": ["TM2", "TM3", "TM4"], "response": "paper"},
     "geometry": {"vza": 20.0, "vaa": 100.0},
 }
 

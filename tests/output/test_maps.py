@@ -20,7 +20,7 @@ def lai():
 @pytest.fixture(scope="module")
 def dn(lai):
     rho = lai.fifesim.surface_reflectance("TM", bands=["TM2", "TM3", "TM4"])
-    return rho.fifesim.to_toa().fifesim.sense("TM").compute()
+    return rho.fifesim.to_toa().fifesim.sense(fifesim.instrument("TM", response="paper")).compute()
 
 
 @pytest.mark.parametrize(

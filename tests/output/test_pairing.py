@@ -18,7 +18,8 @@ class Fit:
 
 
 def rows(fits=None, **sections):
-    values = {"grid": GRID, "ground": {"distribution": "burned-grazed", "arp": 0.15}} | sections
+    values = {"grid": GRID, "ground": {"distribution": "burned-grazed", "arp": 0.15}}
+    values |= {"sensor": {"response": "paper"}} | sections
     return pairing_rows(parse_scenario(values).complete(), {"lai": Fit} if fits is None else fits)
 
 
@@ -32,7 +33,7 @@ def test_run_of_the_papers_ground_says_why_its_r2_is_another():
             "grid": GRID,
             "ground": {"distribution": "burned-grazed", "arp": 0.15},
             "terrain": {"dem": "flat"},
-            "sensor": {"interval": "native"},
+            "sensor": {"interval": "native", "response": "paper"},
         }
     )
     run = simulate(native, chunks=None)
@@ -50,8 +51,9 @@ def test_run_of_the_papers_ground_says_why_its_r2_is_another():
 @pytest.mark.parametrize(
     "sections",
     [
-        {"sensor": {"interval": "native"}},
+        {"sensor": {"interval": "native", "response": "paper"}},
         {"sensor": {"instrument": "OLI"}},
+        {"sensor": {}},
         {"ground": {"arp": 0.2, "distribution": "burned-grazed"}},
         {"fits": {}},
     ],

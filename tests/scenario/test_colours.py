@@ -35,8 +35,8 @@ def test_what_is_wrong_is_left_to_be_told(sensor):
 
 
 def test_noise_that_green_lacks_is_not_asked_of_it():
-    """The noise of the Landsat-5 Thematic Mapper is not known of any band: two are left, which is told of them."""
-    values = {"sensor": {"instrument": "TM", "noise": ["shot"]}}
+    """The noise of SuperDove is not known of any band: two are left, which is told of them."""
+    values = {"sensor": {"instrument": "SuperDove", "noise": ["shot"]}}
     assert with_false_colour(values) == values
     noisy = {"sensor": {"instrument": "OLI", "noise": ["shot"]}}
     assert with_false_colour(noisy)["sensor"]["bands"] == ["OLI3", "OLI4", "OLI5"]

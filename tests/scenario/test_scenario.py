@@ -161,7 +161,8 @@ def test_lengths_are_taken_in_any_of_their_units():
         ("[sensor]\noffset = [1.0]", "sensor.offset"),
         ("[sensor]\noffset = [nan, 0.0]", "two finite numbers"),
         ("[sensor]\nnoise = ['shto']", "sensor.noise"),
-        ("[sensor]\nnoise = ['shot']", "the description of TM has no noise for TM3"),
+        ("[sensor]\ninstrument = 'HRV'\nnoise = ['fixed-pattern']", "HRV has no fixed-pattern noise for XS1"),
+        ("[sensor]\ninstrument = 'SuperDove'\nnoise = ['shot']", "description of SuperDove has no noise for PS6"),
         ("atmosphere = 3", "atmosphere"),
         ("[atmosphere", "scenario.toml is not valid TOML"),
     ],
@@ -363,7 +364,7 @@ def test_a_class_without_leaf_area_has_that_of_the_ground():
     ("text", "second"),
     [
         ("[sensor]\ninstrment = 'TM'\nbands = ['XX']\n", "sensor: unknown band of TM 'XX'"),
-        ("[sensor]\npixl = 30\nnoise = ['shot']\n", "has no noise for TM3"),
+        ("[sensor]\npixl = 30\nnoise = ['fixed-pattern']\n", "TM has no fixed-pattern noise for TM2"),
         ("[landscap]\ncover = 'pastures'\n[classes.a]\nshare = 0.3\n[classes.b]\n", "classes: b has no share"),
         ("[sensor]\nxyzzy = 1\nbands = ['XX']\n", "sensor: unknown band of TM 'XX'"),
     ],

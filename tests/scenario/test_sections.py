@@ -44,7 +44,7 @@ def test_size_of_a_pixel_is_the_products_unless_given():
         (CoverStand, {"leaf_angles": "spheric"}, "did you mean 'spherical'"),
         (Terrain, {"dem": "a.tif", "vertical_units": "furlong"}, "vertical units must be one of"),
         (Air, {"engine": "7S"}, "must be one of 5S"),
-        (Sensor, {"noise": ["shot"]}, "no noise for TM3"),
+        (Sensor, {"instrument": "SuperDove", "noise": ["shot"]}, "no noise for PS6"),
     ],
 )
 def test_what_physics_refuses(section, values, said):
@@ -94,9 +94,10 @@ def test_pixels_are_those_of_the_bands_as_in_python():
 def test_response_of_a_scenario_is_that_of_python():
     sharp = Sensor(response="detector").description
     assert sharp == fifesim.instrument("TM", response="detector") != Sensor().description
-    assert Sensor(response="system").description == Sensor(response="paper").description == Sensor().description
+    assert Sensor(response="system").description == Sensor().description
+    assert Sensor(response="paper").description == fifesim.instrument("TM", response="paper")
     for name, response, said in (
-        ("TM", "sharp", "response must be one of system, detector, paper, got 'sharp'"),
+        ("TM", "sharp", "response must be one of system, detector, paper, sharpest, softest, got 'sharp'"),
         ("MSI", "paper", "MSI has no 'paper' response: type response='detector'"),
     ):
         with pytest.raises(ValueError, match=said):
@@ -118,5 +119,5 @@ def test_noise_of_a_scenario_is_that_of_python():
 
 
 def test_noise_that_an_instrument_lacks_is_told_with_those_that_have_it():
-    with pytest.raises(ValueError, match=r"TM has no noise for TM3: .*\[sensor.noise_model\].* such as .*L4TM, MODIS"):
-        Sensor(noise=["shot"])
+    with pytest.raises(ValueError, match=r"SuperDove has no noise for PS6: .*\[sensor.noise_model\].* L4TM, MODIS"):
+        Sensor(instrument="SuperDove", noise=["shot"])

@@ -246,7 +246,7 @@ def test_every_key_of_a_scenario_reaches_its_stage():
         },
         "geometry": {"sza": 40.0, "saa": 100.0, "vza": 5.0, "vaa": 10.0},
         "atmosphere": {"visibility": 23, "altitude": 1.0},
-        "sensor": {"bands": bands, "pixel": 50.0, "min_valid": 1.0},
+        "sensor": {"bands": bands, "pixel": 50.0, "min_valid": 1.0, "response": "paper"},
     }
     tree = fifesim.simulate(fifesim.Scenario.model_validate(options))
     sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(times.TIME))
@@ -259,7 +259,8 @@ def test_every_key_of_a_scenario_reaches_its_stage():
         geometry=sun,
         canopy=fifesim.Canopy(leaf_optics=leaf, background=back, leaf_angles="planophile", hotspot=0.2),
     )
-    image = fifesim.sense(fifesim.to_toa(rho), onto=grids.aligned_grid(grid, 50.0), min_valid=1.0)
+    paper = fifesim.instrument("TM", response="paper")
+    image = fifesim.sense(fifesim.to_toa(rho), paper, onto=grids.aligned_grid(grid, 50.0), min_valid=1.0)
     fpar = fifesim.fpar(lai, geometry=sun, canopy=fifesim.Canopy(leaf_angles="planophile"), fpar_inf=0.9)
     np.testing.assert_array_equal(tree["image"]["dn"], image)
     np.testing.assert_array_equal(tree["truth"]["lai"], fifesim.aggregate(lai, 50.0, min_valid=1.0))

@@ -91,10 +91,11 @@ def test_image_carries_its_calibration(toa):
 
 def test_pixels_over_a_hole_are_no_data(toa):
     toa[0, 20:26, 20:26] = np.nan
-    image = fifesim.sense(toa, "TM")
+    paper = instrument("TM", "paper")
+    image = fifesim.sense(toa, paper)
     assert (image.sel(band="TM3") == 0).sum() == 1
     assert (image.sel(band="TM4") > 0).all()
-    assert (fifesim.sense(toa, "TM", min_valid=0.3) > 0).all()
+    assert (fifesim.sense(toa, paper, min_valid=0.3) > 0).all()
 
 
 def test_radiance_and_reflectance_keep_their_word(toa):
@@ -160,7 +161,7 @@ def test_one_band_without_the_dimension_is_an_image_of_one_band(toa):
         (lambda toa: toa.drop_vars("band"), {}, "neither names of TM.*nor a wavelength"),
         (lambda toa: toa.assign_coords(band=[1, 2], wavelength=("band", [0.66, 1.2])), {}, r"responds at 1\.2 um"),
         (lambda toa: toa, {"instrument": "MT"}, "MT"),
-        (lambda toa: toa, {"min_valid": 98}, "min_valid must be in"),
+        (lambda toa: toa, {"instrument": instrument("TM", "paper"), "min_valid": 98}, "min_valid must be in"),
         (lambda toa: toa, {"onto": fifesim.grid_at("EPSG:32614", 0, 0, 60, 60, 30)}, "CRS of the scene"),
     ],
 )

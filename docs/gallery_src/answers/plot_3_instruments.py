@@ -4,9 +4,10 @@ Information lost by each instrument
 
 The figure shows which fraction of the variance of leaf area is not explained by a line on NDVI, by stage and
 instrument. The ground is level burned, grazed prairie in cells of 3.33 m, and the truth is the mean over a pixel. Point
-spread, noise and geolocation error of each instrument are taken from published sources. **Hatched cells are unknown,
-not zero.** An instrument with an unknown term has no total, and its other shares are computed without that term. Shares
-are means over 20 realisations.
+spread, noise and geolocation error of each instrument come from the best source: measured in flight, measured before
+launch, required, or assumed; the labels state the origin of the blur. **Hatched cells are unknown, not zero.** An
+instrument with an unknown term has no total, and its other shares are computed without that term. Shares are means over
+8 realisations.
 
 The table is computed by ``python docs/make_instruments.py``, and a single row by ``fifesim budget --sensor MSI``. The
 ground is homogeneous grass that varies over some ten metres at most. Large pixels therefore have little variance, and
@@ -27,7 +28,9 @@ table = pd.read_csv(
         if path.exists()
     )
 )
-table = table[table["variable"] == "lai"]
+every = table[table["variable"] == "lai"]
+# The best known blur; the table has the ends of its uncertainty too.
+table = every[every["response"] == "system"]
 sizes = table.sort_values("pixel", kind="stable").drop_duplicates("instrument")
 names, arps = list(sizes["instrument"]), sorted(table["arp"].unique())
 shares = table.pivot(index=["arp", "instrument"], columns="stage", values="share")
@@ -65,7 +68,10 @@ for axis, arp in zip(axes, arps, strict=True):
     axis.set(title=f"arp {arp:g}")
 axes[0].set_yticks(
     range(len(names)),
-    [f"{name}, {pixel:g} m" for name, pixel in zip(names, sizes["pixel"], strict=True)],
+    [
+        f"{name}, {pixel:g} m, {origin}"
+        for name, pixel, origin in zip(names, sizes["pixel"], sizes["blur origin"], strict=True)
+    ],
     fontsize=8,
 )
 figure.suptitle("Fraction of the variance of leaf area not explained by a line on NDVI")
@@ -78,13 +84,29 @@ figure.legend(
 # sphinx_gallery_end_ignore
 
 # %%
-# R² of leaf area on NDVI for instruments with complete information:
+# R² of leaf area on NDVI for instruments with complete information, with its range at the ends of the uncertainty of
+# the blur, and the origins of blur, noise and geolocation. Two instruments differ only if their ranges do not overlap:
 
 totals = table[table["stage"] == "total"].dropna(subset="share")
 r2 = 1 - totals.pivot(index="instrument", columns="arp", values="share")
 error = totals.pivot(index="instrument", columns="arp", values="share_error")
+ends = every[(every["stage"] == "total")].groupby(["instrument", "arp"])["share"]
+low, high = (1 - each.unstack().loc[r2.index] for each in (ends.max(), ends.min()))
 text = r2.map("{:.2f}".format) + " ± " + error.map("{:.3f}".format)
-print(text.loc[[name for name in names if name in text.index]].to_string())
+text += " (" + low.map("{:.2f}".format) + " to " + high.map("{:.2f}".format) + ")"
+origins = sizes.set_index("instrument")[["blur origin", "noise origin", "geolocation origin"]]
+print(text.join(origins).loc[[name for name in names if name in text.index]].to_string())
+
+# %%
+# Ranks by R² at arp 0.15, from the best, and the best and worst rank that the ranges allow:
+
+middle = pd.DataFrame({"r2": r2[0.15], "low": low[0.15], "high": high[0.15]}).sort_values(
+    "r2", ascending=False
+)
+for rank, (name, row) in enumerate(middle.iterrows(), 1):
+    best = 1 + (middle["low"] > row["high"]).sum()
+    worst = (middle["high"] >= row["low"]).sum()
+    print(f"{rank:>2} ({best} to {worst})  {name}")
 
 # %%
 # The smallest and largest share of each term are listed below. **Registration** has the largest share wherever a

@@ -27,6 +27,7 @@ from fifesim.output.progress import steps
 from fifesim.output.report import fixed, title
 from fifesim.scenario.scenario import Scenario
 from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.provenance import origin_text
 
 # As a page reads them: bytes, pairs of bytes with all low ones first, and numbers of four or eight bytes.
 _KINDS = {np.dtype("u1"): "u1", np.dtype("u2"): "u2", np.dtype("f4"): "f4", np.dtype("f8"): "f8"}
@@ -136,7 +137,8 @@ def _sun(sza):
 
 def _instrument_title(sweep, name):
     found, size = instrument(name), sweep.at(replace(sweep.settings[0], instrument=name)).sensor.size
-    return found.name, f"{found.title}, {size:g} m"
+    bands = sweep.at(replace(sweep.settings[0], instrument=name)).sensor.bands
+    return found.name, f"{found.title}, {size:g} m; blur: {origin_text(found, 'blur', bands)}"
 
 
 def _displacement(offset):

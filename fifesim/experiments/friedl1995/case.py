@@ -88,8 +88,10 @@ def background_of(given, bands):
 
 
 def sensor_of(name):
-    """Instrument of the scenes, and the names of its red and near infrared band."""
+    """Instrument of the scenes, with the response of the paper if its file has one, and its red and infrared band."""
     description = instrument(name)
+    if description.paper_lsf is not None:
+        description = instrument(description, "paper")
     return description, tuple(band.name for band in description.red_and_near_infrared())
 
 
@@ -197,15 +199,21 @@ class Reading:
         """TOML text of an instrument file with the response of the reading and all other values from Table 1."""
         text = files.path(_FILE).read_text(encoding="utf-8")
         if self.count is not None:
-            changed, times = re.subn(r"(?m)^count = 9\b.*$", f"count = {self.count}  # {self.text}", text)
+            step = instrument(TABLE_1).paper_lsf.step
+            lsf = f'[lsf]\nkind = "cosine"\nstep = {step!r}  # rad\ncount = {self.count}  # {self.text}\n'
         else:
             lsf = f'[lsf]\nkind = "gaussian"\neifov = {self.eifov / altitude!r}  # rad: {self.text}\n'
-            changed, times = re.subn(r"(?s)\[lsf\].*?\n(?=\n\[)", lsf, text)
-        if times != 1:
-            raise RuntimeError(f"{_FILE} has no response that can be changed: reinstall fifesim")
-        return changed.replace('lsf = "Friedl1995"', f'lsf = "{self.name}"', 1).replace(
-            "[references]\n", f'[references]\n"{self.name}" = "{self.text}"\n', 1
-        )
+        changes = {
+            r"(?s)\[lsf\].*?\n(?=\n\[)": lsf,
+            r"(?m)^blur = .*$": 'blur = { kind = "assumed" }',
+            r"(?m)^lsf = .*$": f'lsf = "{self.name}"',
+            r"(?m)^\[references\]$": f'[references]\n"{self.name}" = "{self.text}"',
+        }
+        for pattern, new in changes.items():
+            text, times = re.subn(pattern, new, text)
+            if times != 1:
+                raise RuntimeError(f"{_FILE} has no response that can be changed: reinstall fifesim")
+        return text
 
 
 # Statements of the paper on cells and pixels, by section. They support the aligned reading.
@@ -374,6 +382,8 @@ class Case:
             ground["background" if by_band else "background_spectra"] = dict(self.background)
         interval, offset = "native" if self.reading.own_interval else "product", self.reading.offset * CELL / self.pixel
         sensor = {"instrument": self.sensor, "bands": list(self.bands), "interval": interval, "offset": [offset] * 2}
+        if sensor_of(self.sensor)[0].paper_lsf is not None and not self.reading.other_response:
+            sensor["response"] = "paper"
         return Scenario(grid=grid, ground=ground, terrain={"dem": self.dem, "upwelling": True}, sensor=sensor)
 
     @cached_property

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 
 from fifesim.experiments.scatter import shares as scatter
@@ -16,6 +17,7 @@ from fifesim.output.run.workers import check_memory_of_cells
 from fifesim.scenario.toml import write_scenario
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.listing import blur_in_words, noise_in_words
+from fifesim.sensor.description.provenance import DASH, origins_in_words
 
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
 
@@ -48,7 +50,12 @@ def bar_chart(table):
         share, error = (100 * rows.loc[list(names), name].to_numpy(float) for name in ("share", "share_error"))
         axis.barh(at, share, 0.38, color=color, hatch=hatch, edgecolor="white", linewidth=0, label=label)
         axis.errorbar(share, at, xerr=np.nan_to_num(error), fmt="none", ecolor="#222222", elinewidth=1, capsize=2.5)
+        longest = np.nanmax(np.abs(share))
         for y, value, spread in zip(at, share, np.nan_to_num(error), strict=True):
+            if np.isnan(value):
+                axis.barh(y, longest, 0.38, color="none", edgecolor="#999999", hatch="xxxx", linewidth=0)
+                axis.annotate("unknown", (longest, y), (5, 0), textcoords="offset points", va="center", fontsize=7)
+                continue
             # A stage without any effect is already ideal.
             text = "0" if value == 0 else fixed(value, 1)
             # Beyond the end of bar and whisker.
@@ -69,7 +76,7 @@ def bar_chart(table):
 
 def _shown(table):
     """Stages with their ideal states; stages of the ground only if it has them."""
-    shares = table.groupby("stage")["share"].apply(lambda values: values.any())
+    shares = table.groupby("stage")["share"].apply(lambda values: values.fillna(0).any())
     return {stage: ideal for stage, ideal in STAGES.items() if stage not in IDEAL_PROPERTIES or shares[stage]}
 
 
@@ -78,7 +85,9 @@ def mechanisms(budget):
     rows = []
     for name, parts in MECHANISMS.items():
         row = {"name": name, "parts": " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))}
-        shares = sum(budget["curvature"] if part == CURVATURE else budget["share"].sel(stage=part) for part in parts)
+        each = [budget["curvature"] if part == CURVATURE else budget["share"].sel(stage=part) for part in parts]
+        # An unknown part is left out; a mechanism with unknown parts only is unknown.
+        shares = xr.concat(each, "part", coords="minimal", compat="override").sum("part", min_count=1)
         for variable in VARIABLES:
             share = shares.sel(variable=variable)
             mean, total = float(share.mean()), float(budget["total"].sel(variable=variable).mean())
@@ -87,16 +96,19 @@ def mechanisms(budget):
     return rows
 
 
-def budget_page(scenario, budget, table, picture, run):
+def budget_page(scenario, budget, table, picture, run, ends=None):
     """One self-contained HTML page of a budget."""
     by_variable = {name: table[table["variable"] == name].set_index("stage").to_dict("index") for name in VARIABLES}
     found, own = mechanisms(budget), scenario.sensor
+    unknown = [stage for stage, row in by_variable["lai"].items() if row["origin"] == DASH and np.isnan(row["share"])]
     return report.page_html(
         _TEMPLATE, title=title(scenario), scenario=scenario, stages=_shown(table), variables=VARIABLES,
         native_interval=instrument(own.instrument).ground_interval, drift=_drift(scenario, run),
         blur=blur_in_words(own.description, own.bands), noise=noise_in_words(own.description, own.bands, own.noise),
         ground="level" if scenario.terrain.dem == "flat" else Path(scenario.terrain.dem).name,
-        rows=by_variable, mechanisms=found, largest=max(found, key=lambda row: row["lai"]["share"]),
+        rows=by_variable, mechanisms=found, largest=max(found, key=lambda row: np.nan_to_num(row["lai"]["share"])),
+        origins=origins_in_words(own.description, own.bands), ends=ends,
+        unknown=unknown,
         curvature=CURVATURE, total=TOTAL, variation=VARIATION, run=run, chart=picture,
     )  # fmt: skip
 
@@ -132,7 +144,8 @@ def budget_to_folder(scenario, folder, *, realisations=20, cells=333, seed=None,
         table.to_csv(partial / "budget.csv", index=False, float_format="%.6g")
         chart = report.png(bar_chart(table), _DPI)
         (partial / "budget.png").write_bytes(chart)
-        page = budget_page(complete, found, table, chart, run)
+        ends = scatter.total_range(complete, **options, each=iter)
+        page = budget_page(complete, found, table, chart, run, ends)
         (partial / "report.html").write_text(page, encoding="utf-8")
         (partial / "scenario.toml").write_text(write_scenario(complete), encoding="utf-8")
     return [folder / name for name in BUDGET_FILES]

@@ -23,6 +23,7 @@ from fifesim.output.progress import steps
 from fifesim.scenario.ground import ground_scene
 from fifesim.scenario.scenario import Scenario, grid_keys
 from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.provenance import DASH, origin_text
 
 # Further rows of the table: the remainder with all stages ideal, and the total.
 CURVATURE, TOTAL = "curvature", "total"
@@ -72,6 +73,8 @@ def budget(
         if only this stage is ideal; ``first``, the scatter with only this stage active, minus curvature. Over
         (realisation, variable): ``total``; ``curvature``, the scatter with all stages ideal, because the relation with
         NDVI is curved; ``variation``, the decrease of the total if the ground is uniform within each pixel. [1]
+        Along stage: ``origin``, where blur, geolocation and noise of the instrument come from. A stage that is unknown
+        has the origin "–" and shares of NaN, and the total leaves it out.
 
     Raises
     ------
@@ -93,7 +96,7 @@ def budget(
     >>> scenario = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
     >>> shares = fifesim.budget(scenario, realisations=1, cells=90)
     >>> round(float(shares["total"].sel(variable="lai").mean()), 2)
-    0.05
+    0.24
     """
     scenario = budget_scenario() if scenario is None else scenario
     if not isinstance(scenario, Scenario):
@@ -105,7 +108,45 @@ def budget(
     stacked = {name: np.stack([one[name] for one in found]) for name in found[0]}
     dims = {3: ("realisation", "variable", "stage"), 2: ("realisation", "variable")}
     attrs = {"units": "1", "long_name": "share of the variance"}
-    return xr.Dataset({name: (dims[values.ndim], values, attrs) for name, values in stacked.items()}, coords=names)
+    made = xr.Dataset({name: (dims[values.ndim], values, attrs) for name, values in stacked.items()}, coords=names)
+    origins = stage_origins(scenario)
+    made = made.assign_coords(origin=("stage", [origins.get(stage, "") for stage in STAGES]))
+    # A stage that could not be simulated has an unknown share, not a share of zero.
+    by_stage = made[["share", "alone", "first"]]
+    return made.assign(by_stage.where((made["origin"] != DASH) | (by_stage != 0).any(["realisation", "variable"])))
+
+
+def stage_origins(scenario):
+    """Origin of the blur, geolocation and noise of the instrument by the stage that they affect; a dash if unknown."""
+    own = scenario.complete().sensor
+    found = {
+        stage: origin_text(own.description, quantity, own.bands)
+        for stage, quantity in (("point spread", "blur"), ("registration", "geolocation"), ("noise", "noise"))
+    }
+    # The ideal response, a displacement and a noise model are given by the scenario.
+    given = {
+        "point spread": own.response == "detector",
+        "registration": any(own.offset),
+        "noise": bool(own.noise_model),
+    }
+    return {stage: "given" if given[stage] else text for stage, text in found.items()}
+
+
+def total_range(scenario, **options):
+    """Totals of LAI and FPAR at the ends of the uncertainty of the blur by variable, None if it is not stated."""
+    totals: dict[str, list[float]] = {name: [] for name in VARIABLES}
+    for end in ("sharpest", "softest"):
+        if scenario.sensor.response not in (None, "system"):
+            return None
+        try:
+            sensor = scenario.sensor.model_copy(update={"response": end})
+            sensor.description  # noqa: B018
+        except ValueError:
+            return None
+        found = budget(scenario.model_copy(update={"sensor": sensor}), **options)
+        for name in VARIABLES:
+            totals[name].append(float(found["total"].sel(variable=name).mean()))
+    return {name: (min(values), max(values)) for name, values in totals.items()}
 
 
 def _check_map(scenario):
@@ -125,7 +166,7 @@ def _check_map(scenario):
 
 def budget_scenario():
     """Scenario of the paper, with pixels at the interval of Table 1."""
-    return Scenario(sensor={"interval": "native"})
+    return Scenario(sensor={"interval": "native", "response": "paper"})
 
 
 def budget_cases(scenario, *, realisations, cells, seed=None):
@@ -152,7 +193,7 @@ def budget_cases(scenario, *, realisations, cells, seed=None):
 
 def budget_table(budget):
     """Means and standard errors of a budget over its realisations, as a table."""
-    rows = []
+    rows, origins = [], dict(zip(budget["stage"].values, budget["origin"].values, strict=True))
     for variable in VARIABLES:
         one = budget.sel(variable=variable)
         by_stage = one[["alone", "first", "share"]]
@@ -160,12 +201,12 @@ def budget_table(budget):
         cases += [(CURVATURE, {"share": one["curvature"]}), (TOTAL, {"share": one["total"]})]
         cases += [(VARIATION, {"alone": one["variation"]})]
         for stage, columns in cases:
-            row = {"stage": stage, "variable": variable}
+            row = {"stage": stage, "variable": variable, "origin": str(origins.get(stage, ""))}
             for name, values in columns.items():
                 row |= {name: float(values.mean("realisation")), f"{name}_error": float(standard_error(values))}
             rows.append(row)
     order = [f"{name}{suffix}" for name in ("alone", "first", "share") for suffix in ("", "_error")]
-    return pd.DataFrame(rows, columns=["stage", "variable", *order])
+    return pd.DataFrame(rows, columns=["stage", "variable", "origin", *order])
 
 
 def standard_error(values):
@@ -241,8 +282,8 @@ _PIXELS = 12  # minimum along a window, for coarse instruments
 _CELLS = 333  # minimum along a window
 
 
-def instrument_scenario(name, *, arp=0.15):
-    """Scenario of the paper on level ground as seen by an instrument."""
+def instrument_scenario(name, *, arp=0.15, response=None):
+    """Scenario of the paper's ground, level, as seen by an instrument with a spatial response."""
     # Red and near infrared on the grid of its product, with its noise, displaced along both axes by the root mean
     # square error of its geolocation.
     description = instrument(name)
@@ -250,6 +291,7 @@ def instrument_scenario(name, *, arp=0.15):
     shift = (description.geolocation or 0.0) / description.pixel(bands[0])
     noise = ["all"] if all(band.noise for band in bands) else []
     sensor = {"instrument": name, "bands": [band.name for band in bands], "noise": noise, "offset": [shift, shift]}
+    sensor |= {} if response is None else {"response": response}
     return Scenario(sensor=sensor, ground={"arp": arp}, terrain={"dem": "flat"})
 
 

@@ -95,7 +95,7 @@ def _parts():
 
 def _instruments():
     """Check angles on the ground, and a measured transfer: 40.8 m is half of the period with a transfer of one half."""
-    tm, measured = instrument("TM"), instrument("L4TM").line_spread
+    tm, measured = instrument("TM", "paper"), instrument("L4TM").line_spread
     angles = tm.line_spread.width / (9 * 4.778e-6 * 705e3), tm.ground_interval / (43e-6 * 705e3)
     found = [*angles, measured.mtf(0.5 / 40.8) / 0.5]
     yield _deviation("TM's line spread on the ground", largest(found, 1), 1e-4, "1", "Schowengerdt et al. (1985)")

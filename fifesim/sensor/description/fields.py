@@ -118,7 +118,7 @@ def false_colour_bands(instrument):
 
 
 # Keys with several types of values. In the location of an error, they are followed by the name of the type.
-_FORMS = ("srf", "lsf", "interval", "ifov")
+_FORMS = ("srf", "lsf", "paper_lsf", "interval", "ifov")
 
 
 def errors_in_words(error, known, called="key"):
@@ -166,7 +166,7 @@ def _key_parts(places):
         yield str(part + 1) if isinstance(part, int) else part
         if part in _FORMS and places:
             form = places.pop(0)
-            if part == "lsf" and form == "axes" and places:
+            if part.endswith("lsf") and form == "axes" and places:
                 yield places.pop(0)
-            if part == "lsf" and places and places[0] in ("cosine", "boxcar", "gaussian", "table", "system"):
+            if part.endswith("lsf") and places and places[0] in ("cosine", "boxcar", "gaussian", "table", "system"):
                 places.pop(0)

@@ -26,6 +26,7 @@ from fifesim.sensor.description.fields import (
     lookup,
     worded,
 )
+from fifesim.sensor.description.provenance import DescribedQuantity, Origin, Provenance, provenance_of
 from fifesim.sensor.description.spatial_response import SpatialResponse, View
 from fifesim.sensor.description.spectral_response import SpectralResponse
 from fifesim.sensor.response.noise import NoiseModel
@@ -48,9 +49,12 @@ class Noise:
         Ratio of signal to noise there. [1]
     nedl : float, optional
         Noise equivalent radiance there, standard deviation; instead of the ratio. [W m-2 sr-1 um-1]
+    high_radiance, high_snr : float, optional
+        A second, higher radiance and the ratio there. Both ratios determine the shot noise and the constant noise.
+        [W m-2 sr-1 um-1], [1]
     shot : float, optional
-        Share of the variance there that grows in proportion to the signal; the rest is constant. Where it is not
-        given it is not known, and all of the noise is taken as constant. [1]
+        Share of the variance at `radiance` that grows in proportion to the signal (shot noise); the rest is constant.
+        By default 1: the noise is limited by shot noise. Leave it out with two radiances. [1]
     gain_spread : float, optional
         Standard deviation of the detectors' relative gain: fixed pattern, which stripes the image. [1]
     offset_spread : float, optional
@@ -59,12 +63,15 @@ class Noise:
     Raises
     ------
     pydantic.ValidationError
-        Unless one of the ratio and the noise is given.
+        Unless one of the ratio and the noise is given, or if the second point is incomplete, lower than the first, or
+        needs a negative variance.
     """
 
     radiance: Positive
     snr: Positive | None = None
     nedl: Positive | None = None
+    high_radiance: Positive | None = None
+    high_snr: Positive | None = None
     shot: Annotated[float, Field(strict=True, ge=0, le=1)] | None = None
     gain_spread: Annotated[float, Field(strict=True, ge=0, lt=1)] = 0.0
     offset_spread: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 0.0
@@ -72,16 +79,24 @@ class Noise:
     def __post_init__(self):
         if (self.snr is None) == (self.nedl is None):
             raise ValueError("give either snr or nedl [W m-2 sr-1 um-1], at the radiance")
+        if (self.high_radiance is None) != (self.high_snr is None):
+            raise ValueError("high_radiance and high_snr belong together: give both or neither")
+        if self.high_radiance is not None and self.high_radiance <= self.radiance:
+            raise ValueError(f"high_radiance must be above radiance = {self.radiance:g}, got {self.high_radiance:g}")
+        # Raises if the points and the share do not fit together.
+        self.model()
 
     @property
     def equivalent_radiance(self):
         """Noise equivalent radiance at `radiance`, as a standard deviation. [W m-2 sr-1 um-1]"""
         return self.radiance / self.snr if self.nedl is None else self.nedl
 
-    def model(self, detectors, along):
+    def model(self, detectors=1, along="rows"):
         """Noise model at every radiance."""
-        snr, shot = self.radiance / self.equivalent_radiance, self.shot or 0.0
-        model = NoiseModel.from_snr(self.radiance, snr, shot, detectors=detectors, along=along)
+        radiance, snr = [self.radiance], [self.radiance / self.equivalent_radiance]
+        if self.high_radiance is not None:
+            radiance, snr = [*radiance, self.high_radiance], [*snr, self.high_snr]
+        model = NoiseModel.from_snr(radiance, snr, self.shot, detectors=detectors, along=along)
         return replace(model, gain_spread=self.gain_spread, offset_spread=self.offset_spread)
 
 
@@ -206,7 +221,9 @@ class Scan:
 # Numbers that must be there and those that may; each that is there has a source.
 INSTRUMENT_NUMBERS = ("altitude", "gsd", "interval", "bits", "lsf")
 BAND_NUMBERS = ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance")
-OPTIONAL_NUMBERS = ("ifov", "detectors", "scan", "product", "noise", "gains", "limits", "geolocation", "compression")
+OPTIONAL_NUMBERS = (
+    "ifov", "detectors", "scan", "product", "noise", "gains", "limits", "geolocation", "compression", "paper_lsf",
+)  # fmt: skip
 
 # Publications by number.
 Sources = dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str]  # type: ignore[misc, valid-type]
@@ -243,6 +260,8 @@ class InstrumentBand:
         Scale of the digital numbers, which meets the linear one at both ends; that is linear by default.
     sources : dict
         Key of the instrument's references for each number that has another source than the instrument says.
+    origin : dict of Origin, optional
+        Origin of ``blur`` and ``noise`` where it differs from the instrument's.
 
     Raises
     ------
@@ -266,6 +285,7 @@ class InstrumentBand:
     gains: dict[str, Gain] = field(default_factory=dict, repr=False, hash=False)
     compression: Literal["square-root"] | None = None
     sources: Sources = field(default_factory=dict, repr=False, hash=False)  # type: ignore[valid-type]
+    origin: dict[Literal["blur", "noise"], Origin] = field(default_factory=dict, repr=False, hash=False)
 
     def __post_init__(self):
         Gain(self.full_scale_radiance, self.min_radiance)
@@ -343,8 +363,12 @@ class Instrument:
         Error of the gridded product's place, root mean square along each axis. [m]
     product : Product, optional
         Scale of the agency's product.
+    paper_lsf : response of both axes or TwoAxesResponse, optional
+        Spatial response of Friedl et al. (1995), which ``response="paper"`` selects.
+    origin : dict of Origin, optional
+        Origin of ``blur``, ``noise`` and ``geolocation``; see `fifesim.sensor.description.provenance`.
     not_found : dict, optional
-        Parts missing in ``noise`` and ``blur``, with their publisher.
+        Parts missing in ``noise``, ``blur`` and ``geolocation``, with their publisher or the search that was done.
     aliases : tuple of str, optional
         Other names.
 
@@ -376,7 +400,9 @@ class Instrument:
     scan: Scan | None = None
     geolocation: Positive | None = None
     product: Product | None = None
-    not_found: dict[Literal["noise", "blur"], str] = field(default_factory=dict, repr=False, hash=False)
+    paper_lsf: SpatialResponse | None = None
+    origin: dict[DescribedQuantity, Origin] = field(default_factory=dict, repr=False, hash=False)
+    not_found: dict[DescribedQuantity, str] = field(default_factory=dict, repr=False, hash=False)
     aliases: tuple[Name, ...] = ()
 
     def __post_init__(self):
@@ -399,6 +425,11 @@ class Instrument:
     def max_angle(self) -> float:
         """Largest scan angle from nadir, infinite where the file has no scan [degree]."""
         return np.inf if self.scan is None else self.scan.max_angle
+
+    @property
+    def provenance(self) -> tuple[Provenance, ...]:
+        """Origin, uncertainty and source of blur, noise and geolocation, one row for the bands that share them."""
+        return provenance_of(self)
 
     @property
     def line_spread(self) -> LineSpread:

@@ -33,12 +33,26 @@ from fifesim.sensor.description.spatial_response import with_response
 
 # Keys that are suggested for misspelt ones, including keys of short files.
 _KEYS = {key.name for kind in (Instrument, InstrumentBand, Noise, Product, Scan, ScanZone) for key in fields(kind)}
-_KEYS |= {"center", "width", "shape", "snr", "snr_radiance", "snr_shot"}
+_KEYS |= {
+    "center",
+    "width",
+    "shape",
+    "snr",
+    "snr_radiance",
+    "snr_shot",
+    "high_snr",
+    "high_snr_radiance",
+    "mtf_at_nyquist",
+}
 
 
 def instrument(
     name: InstrumentLike,
-    response: Annotated[Literal["system", "detector", "paper"], Kind("'system', 'detector' or 'paper'")] | None = None,
+    response: Annotated[
+        Literal["system", "detector", "paper", "sharpest", "softest"],
+        Kind("'system', 'detector', 'paper', 'sharpest' or 'softest'"),
+    ]
+    | None = None,
 ) -> Instrument:
     """
     Description of an instrument by its name, or from a file.
@@ -48,9 +62,10 @@ def instrument(
     name : str, path-like or Instrument
         Name or alias in any case, such as ``"TM"`` or ``"Landsat 8"``; or the path of a file, which ends in
         ``.toml``. An Instrument passes through.
-    response : {"system", "detector", "paper"}, optional
-        Spatial response, as `fifesim.sensor.description.spatial_response.with_response` takes it; by default what the
-        file has.
+    response : {"system", "detector", "paper", "sharpest", "softest"}, optional
+        Spatial response, by default "system", the best that is known of the whole system. "detector" is the ideal case,
+        the detector alone; "paper" is Table 1 of Friedl et al. (1995), for TM. "sharpest" and "softest" are the ends of
+        the stated uncertainty of the modulation transfer at the Nyquist frequency.
 
     Returns
     -------
@@ -67,8 +82,8 @@ def instrument(
     --------
     >>> from fifesim import instrument
     >>> tm = instrument("tm")
-    >>> tm.name, round(tm.line_spread.width, 2), round(tm.ground_interval, 3)
-    ('TM', 30.32, 30.315)
+    >>> tm.name, round(tm.line_spread.fwhm, 2), round(tm.ground_interval, 3)
+    ('TM', 36.01, 30.315)
     """
     found = name if isinstance(name, Instrument) else _found(name)
     return found if response is None else with_response(found, response)

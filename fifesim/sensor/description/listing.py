@@ -1,6 +1,7 @@
 """Instruments as text."""
 
 from fifesim.sensor.description.fields import TwoAxes, by_axes
+from fifesim.sensor.description.provenance import UNKNOWN, uncertainty_in_words
 from fifesim.sensor.description.spatial_response import knows_blur, with_response
 from fifesim.sensor.description.spectral_response import half_peak
 from fifesim.sensor.response.noise import ALL
@@ -22,9 +23,22 @@ def instrument_in_words(instrument):
         lines.append(f"  also called {', '.join(instrument.aliases)}")
     lines += [f"  altitude {instrument.altitude / 1000:g} km, {instrument.bits} bits", *_scan(instrument)]
     lines += [*_product(instrument), *_sampling(instrument), *_radiometry(instrument)]
+    lines += ["  origin of blur, noise and geolocation", *_origins(instrument)]
     lines += [f"  not known: {name}, {text}" for name, text in instrument.not_found.items()]
     lines += ["  sources", *(f"    {text}" for text in instrument.references.values())]
     return "\n".join(lines)
+
+
+def _origins(instrument):
+    """Lines on the origin of blur, noise and geolocation, one for the bands that share it."""
+    lines = []
+    for row in instrument.provenance:
+        names = row.bands
+        every = len(names) == len(instrument.bands)
+        which = "all bands" if every else ", ".join(names) if len(names) < 10 else f"{names[0]} to {names[-1]}"
+        parts = [row.origin, uncertainty_in_words(row), "" if row.origin == UNKNOWN else row.source]
+        lines.append(f"    {row.quantity} of {which}: {'; '.join(filter(None, parts))}")
+    return lines
 
 
 def _scan(instrument):
@@ -147,6 +161,8 @@ def _radiometry(instrument):
         noise = ""
         if band.noise is not None:
             noise = f"{band.noise.radiance / band.noise.equivalent_radiance:>9.0f} at {band.noise.radiance:g}"
+            if band.noise.high_snr is not None:
+                noise += f", {band.noise.high_snr:.0f} at {band.noise.high_radiance:g}"
         gain = f"  {band.gain} gain; also {', '.join(band.gains)}" if band.gains else ""
         gain += f"  {band.compression} scale" if band.compression else ""
         lines.append(

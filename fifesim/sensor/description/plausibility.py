@@ -140,11 +140,13 @@ def _check_radiance(band):
             f"full_scale_radiance = {band.full_scale_radiance:g}: it is in W m-2 sr-1 um-1, and a white surface has "
             f"{white:.1f} in this band; mW cm-2 sr-1 um-1 times 10"
         )
-    if band.noise is not None and not band.min_radiance < band.noise.radiance < band.full_scale_radiance:
-        raise ValueError(
-            f"noise.radiance = {band.noise.radiance:g}: it is in W m-2 sr-1 um-1 and must lie between min_radiance and "
-            f"full_scale_radiance, {band.min_radiance:g} and {band.full_scale_radiance:g}"
-        )
+    for key in ("radiance", "high_radiance"):
+        value = getattr(band.noise, key, None)
+        if value is not None and not band.min_radiance < value < band.full_scale_radiance:
+            raise ValueError(
+                f"noise.{key} = {value:g}: it is in W m-2 sr-1 um-1 and must lie between min_radiance and "
+                f"full_scale_radiance, {band.min_radiance:g} and {band.full_scale_radiance:g}"
+            )
 
 
 def _check_scan(instrument):

@@ -22,7 +22,10 @@ _REFERENCES = {
     _SPECTRUM: "ASTM G173-03, extraterrestrial spectrum, as distributed with pvlib, over the band's response",
     _WHITE: "taken for a white surface below an overhead sun of ASTM G173-03, and 0 for digital number 0",
 }
-_NOISE = {"snr": "snr", "snr_radiance": "radiance", "snr_shot": "shot"}
+_NOISE = {
+    "snr": "snr", "snr_radiance": "radiance", "snr_shot": "shot",
+    "high_snr": "high_snr", "high_snr_radiance": "high_radiance",
+}  # fmt: skip
 
 # Made once: making it takes longer than what it does.
 _ADAPTER: TypeAdapter = TypeAdapter(SpectralResponse)
@@ -40,6 +43,7 @@ def completed(content, path):
         references = {_FILE: f"as {in_a_line(path.name, 100)} says"} | references
     if "name" in content:
         content.setdefault("title", content["name"])
+    _blur(content)
     added = _sampling(content, content)
     content |= added
     if isinstance(content["sources"], dict):
@@ -61,6 +65,19 @@ def _used(content):
     return [key for table in tables if isinstance(table, dict) for key in table.values() if isinstance(key, str)]
 
 
+def _blur(item):
+    """Replace ``mtf_at_nyquist``, a number or one for each axis, by a Gaussian response of an instrument or a band."""
+    transfer = item.pop("mtf_at_nyquist", None)
+    if transfer is None:
+        return
+    if "lsf" in item:
+        raise ValueError("mtf_at_nyquist and lsf both state the blur: give one of them")
+    if isinstance(transfer, dict):
+        item["lsf"] = {axis: {"kind": "gaussian", "mtf_at_nyquist": value} for axis, value in transfer.items()}
+    else:
+        item["lsf"] = {"kind": "gaussian", "mtf_at_nyquist": transfer}
+
+
 def _sampling(item, content):
     """Missing interval, field of view and line spread of an instrument or a band, from its pixel."""
     gsd, altitude = item.get("gsd"), content.get("altitude")
@@ -74,6 +91,7 @@ def _sampling(item, content):
 def _band(given, content, sampled, folder):
     """Band with its missing values."""
     band, sources = dict(given), {}
+    _blur(band)
     response = {key: band.pop(key) for key in ("center", "width", "shape") if key in band}
     if response:
         band.setdefault("srf", response)

@@ -231,7 +231,7 @@ SpatialResponse = Annotated[
 ]
 
 
-RESPONSES = ("system", "detector", "paper")
+RESPONSES = ("system", "detector", "paper", "sharpest", "softest")
 
 _DETECTOR = BoxcarResponse(kind="boxcar")
 
@@ -242,22 +242,51 @@ def knows_blur(instrument, band):
 
 
 def with_response(instrument, response):
-    """Instrument with the response of the whole system, the detector alone, or the paper."""
+    """Instrument with the response of the system, an end of its uncertainty, the detector alone, or the paper."""
     # Detectors are as wide as the instantaneous field of view, or as the interval where the file has none.
     if response not in RESPONSES:
         raise ValueError(f"response must be one of {', '.join(RESPONSES)}, got {response!r}")
     if response == "detector":
         return replace(instrument, lsf=_DETECTOR, bands=tuple(_sharp(instrument, band) for band in instrument.bands))
-    if response == "paper":
-        known = any(_kinds(instrument, band) == {"cosine"} for band in instrument.bands)
-    else:
-        known = any(knows_blur(instrument, band) for band in instrument.bands)
-    if not known:
+    if response == "paper" and instrument.paper_lsf is not None:
+        sources = instrument.sources | {"lsf": instrument.sources["paper_lsf"]}
+        origin = {key: value for key, value in instrument.origin.items() if key != "blur"}
+        return replace(instrument, lsf=instrument.paper_lsf, sources=sources, origin=origin)
+    if response == "paper" or not any(knows_blur(instrument, band) for band in instrument.bands):
         raise ValueError(
             f"the description of {instrument.name} has no {response!r} response: type response='detector', or give an "
             "instrument whose file has it"
         )
+    if response in ("sharpest", "softest"):
+        return _at_end(instrument, 1 if response == "sharpest" else -1)
     return instrument
+
+
+# Modulation transfer at the Nyquist frequency is kept within these limits at the ends of its uncertainty. [1]
+_LEAST, _MOST = 0.01, 0.95
+
+
+def _at_end(instrument, sign):
+    """Instrument with Gaussians whose transfer at the Nyquist frequency is one end of its stated uncertainty."""
+    origins = [band.origin.get("blur") or instrument.origin.get("blur") for band in instrument.bands]
+    bands = zip(instrument.bands, origins, strict=True)
+    if unknown := [band.name for band, origin in bands if origin is None or origin.uncertainty is None]:
+        raise ValueError(
+            f"the description of {instrument.name} states no uncertainty of the blur of {', '.join(unknown)}: give "
+            "[origin] blur = { kind = ..., uncertainty = ... } in its file"
+        )
+    found = []
+    for band, origin in zip(instrument.bands, origins, strict=True):
+        given = band.lsf or instrument.lsf, band.ifov or instrument.ifov, band.interval or instrument.interval
+        axes = []
+        for lsf, ifov, interval in zip(*map(by_axes, given), strict=True):
+            own = lsf.spread(View(instrument.altitude, ifov, interval, band)).mtf(
+                0.5 / (interval * instrument.altitude)
+            )
+            end = min(max(float(own) + sign * origin.uncertainty, _LEAST), _MOST)
+            axes.append(GaussianResponse(kind="gaussian", mtf_at_nyquist=end))
+        found.append(replace(band, lsf=TwoAxesResponse(*axes)))
+    return replace(instrument, bands=tuple(found))
 
 
 def _kinds(instrument, band):

@@ -86,8 +86,8 @@ class NoiseModel:
         r"""
         The model that has published signal-to-noise ratios.
 
-        Two points determine both terms; one point determines only their sum, and ``shot_share`` is the fraction that is
-        shot noise.
+        Two points determine both terms. One point determines only their sum, and ``shot_share`` is the fraction of the
+        variance that is shot noise; by default all of it, so that the ratio grows with the square root of the radiance.
 
         .. math:: b = s \, \frac{\sigma^2(L_1)}{L_1}, \quad \sigma_0^2 = (1 - s) \, \sigma^2(L_1),
             \qquad \sigma(L_1) = \frac{L_1}{\mathrm{SNR}_1}
@@ -97,7 +97,7 @@ class NoiseModel:
         radiance, snr : float, or sequence of two
             [W m-2 sr-1 um-1], [1]
         shot_share : float, optional
-            In [0, 1]; needed with one point and only there. [1]
+            In [0, 1], with one point only; 0 for noise that is the same at any radiance, by default 1. [1]
         **fixed_pattern
             ``detectors``, ``gain_spread``, ``offset_spread`` and ``along`` of the model.
 
@@ -108,14 +108,16 @@ class NoiseModel:
         Raises
         ------
         ValueError
-            If the points are not positive, the share is missing, superfluous or out of range, or two points need a
-            negative variance.
+            If the points are not positive, the share is superfluous or out of range, or two points need a negative
+            variance.
 
         Examples
         --------
         >>> model = NoiseModel.from_snr([50.0, 200.0], [100.0, 250.0])
         >>> round(float(model.snr(50.0)), 9), round(float(model.snr(200.0)), 9)
         (100.0, 250.0)
+        >>> [round(float(each)) for each in NoiseModel.from_snr(22.0, 230.0).snr([22.0, 88.0])]
+        [230, 460]
         """
         radiance, snr = np.atleast_1d(radiance).astype(float), np.atleast_1d(snr).astype(float)
         if radiance.shape != snr.shape or radiance.size not in (1, 2) or not (min(radiance) > 0 and min(snr) > 0):
@@ -125,11 +127,7 @@ class NoiseModel:
             )
         variance = (radiance / snr) ** 2
         if radiance.size == 1:
-            if shot_share is None:
-                raise ValueError(
-                    "one published snr does not say how much of the noise is shot noise: give shot_share in [0, 1], 0 "
-                    "for noise that is the same at any radiance"
-                )
+            shot_share = 1.0 if shot_share is None else shot_share
             if not 0 <= shot_share <= 1:
                 raise ValueError(f"shot_share must be in [0, 1], got {shot_share}: it is a share of the variance")
             thermal, shot = (1 - shot_share) * variance[0], shot_share * variance[0] / radiance[0]

@@ -43,7 +43,7 @@ def test_block_with_too_few_valid_cells_is_missing(lai):
 
 def test_blocks_may_be_weighted_by_a_line_spread(lai):
     """A matrix of the instrument's weights for each axis, without the package's operators."""
-    lsf = fifesim.instrument("TM").line_spread
+    lsf = fifesim.instrument("TM", response="paper").line_spread
     weights = [
         [[lsf.cumulative(CELL * (j + 1) - 30 * (i + 0.5)) - lsf.cumulative(CELL * j - 30 * (i + 0.5)) for j in range(n)]
          for i in range(n // 9)]

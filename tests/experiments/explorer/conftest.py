@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+import fifesim
 from fifesim.experiments.explorer.outcomes import outcomes_of
 from fifesim.experiments.explorer.page import explorer_page
 from fifesim.experiments.explorer.settings import sweep_of
@@ -15,6 +16,19 @@ SMALL = {
     "ground": {"arp": 0.15, "seed": 3},
     "atmosphere": {"visibility": 45.0},
 }
+
+
+def ndvi_with_data(scenario):
+    """NDVI and truth of a run, where the image without displacement has data too, as for the stages of a budget."""
+    run = fifesim.simulate(scenario)
+    still = scenario.sensor.model_copy(update={"offset": [0.0, 0.0]})
+    aligned = fifesim.simulate(scenario.model_copy(update={"sensor": still}))
+    return run["truth"], run["image"]["ndvi"].where(aligned["image"]["ndvi"].notnull().values)
+
+
+@pytest.fixture(scope="session")
+def with_data():
+    return ndvi_with_data
 
 
 @pytest.fixture(scope="session")

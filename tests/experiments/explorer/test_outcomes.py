@@ -30,10 +30,10 @@ def test_images_and_truth_are_those_of_a_simulation(place, sweep, outcomes):
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_lines_are_those_of_regress(place, sweep, outcomes):
-    run = fifesim.simulate(scenario_at(sweep, place))
+def test_lines_are_those_of_regress(place, sweep, outcomes, with_data):
+    truth, ndvi = with_data(scenario_at(sweep, place))
     for k, name in enumerate(VARIABLES):
-        line = fifesim.regress(run["truth"][name], run["image"]["ndvi"], pair="index")
+        line = fifesim.regress(truth[name], ndvi, pair="index")
         np.testing.assert_allclose(outcomes.lines[place][k], [line.slope, line.intercept, line.r2, line.n], rtol=1e-9)
 
 

@@ -67,7 +67,7 @@ def test_ranges_hold_what_is_drawn(sweep, outcomes):
 
 
 @in_a_browser
-def test_numbers_shown_are_those_of_the_public_functions(page, sweep, tmp_path):
+def test_numbers_shown_are_those_of_the_public_functions(page, sweep, tmp_path, with_data):
     """Sliders by keyboard; R2, slope, intercept, shares, and the scenario that the page says, run again."""
 
     async def look(browser):
@@ -88,7 +88,8 @@ def test_numbers_shown_are_those_of_the_public_functions(page, sweep, tmp_path):
     assert (scenario.ground.arp, scenario.sensor.offset) == (sweep.arps[1], list(sweep.offsets[1]))
     assert scenario.geometry.sza == sweep.szas[1] and scenario.sensor.instrument == "HRV"
     run = fifesim.simulate(scenario)
-    line = fifesim.regress(run["truth"]["lai"], run["image"]["ndvi"], pair="index")
+    of_run, with_both = with_data(scenario)
+    line = fifesim.regress(of_run["lai"], with_both, pair="index")
     expected = {"r2": f"{line.r2:.3f}", "slope": f"{line.slope:.3f}", "intercept": f"{line.intercept:.3f}"}
     assert {name: shown[name].replace("−", "-") for name in expected} == expected and shown["n"] == str(line.n)
     assert f"{100 * line.r2:.0f} %" in shown["headline"]

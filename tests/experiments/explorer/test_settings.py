@@ -46,7 +46,7 @@ def test_a_setting_is_the_scenario_with_its_values(small):
     assert (own.ground.arp, own.atmosphere.visibility, own.sensor.offset) == (0.249, 10.0, [0.0, 0.5])
     assert own.sun_and_view().sza == 60.0 and own.sun_and_view().saa == sweep.scenario.sun_and_view().saa
     assert own.ground.seed == 3 and own.geobox() == sweep.scenario.geobox()
-    assert sweep.at(Setting(0.24, 10.0, 60.0, "HRV")).sensor.noise == []
+    assert sweep.at(Setting(0.24, 10.0, 60.0, "MSS")).sensor.noise == []
     other = sweep.at(Setting(0.24, 10.0, 60.0, "MSI"))
     assert other.sensor.bands == ["MSI4", "MSI8"] and other.sensor.noise == ["all"] and other.sensor.min_valid == 0.9
 

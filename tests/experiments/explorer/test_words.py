@@ -19,7 +19,10 @@ def test_sliders_begin_at_the_scenario_and_say_its_values(sweep):
     assert haze["marks"] == ["45 km"] and haze["start"] == 0
     assert sza["texts"][0] == "28.5° from overhead"
     assert instrument["marks"] == ["HRV", "TM"]
-    assert instrument["texts"] == ["SPOT-1 HRV 1, multispectral mode, 20 m", "Landsat-5 Thematic Mapper, 30 m"]
+    assert instrument["texts"] == [
+        "SPOT-1 HRV 1, multispectral mode, 20 m; blur: assumed ± 0.08",
+        "Landsat-5 Thematic Mapper, 30 m; blur: in-flight ± 0.12",
+    ]
     assert registration["marks"] == ["0", "½"] and registration["texts"] == ["none", "0.50 pixel"]
 
 

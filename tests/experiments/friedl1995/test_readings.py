@@ -5,20 +5,21 @@ import pytest
 from fifesim.experiments.friedl1995.case import ALIGNED, NATIVE, READINGS, beside, reading_of
 from fifesim.sensor.description.instruments import instrument, read_instrument
 
+PAPER = instrument("TM", "paper")
 OTHER = [name for name, reading in READINGS.items() if reading.other_response]
 
 
 def test_blur_is_that_measured_in_flight():
     """Half of the modulation passes at half of the frequency that the field of view is a half period of."""
     for name, metres in (("blur-40.8", 40.8), ("blur-48.6", 48.6)):
-        spread = READINGS[name].instrument(instrument("TM")).line_spread
+        spread = READINGS[name].instrument(PAPER).line_spread
         assert float(spread.mtf(1 / (2 * metres))) == pytest.approx(0.5, abs=1e-4)
-    assert READINGS["narrow"].instrument(instrument("TM")).line_spread.width == pytest.approx(7 / 9 * 30.32, abs=0.005)
+    assert READINGS["narrow"].instrument(PAPER).line_spread.width == pytest.approx(7 / 9 * 30.32, abs=0.005)
 
 
 @pytest.mark.parametrize("name", OTHER)
 def test_instrument_file_of_a_reading_is_that_instrument(name, tmp_path):
-    reading, tm = READINGS[name], instrument("TM")
+    reading, tm = READINGS[name], PAPER
     (tmp_path / "own.toml").write_text(reading.instrument_file(tm.altitude), encoding="utf-8")
     read, made = read_instrument(tmp_path / "own.toml"), reading.instrument(tm)
     assert read.lsf == made.lsf != tm.lsf

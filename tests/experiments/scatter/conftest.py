@@ -9,7 +9,9 @@ GRID = {"west": 707970.0, "north": 4331220.0, "width": 420.0, "height": 360.0}
 
 def scenario_of(sensor=None, dem="flat", **ground):
     terrain = {"dem": dem} | ({} if dem == "flat" else {"horizon_reach": 300})
-    return parse_scenario({"grid": GRID, "sensor": sensor or {}, "terrain": terrain, "ground": ground})
+    return parse_scenario(
+        {"grid": GRID, "sensor": sensor or {"response": "paper"}, "terrain": terrain, "ground": ground}
+    )
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ from fifesim.scenario.scenario import parse_scenario
 
 # 10 x 10 pixels of 30 m.
 GRID = {"west": 707970.0, "north": 4331220.0, "width": 300.0, "height": 300.0}
-FLAT = {"grid": GRID, "terrain": {"dem": "flat"}}
+FLAT = {"grid": GRID, "terrain": {"dem": "flat"}, "sensor": {"response": "paper"}}
 ALL = {
     "ground": {"brown": 0.2, "crown_cover": 0.8, "moisture": 0.2},
     "landscape": {

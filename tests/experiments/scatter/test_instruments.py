@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 
 import fifesim
-from fifesim.experiments.scatter.shares import instrument_scenario, window_cells
+from fifesim.experiments.scatter.report import bar_chart
+from fifesim.experiments.scatter.shares import budget_table, instrument_scenario, total_range, window_cells
 from fifesim.sensor.description.spatial_response import knows_blur
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -24,8 +25,8 @@ def test_an_instrument_is_flown_with_all_that_is_known_of_it():
     msi = instrument_scenario("Sentinel-2", arp=0.24)
     assert msi.sensor.bands == ["MSI4", "MSI8"] and msi.sensor.size == 10.0 and msi.ground.arp == 0.24
     assert msi.sensor.offset == pytest.approx([0.33, 0.33]) and msi.sensor.noise == ["all"]
-    hrv = instrument_scenario("HRV")
-    assert hrv.sensor.offset == [0.0, 0.0] and hrv.sensor.noise == [] and hrv.terrain.dem == "flat"
+    mss = instrument_scenario("MSS")
+    assert mss.sensor.offset == [0.0, 0.0] and mss.sensor.noise == [] and mss.terrain.dem == "flat"
 
 
 def test_windows_hold_twelve_pixels():
@@ -36,6 +37,8 @@ def test_windows_hold_twelve_pixels():
 def test_blur_and_place_take_the_most_from_sentinel_2(make_instruments):
     """At 10 m over burned-grazed ground, beside counts of twelve bits and the noise that they have."""
     found = make_instruments.compare_instruments(["MSI"], arps=(0.15,), realisations=2)
+    assert list(found["response"].unique()) == ["system", "sharpest", "softest"]
+    found = found[found["response"] == "system"]
     assert set(found["instrument"]) == {"MSI"} and found["blur"].all() and found["noise"].all() and found["place"].all()
     shares = found[found["variable"] == "lai"].set_index("stage")["share"]
     parts = shares.drop(["total", "sub-pixel variation"], errors="ignore")
@@ -46,14 +49,14 @@ def test_blur_and_place_take_the_most_from_sentinel_2(make_instruments):
 
 
 def test_terms_that_no_source_states_are_unknown_and_so_is_their_total(make_instruments):
-    """Of OLI the blur is unknown; of HRV blur, noise and place are."""
-    found = make_instruments.compare_instruments(["OLI", "HRV"], arps=(0.15,), realisations=2)
+    """Of EMIT the place is unknown; of MSS blur, noise and place are."""
+    found = make_instruments.compare_instruments(["EMIT", "MSS"], arps=(0.15,), realisations=2)
     unknown = found[found["share"].isna() & found["alone"].isna()]
     by_name = unknown[unknown["variable"] == "lai"].groupby("instrument")["stage"].agg(set)
     total = {"total", "sub-pixel variation"}
     assert by_name.to_dict() == {
-        "OLI": {"point spread"} | total,
-        "HRV": {"point spread", "registration", "noise"} | total,
+        "EMIT": {"registration"} | total,
+        "MSS": {"point spread", "registration", "noise"} | total,
     }
     numbers = unknown.select_dtypes("number").columns.difference(["arp", "pixel"])
     assert unknown[numbers].isna().all(axis=None) and len(numbers) == 6
@@ -78,15 +81,43 @@ def test_table_of_the_gallery_has_no_number_for_an_unknown_term(make_instruments
         assert tuple(known) == stated, name
 
 
+def test_budget_states_origins_and_no_zero_for_what_is_unknown():
+    """Of MSS, blur, geolocation and noise are unknown; its detector blurs by more than a pixel of 60 m."""
+    found = fifesim.budget(instrument_scenario("MSS"), realisations=1, cells=333, each=iter)
+    unknown = ["point spread", "registration", "noise"]
+    assert found["origin"].sel(stage=unknown).values.tolist() == ["–"] * 3
+    table = budget_table(found).set_index(["variable", "stage"])["share"]["lai"]
+    assert table[["registration", "noise"]].isna().all() and table[["point spread", "quantisation"]].notna().all()
+    known = fifesim.budget(instrument_scenario("TM"), realisations=1, cells=90, each=iter)
+    assert known["origin"].sel(stage="point spread") == "in-flight ± 0.12" and known["share"].notnull().all()
+    parts = (known["share"].sum("stage") + known["curvature"]).values
+    np.testing.assert_allclose(parts, known["total"].values, atol=1e-12)
+    chart = bar_chart(budget_table(found))
+    assert sum(text.get_text() == "unknown" for text in chart.axes[0].texts) == 4
+
+
+def test_range_of_a_trade_study_contains_its_total():
+    """Both ends of the uncertainty of the blur enclose the total."""
+    options = {"realisations": 2, "cells": 120, "each": iter}
+    for name in ("OLI", "TM"):
+        scenario = instrument_scenario(name)
+        total = fifesim.budget(scenario, **options)["total"].sel(variable="lai").mean()
+        low, high = total_range(scenario, **options)["lai"]
+        assert low < float(total) < high and high - low > 0.002
+    assert total_range(instrument_scenario("MSS"), **options) is None
+
+
 def test_a_budget_of_an_instrument_from_the_command_line(tmp_path, monkeypatch):
     from typer.testing import CliRunner
 
     from fifesim.cli import app
 
     monkeypatch.chdir(tmp_path)
-    made = CliRunner().invoke(app, ["budget", "--sensor", "HRV", "-o", "out", "--realisations", "1"])
+    made = CliRunner().invoke(app, ["budget", "--sensor", "MSS", "-o", "out", "--realisations", "1"])
     assert made.exit_code == 0, made.output
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "only the detector of XS2, XS3 is known" in page
+    assert "only the detector of MSS5, MSS7 is known" in page
+    assert "<td>blur –; noise –; geolocation –</td>" in page
+    assert "leaves out what is unknown of the instrument: registration, noise" in page
     both = CliRunner().invoke(app, ["budget", "x.toml", "--sensor", "HRV"])
     assert both.exit_code == 2

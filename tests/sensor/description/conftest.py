@@ -1,11 +1,9 @@
 """Instrument files with one thing changed."""
 
 import pytest
+from paper_file import paper_text
 
-from fifesim.base import files
 from fifesim.sensor.description.instruments import read_instrument
-
-TM_FILE = files.path("instruments/tm.toml")
 
 
 @pytest.fixture
@@ -13,7 +11,7 @@ def changed(tmp_path):
     """Reads the TM file after replacements in its text, each old and new."""
 
     def read(*replacements):
-        text = TM_FILE.read_text(encoding="utf-8")
+        text = paper_text()
         for old, new in zip(replacements[::2], replacements[1::2], strict=True):
             assert old in text
             text = text.replace(old, new, 1)

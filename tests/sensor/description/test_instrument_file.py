@@ -17,12 +17,13 @@ def test_tm_is_table_1():
     assert tm.bits == 8
     assert tm.altitude == 705_000.0
     assert tm.interval == 0.000043
-    assert (tm.lsf.count, tm.lsf.step, tm.lsf.kind) == (9, 0.000004778, "cosine")
+    for lsf in (tm.paper_lsf, instrument("TM", "paper").lsf):
+        assert (lsf.count, lsf.step, lsf.kind) == (9, 0.000004778, "cosine")
 
 
 def test_footprint_of_tm_on_the_ground():
     """By hand: 9 x 4.778 urad x 705 km and 43 urad x 705 km."""
-    tm = instrument("TM")
+    tm = instrument("TM", "paper")
     np.testing.assert_allclose(tm.line_spread.width, 30.31641, rtol=1e-12)
     np.testing.assert_allclose(tm.line_spread.half_width, 15.158205, rtol=1e-12)
     np.testing.assert_allclose(tm.ground_interval, 30.315, rtol=1e-12)

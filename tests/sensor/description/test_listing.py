@@ -12,7 +12,7 @@ from fifesim.sensor.description.spatial_response import knows_blur
 
 def test_thematic_mapper_in_words():
     """Table 1: 43 urad from 705 km; the cosine keeps 0.69 at half a cycle per interval; 205.5 / 255 a count."""
-    text = instrument_in_words(instrument("TM"))
+    text = instrument_in_words(instrument("TM", "paper"))
     lines = text.splitlines()
     assert lines[0] == "TM  Landsat-5 Thematic Mapper"
     assert "  altitude 705 km, 8 bits" in lines and "  whiskbroom, 7.47 degrees to either side, swath 185 km" in text
@@ -27,8 +27,10 @@ def test_thematic_mapper_in_words():
 
 def test_transfer_at_the_nyquist_frequency_is_that_of_each_axis():
     """A detector as wide as half, and as a fourth, of its interval: sinc(1/4) = 0.90 and sinc(1/8) = 0.97."""
-    oli = instrument("OLI")
-    wide = dataclasses.replace(oli, interval=Angles(along=4 * 42.5e-6, across=8 * 42.5e-6), ifov=2 * 42.5e-6)
+    oli = instrument("OLI", "detector")
+    wide = dataclasses.replace(
+        oli, interval=Angles(along=4 * 42.5e-6, across=8 * 42.5e-6), ifov=2 * 42.5e-6, bands=instrument("OLI").bands[:1]
+    )
     text = instrument_in_words(wide)
     assert "own interval 119.850 along x 239.700 across m" in text
     assert "of the own interval 0.90 along x 0.97 across" in text
@@ -59,6 +61,7 @@ def test_what_a_file_does_not_know_it_says_with_who_does(name):
     lacking = {
         "noise": any(band.noise is None for band in described.bands),
         "blur": not all(knows_blur(described, band) for band in described.bands),
+        "geolocation": described.geolocation is None,
     }
     for quantity, lacks in lacking.items():
         assert not lacks or quantity in described.not_found
@@ -68,16 +71,16 @@ def test_what_a_file_does_not_know_it_says_with_who_does(name):
 
 
 def test_a_line_says_which_bands_lack_noise_or_blur_and_who_published_it():
-    oli = instrument("OLI")
-    assert noise_in_words(oli, ["OLI4"]) == "none"
-    said = "none; the noise of OLI6 is unknown, of bands 1 and 6"
-    assert noise_in_words(oli, ["OLI4", "OLI6"]).startswith(said)
-    assert noise_in_words(oli, ["OLI6"], ["thermal", "shot"]) == "thermal, shot"
-    assert blur_in_words(oli, ["OLI4"]).endswith(f"so the image is too sharp, {oli.not_found['blur']}")
+    dove = instrument("SuperDove")
+    assert noise_in_words(instrument("OLI"), ["OLI4"]) == "none"
+    assert noise_in_words(dove, ["PS6", "PS8"]).startswith("none; the noise of PS6, PS8 is unknown, a public list")
+    assert noise_in_words(dove, ["PS6"], ["thermal", "shot"]) == "thermal, shot"
+    assert blur_in_words(dove, ["PS6"]).endswith(f"so the image is too sharp, {dove.not_found['blur']}")
     assert "sharper" not in blur_in_words(instrument("MSI"), ["MSI4"])
     # The cosine of Table 1 passes more than its detector, as wide as the field of view, does.
     said = "0.69; the detector alone has 0.64: the image of TM3 is sharper"
-    assert blur_in_words(instrument("TM"), ["TM3"]).endswith(said)
+    assert blur_in_words(instrument("TM", "paper"), ["TM3"]).endswith(said)
+    assert blur_in_words(instrument("TM"), ["TM3"]).startswith("modulation transfer at the Nyquist frequency 0.28")
     # A file of one's own need not say it.
-    own = dataclasses.replace(oli, not_found={})
-    assert noise_in_words(own, ["OLI6"]).endswith("the noise of OLI6 is unknown")
+    own = dataclasses.replace(dove, not_found={})
+    assert noise_in_words(own, ["PS6"]).endswith("the noise of PS6 is unknown")

@@ -55,7 +55,7 @@ def test_noise_by_its_ratio_and_by_its_radiance_is_the_same():
         np.testing.assert_allclose(
             model.noise_equivalent_radiance([80.0, 20.0]), [0.5, 0.5 * np.sqrt(0.625)], rtol=1e-12
         )
-    constant = Noise(radiance=80.0, snr=160.0).model(1, "rows")
+    constant = Noise(radiance=80.0, snr=160.0, shot=0.0).model(1, "rows")
     assert (constant.shot, constant.thermal) == (0.0, 0.5)
 
 

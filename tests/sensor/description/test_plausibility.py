@@ -80,7 +80,7 @@ def test_sums_of_samples_are_counted_as_what_they_are_made_of(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(text, encoding="utf-8")
     assert read_instrument(path).scan.elementary_samples() == 12608
-    start, end = text.index("[[scan.zones]]"), text.index("[not_found]")
+    start, end = text.index("[[scan.zones]]"), text.index("[origin]")
     path.write_text((text[:start] + text[end:]).replace("0.00015582", "0.00046746"), encoding="utf-8")
     with pytest.raises(ValueError, match=r"6400 x 0.00046746 radians, reach 85.7 degrees.*\[\[scan.zones\]\]"):
         read_instrument(path)

@@ -84,6 +84,35 @@ def test_share_of_shot_noise_stands_beside_the_ratio(tmp_path):
     assert (red.noise.equivalent_radiance, red.noise.shot) == (0.5, 0.75)
 
 
+def test_two_ratios_determine_the_noise_at_every_radiance(tmp_path):
+    second = "snr_radiance = 100.0, high_snr = 350.0, high_snr_radiance = 250.0"
+    camera = read(tmp_path, CAMERA.replace("snr_radiance = 100.0", second))
+    model = camera.noise_model(camera.bands[0])
+    assert model.snr([100.0, 250.0]).tolist() == pytest.approx([200.0, 350.0], rel=1e-12)
+
+
+def test_blur_is_stated_by_the_transfer_at_the_nyquist_frequency(tmp_path):
+    def transfer(camera, number):
+        spreads, steps = camera.line_spreads(camera.bands[number]), camera.ground_intervals(camera.bands[number])
+        return [float(spread.mtf(0.5 / step)) for spread, step in zip(spreads, steps, strict=True)]
+
+    own = 'bits = 12\nmtf_at_nyquist = { along = 0.2, across = 0.3 }\norigin = { blur = { kind = "required" } }'
+    text = CAMERA.replace("bits = 12", own)
+    camera = read(tmp_path, text.replace('name = "nir"', 'name = "nir", mtf_at_nyquist = 0.15'))
+    np.testing.assert_allclose(transfer(camera, 0), [0.2, 0.3], rtol=1e-9)
+    np.testing.assert_allclose(transfer(camera, 1), 0.15, rtol=1e-9)
+    blur, noise, lacking, place = camera.provenance
+    assert (blur.quantity, blur.bands, blur.origin) == ("blur", ("red", "nir"), "required")
+    assert (noise.bands, noise.origin, lacking.bands, lacking.origin) == (("red",), "assumed", ("nir",), "unknown")
+    assert (place.quantity, place.origin) == ("geolocation", "unknown")
+    with pytest.raises(ValueError, match="mtf_at_nyquist and lsf both state the blur"):
+        read(tmp_path, text.replace("bits = 12", 'bits = 12\nlsf = { kind = "boxcar" }'))
+    with pytest.raises(ValueError, match=r"lsf\.across\.mtf_at_nyquist = 1.3: must be below 1"):
+        read(tmp_path, text.replace("0.3", "1.3"))
+    with pytest.raises(ValueError, match=r"origin\.blur\.kind = 'guessed': .*'in-flight', 'pre-launch'"):
+        read(tmp_path, text.replace("required", "guessed"))
+
+
 def test_scenario_sees_through_a_short_file(tmp_path):
     path = tmp_path / "camera.toml"
     path.write_text(CAMERA, encoding="utf-8")

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
+from paper_file import paper_text
 
-from fifesim.base import files
-
-TM_TEXT = files.path("instruments/tm.toml").read_text(encoding="utf-8")
+TM_TEXT = paper_text()
 LSF = TM_TEXT[TM_TEXT.index('kind = "cosine"') : TM_TEXT.index("[scan]")]
 IFOV = ("bits = 8 ", "ifov = 43.0e-6\nbits = 8 ", 'bits = "Friedl1995"', 'bits = "Friedl1995"\nifov = "Friedl1995"')
 

@@ -53,6 +53,13 @@ def test_one_published_ratio_is_met_whatever_the_share_of_shot_noise(share):
     assert float(model.noise_equivalent_radiance(20.0)) ** 2 == pytest.approx(expected, rel=1e-12)
 
 
+def test_one_published_ratio_alone_is_limited_by_shot_noise():
+    model = NoiseModel.from_snr(22.0, 230.0)
+    radiance = np.array([5.5, 22.0, 60.0, 150.0])
+    np.testing.assert_allclose(model.snr(radiance), 230.0 * np.sqrt(radiance / 22.0), rtol=1e-12)
+    assert model.kinds == ("shot",) and float(model.noise_equivalent_radiance(0.0)) == 0.0
+
+
 def test_fixed_pattern_repeats_with_the_detectors():
     """Rows of one detector are the same but for what they see; gains show in bright scenes and offsets in dark."""
     noise = residual(100.0, ["fixed-pattern"])
@@ -123,7 +130,6 @@ def test_nothing_is_noisy_by_default_and_nan_stays():
         (lambda: NoiseModel(-1.0, 0.0), "thermal must not be negative"),
         (lambda: NoiseModel(1.0, 0.0, detectors=0), "detectors"),
         (lambda: NoiseModel(1.0, 0.0, along="lines"), "pushbroom"),
-        (lambda: NoiseModel.from_snr(80.0, 200.0), "give shot_share"),
         (lambda: NoiseModel.from_snr(80.0, 200.0, 40.0), "share of the variance"),
         (lambda: NoiseModel.from_snr([80.0, 20.0], [200.0, 300.0]), "negative variance of thermal"),
         (lambda: NoiseModel.from_snr([20.0, 200.0], [20.0, 300.0]), "negative variance of shot"),

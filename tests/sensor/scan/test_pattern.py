@@ -199,7 +199,21 @@ def test_sums_of_samples_add_their_variances():
 
 
 def test_a_band_of_viirs_sees_what_three_detectors_see_at_nadir():
-    item = instrument("VIIRS")
+    item = instrument("VIIRS", "detector")
     widths = [item.line_spreads(item.bands[0], count).across.half_width * 2 for count in (None, 3, 2, 1)]
     assert widths == pytest.approx([385.19, 385.19, 256.79, 128.4], rel=1e-4)
     assert item.line_spreads(item.bands[0], 1).along.half_width * 2 == pytest.approx(370.96, rel=1e-4)
+
+
+@pytest.mark.parametrize(("name", "sample"), [("I1", 0.35), ("M5", 0.25)])
+def test_blur_of_viirs_is_that_of_one_sample_before_aggregation(name, sample):
+    """Half a cycle per sum of n samples: the sample passes m^(1 / n^2), the sum 1 / (n sin(pi / 2 n))."""
+    item = instrument("VIIRS")
+    (band,) = item.select(name)
+    step = item.ground_intervals(band).across / 3
+    for count in (1, 2, 3):
+        expected = sample ** (1 / count**2) / (count * np.sin(np.pi / (2 * count)))
+        found = float(item.line_spreads(band, count).across.mtf(0.5 / (count * step)))
+        assert found == pytest.approx(expected, rel=1e-6)
+    spread = item.line_spreads(band)
+    assert float(spread.along.mtf(0.5 / item.ground_intervals(band).along)) == pytest.approx(0.42, rel=1e-9)

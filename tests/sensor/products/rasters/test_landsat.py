@@ -206,7 +206,8 @@ def test_a_scene_is_seen_by_another_instrument(folders):
     """Coordinates over the pixels are not in the way of an image on others."""
     folder, _ = folders["OLI", 1]
     scene = fifesim.open_landsat(folder, bands=["OLI4", "OLI5"])
-    image = scene.fifesim.sense("MODIS", onto=fifesim.grid_at("EPSG:32610", 353700.0, 5374200.0, 540.0, 360.0, 90.0))
+    modis = fifesim.instrument("MODIS", response="detector")
+    image = scene.fifesim.sense(modis, onto=fifesim.grid_at("EPSG:32610", 353700.0, 5374200.0, 540.0, 360.0, 90.0))
     assert image.shape == (2, 4, 6) and "quality" not in image.coords
     assert scene.fifesim.aggregate(90.0).shape == (2, 4, 6)
 

@@ -58,7 +58,7 @@ def test_order_of_the_samples_does_not_matter(leaf):
 
 def test_bands_go_on_to_an_image(cube):
     toa = cube.fifesim.to_bands("OLI", bands=["OLI4", "OLI5"]).fifesim.to_toa()
-    image = toa.fifesim.sense("OLI")
+    image = toa.fifesim.sense(fifesim.instrument("OLI", response="detector"))
     assert image.dtype == np.uint16 and np.isfinite(image.fifesim.ndvi()).all()
 
 

@@ -16,7 +16,7 @@ from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.labels import noisy
 from fifesim.sensor.response.noise import NoiseModel, add_noise
 
-TM = instrument("TM")
+TM = instrument("TM", "paper")
 # Figures of a test, of no real instrument.
 SOURCES = TM.sources | {"noise": "Friedl1995", "detectors": "Friedl1995"}
 NOISY = replace(
@@ -87,7 +87,9 @@ def test_a_window_and_a_band_have_the_noise_of_the_whole():
 def test_noise_clips_and_never_wraps():
     scene = uniform((270, 270)).copy()
     scene = scene.copy(data=np.stack([np.full((270, 270), -1.2), np.full((270, 270), 206.0)]))
-    loud = replace(NOISY, bands=tuple(replace(band, noise=Noise(radiance=50.0, snr=4.0)) for band in TM.bands))
+    loud = replace(
+        NOISY, bands=tuple(replace(band, noise=Noise(radiance=50.0, snr=4.0, shot=0.0)) for band in TM.bands)
+    )
     image = fifesim.sense(scene, loud, noise="thermal", seed=1)
     dark, bright = image.sel(band="TM3").values, image.sel(band="TM4").values
     assert dark.min() == 1 and (dark == 1).mean() == pytest.approx(0.5, abs=0.1) and dark.max() < 100
@@ -115,7 +117,7 @@ def test_noise_that_is_not_described_is_refused():
 
 
 def test_each_requested_kind_must_exist_in_every_band():
-    """L4TM states one ratio without a share of shot noise; the other verbs refuse it as `sense` does."""
+    """The noise of L4TM is the same at any radiance; the other verbs refuse shot noise as `sense` does."""
     lai = fifesim.lai_scene(fifesim.fife_site(cell=10, window=((0, 60), (0, 60))), "burned-grazed", seed=7)
     said = "L4TM has no shot noise for TM3, only thermal; type noise='all'"
     with pytest.raises(ValueError, match=said):

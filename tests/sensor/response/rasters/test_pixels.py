@@ -20,7 +20,7 @@ from fifesim.sensor.description.spatial_response import (
 )
 from fifesim.sensor.pixel_labels import bands_by_grid, pixel_grid
 
-TM = instrument("TM")
+TM = instrument("TM", "paper")
 INTERVAL = 43e-6 * 705e3
 
 
@@ -143,7 +143,7 @@ def test_radiance_becomes_reflectance():
     radiance = sensed(scene())
     reflectance = fifesim.to_reflectance(radiance)
     assert reflectance.attrs["units"] == "1"
-    np.testing.assert_allclose(fifesim.to_reflectance(fifesim.sense(scene(), "TM")), reflectance, atol=0.003)
+    np.testing.assert_allclose(fifesim.to_reflectance(fifesim.sense(scene(), TM)), reflectance, atol=0.003)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from fifesim.sensor.description.spatial_response import BoxcarResponse
 from fifesim.sensor.response.scan import growth, place_beside, view_from_ground
 from fifesim.sensor.scan_labels import latitude_longitude
 
-TM = instrument("TM")
+TM = instrument("TM", "paper")
 VIEW = {"nadir_offset": -36e3, "heading": 193.6, "view_tolerance": 180}
 
 
