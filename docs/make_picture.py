@@ -11,7 +11,7 @@ from PIL import Image
 import fifesim
 from fifesim.output.maps import image_map, stretch_of
 
-# Of the ground of the default run: what is shown, and within it the part that is shown larger. [m]
+# Extent of the picture on the ground of the default run, and the enlarged part. [m]
 WEST, NORTH, WIDTH, HEIGHT = 706500.0, 4331220.0, 12000.0, 8100.0
 LEFT, TOP, SIDE = 9780.0, 5700.0, 480.0
 
@@ -35,7 +35,7 @@ def run():
 
 
 def _part(raster):
-    """What is shown larger."""
+    """Enlarged part."""
     size = abs(float(raster["x"][1] - raster["x"][0]))
     starts = {"y": TOP, "x": LEFT}
     return raster.isel(

@@ -1,4 +1,4 @@
-"""Methods of retrieval on arrays of pixels: how each is fitted to training pixels, and how it estimates."""
+"""Methods of retrieval on arrays of pixels: fit to training pixels, and estimates."""
 
 from typing import NamedTuple
 
@@ -158,7 +158,7 @@ def by_quantiles(tables, reflectance, angles, levels):
     wanted = probabilities_of(levels)
     outputs = network(inputs, layers).reshape(len(inputs), -1, len(wanted))
     quantiles = np.sort(outputs, axis=-1) * tables["scale"][:, None] + tables["centre"][:, None]
-    # Standard deviation of a normal distribution with the interval nearest to its own.
+    # Standard deviation of a normal distribution with the interval whose level is nearest to 68 %.
     at = int(np.argmin(np.abs(np.asarray(levels) - 0.68)))
     level = sorted(levels, reverse=True).index(levels[at])
     width = quantiles[..., len(wanted) - 1 - level] - quantiles[..., level]
@@ -179,7 +179,7 @@ def stretch_factors(estimates, truth, landscape, levels):
     Parameters
     ----------
     estimates : Estimates
-        Of pixels that were not used to fit the method.
+        Estimates of pixels that were not used to fit the method.
     truth : array, shape (n, quantities)
     landscape : array, shape (n,)
         Every landscape has the same weight.
