@@ -414,7 +414,8 @@ BANDS = [
     refused("nameless bands", 'toa.drop_vars(["band", "wavelength"]).fifesim.ndvi()', "wavelength", "'red', 'nir'"),
     refused(
         "exchanged wavelengths",
-        'toa.assign_coords(wavelength=("band", [0.838, 0.661])).fifesim.sense(fifesim.instrument("TM", "paper")).fifesim.ndvi()',
+        'paper = fifesim.instrument("TM", "paper")\n'
+        'toa.assign_coords(wavelength=("band", [0.838, 0.661])).fifesim.sense(paper).fifesim.ndvi()',
         "TM3",
     ),
     refused("wavelengths of other bands", 'rho.assign_coords(wavelength=("band", [0.83, 0.66])).fifesim.to_toa()',
