@@ -63,7 +63,9 @@ def run(case):
         ndvi=ndvi,
         truth=truth,
         fit=fifesim.regress(truth, ndvi),
-        shares=xr.concat([budget["share"], curvature], "stage", coords="minimal"),
+        shares=xr.concat(
+            [budget["share"].drop_vars("origin"), curvature], "stage", coords="minimal"
+        ),
         total=float(budget["total"]),
     )
 

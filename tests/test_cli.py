@@ -159,7 +159,7 @@ def test_sensors_check_says_what_a_file_is(invoke, tmp_path):
     (tmp_path / "mine.toml").write_text(text.replace('"AVHRR"', '"MINE"', 1), encoding="utf-8")
     result = invoke("sensors", "--check", "mine.toml")
     assert result.exit_code == 0, result.output
-    assert "own interval 1089.564 along x 791.350 across m" in result.stdout
+    assert "own interval 1124.880 along x 817.000 across m" in result.stdout
     assert "mine.toml is valid" in result.stdout
 
 

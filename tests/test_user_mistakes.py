@@ -414,7 +414,8 @@ BANDS = [
     refused("nameless bands", 'toa.drop_vars(["band", "wavelength"]).fifesim.ndvi()', "wavelength", "'red', 'nir'"),
     refused(
         "exchanged wavelengths",
-        'toa.assign_coords(wavelength=("band", [0.838, 0.661])).fifesim.sense("TM").fifesim.ndvi()',
+        'paper = fifesim.instrument("TM", "paper")\n'
+        'toa.assign_coords(wavelength=("band", [0.838, 0.661])).fifesim.sense(paper).fifesim.ndvi()',
         "TM3",
     ),
     refused("wavelengths of other bands", 'rho.assign_coords(wavelength=("band", [0.83, 0.66])).fifesim.to_toa()',
@@ -952,7 +953,7 @@ def shared():
         lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7)
         rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
         toa = rho.fifesim.to_toa()
-        image = toa.fifesim.sense("TM")
+        image = toa.fifesim.sense(fifesim.instrument("TM", response="paper"))
         ndvi, truth = image.fifesim.ndvi(), lai.fifesim.aggregate(30)
         _SHARED.update(grid=grid, lai=lai, dem=fifesim.flint_hills(grid, seed=7), rho=rho, toa=toa, image=image)
         _SHARED.update(ndvi=ndvi, truth=truth, fit=fifesim.regress(truth, ndvi))

@@ -110,7 +110,8 @@ for rank, (name, row) in enumerate(middle.iterrows(), 1):
 
 # %%
 # The smallest and largest share of each term are listed below. **Registration** has the largest share wherever a
-# geolocation error is published, because the ground varies over short distances. **Noise and quantisation** matter if
+# geolocation error is published, because the ground varies over short distances. PRISMA is displaced by three pixels,
+# the error that is required without control points, and AVHRR by one. **Noise and quantisation** matter if
 # pixels have little variance: instruments with 6 bits, 1 km pixels with 10 bits, and the finest bands of MODIS. A
 # **uniform atmosphere** has little effect on R², because it mainly changes slope and intercept.
 
