@@ -92,8 +92,7 @@ def test_statements_of_the_page_on_the_table(why):
     assert causes.loc["variation of LAI within pixels"].abs().max() < 1
     assert causes.loc[["terrain", "atmosphere"]].abs().max().max() < 2
     assert found.loc["total"].idxmin() == "MODIS"
-    part = found.loc["sub-pixel variation"] / found.loc["total"]
-    assert part.abs().max() < 0.06
+    assert found.loc["sub-pixel variation"].abs().max() < 1.4
     assert causes.loc["correlation of LAI with soil and terrain", ["TM", "MSI"]].max() < -3
 
 
