@@ -116,6 +116,7 @@ from .retrieval.description import read_retrieval as read_retrieval
 from .output.pictures import plot as plot  # method
 from .output.maps import rgb as rgb  # method
 from .output.pictures import plot_fit as plot_fit
+from .output.pictures import plot_score as plot_score
 from .output.pictures import plot_comparison as plot_comparison  # method of a DataTree
 
 # Images of one's own

@@ -88,7 +88,7 @@ def analysis(lai: xr.DataArray, rho: xr.DataArray, dn: xr.DataArray) -> float:
     fit = fifesim.regress(truth, ndvi, pair="coordinates")
     low, high = fit.prediction_interval([0.5, 0.6])
     estimate = fifesim.invert(ndvi, fit, "lai")
-    print(low[0], high[-1], fit.predict(0.5), estimate["lai"], fifesim.inversion_error(estimate, truth)["rmse"])
+    print(low[0], high[-1], fit.predict(0.5), estimate["lai"], fifesim.score(estimate, truth)["rmse"])
     print(fifesim.relative_equivalent_noise(truth, ndvi, min_count=2), fifesim.share_kept(truth, lai))
     print(fifesim.scale_bias(fifesim.ndvi, rho)["bias"].mean(), fifesim.ndvi_bias(rho).mean())
     print(fifesim.regularized_variance(lai, 30, fifesim.instrument("TM", response="paper").line_spread))

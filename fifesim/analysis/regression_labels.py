@@ -13,6 +13,7 @@ import xarray as xr
 from fifesim.analysis import regression
 from fifesim.analysis.regression import Regression, totals
 from fifesim.base.annotations import Pairing
+from fifesim.base.messages import warn
 from fifesim.grids import cf, chunks, swaths
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import with_crs_of
@@ -347,6 +348,8 @@ def inversion_error(estimate: RasterOrDataset, truth: xr.DataArray, *, pair: Pai
     """
     Error of an estimated map against the truth; computes.
 
+    Deprecated: use `fifesim.score`, which also has standard errors and groups. It will be removed in the next release.
+
     Parameters
     ----------
     estimate : xarray.Dataset or xarray.DataArray, dims (y, x)
@@ -366,6 +369,10 @@ def inversion_error(estimate: RasterOrDataset, truth: xr.DataArray, *, pair: Pai
     ValueError
         If the rasters do not match, no pixel has both values, or a Dataset is not a result of `invert`.
 
+    See Also
+    --------
+    fifesim.score
+
     Examples
     --------
     >>> import fifesim
@@ -379,6 +386,7 @@ def inversion_error(estimate: RasterOrDataset, truth: xr.DataArray, *, pair: Pai
     >>> abs(round(float(error.bias), 6)), round(float(error.coverage), 2)
     (0.0, 0.94)
     """
+    warn("inversion_error is deprecated and will be removed: use fifesim.score(estimate, truth)", FutureWarning)
     value, low, high = [estimate] * 3 if isinstance(estimate, xr.DataArray) else _map_and_limits(estimate)
     check_same_quantity(value, truth, ("estimate", "truth"))
     value, true = matched(value, truth, pair)

@@ -89,12 +89,12 @@ def in_own_words(error):
 _PACKAGE = str(Path(__file__).parents[1])
 
 
-def warn(message):
-    """Warn that a result may be wrong, at the first line outside of the package."""
+def warn(message, category=UserWarning):
+    """Warn that a result may be wrong or a function will go, at the first line outside of the package."""
     frame, level = sys._getframe(1), 2
     while frame.f_back and frame.f_code.co_filename.startswith(_PACKAGE):
         frame, level = frame.f_back, level + 1
-    warnings.warn(message, stacklevel=level)
+    warnings.warn(message, category, stacklevel=level)
 
 
 LOG = logging.getLogger("fifesim")

@@ -191,6 +191,76 @@ def plot_fit(
     return axes
 
 
+def plot_score(scores: xr.Dataset) -> Figure:
+    """
+    Plot how well intervals and distributions of an estimate agree with the truth.
+
+    Parameters
+    ----------
+    scores : xarray.Dataset
+        From `fifesim.score`, of an estimate with intervals, a standard deviation or members. Groups are drawn one by
+        one.
+
+    Returns
+    -------
+    figure : matplotlib.figure.Figure
+        Coverage by the level of the intervals, with error bars of two standard errors where they are known; and the
+        density of the probability integral transform, which is 1 for a calibrated estimate.
+
+    Raises
+    ------
+    ValueError
+        If the scores have neither ``coverage`` nor ``pit``, or several dimensions of groups.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> import numpy as np
+    >>> import xarray as xr
+    >>> rng = np.random.default_rng(1)
+    >>> truth = xr.DataArray(rng.normal(2, 1, (20, 500)), dims=("landscape", "pixel"), name="lai")
+    >>> guess = truth + rng.normal(0, 0.3, truth.shape)
+    >>> figure = fifesim.plot_score(fifesim.score(xr.Dataset({"lai": guess, "sd": 0.3 + 0 * guess}), truth))
+    >>> figure.axes[0].get_xlabel()
+    'Probability of a value below the truth'
+    """
+    shown = [name for name in ("coverage", "pit") if name in scores.data_vars]
+    if not shown:
+        raise ValueError("scores have neither coverage nor pit: give the estimate intervals or a standard deviation")
+    groups = [str(dim) for dim in scores[shown[0]].dims if dim not in ("level", "pit_bin")]
+    if len(groups) > 1:
+        raise ValueError(f"scores have groups along {', '.join(groups)}: select one of each but one")
+    rows = [("", scores)]
+    if groups:
+        labels = scores[groups[0]].values
+        rows = [(f"{groups[0]} {label}", scores.isel({groups[0]: at})) for at, label in enumerate(labels)]
+    figure, panels = plt.subplots(1, len(shown), figsize=(4.4 * len(shown), 4.0), layout="constrained", squeeze=False)
+    for axes, name in zip(panels[0], shown, strict=True):
+        (_draw_coverage if name == "coverage" else _draw_pit)(axes, rows)
+    if groups:
+        panels[0, 0].legend(frameon=False, fontsize="small")
+    return figure
+
+
+def _draw_coverage(axes, rows):
+    """Coverage by level, with the line of a calibrated estimate."""
+    axes.plot([0, 1], [0, 1], color="0.6", linewidth=1)
+    for label, scores in rows:
+        level, coverage, error = (np.atleast_1d(scores[name]) for name in ("level", "coverage", "coverage_se"))
+        axes.errorbar(level, coverage, 2 * np.nan_to_num(error), marker="o", capsize=2, label=label)
+    axes.set(xlim=(0, 1), ylim=(0, 1), aspect="equal")
+    axes.set(xlabel="Level of the interval", ylabel="Fraction of true values inside")
+
+
+def _draw_pit(axes, rows):
+    """Density of the probability integral transform."""
+    axes.axhline(1, color="0.6", linewidth=1)
+    for label, scores in rows:
+        axes.stairs(scores["pit"].values, np.linspace(0, 1, scores.sizes["pit_bin"] + 1), label=label)
+    axes.set(xlim=(0, 1), ylim=(0, None))
+    axes.set(xlabel="Probability of a value below the truth", ylabel="Density")
+
+
 def plot_comparison(images: xr.DataTree, *, limits: tuple[float, float] | None = None) -> Figure:
     """
     Plot the NDVI of a scene from several instruments side by side, on one colour scale.

@@ -232,6 +232,7 @@ def calls(tmp_path_factory):
         "relative_equivalent_noise": {"variable": lai, "ndvi": ndvi, "increment": 0.1, "slope": None, "min_count": 3,
                                       "pair": "coordinates"},
         "invert": {"ndvi": ndvi, "fit": fifesim.regress(lai, ndvi), "quantity": "lai", "level": 0.95},
+        "plot_score": {"scores": fifesim.score(fifesim.invert(ndvi, fit), lai)},
         "inversion_error": {"estimate": lai, "truth": lai, "pair": "coordinates"},
         "train": {"source": chips, "method": "line", "bands": ["TM3", "TM4"], "quantities": ["lai"], "level": "toa",
                   "levels": [0.5], "seed": 0},

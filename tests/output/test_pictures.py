@@ -181,3 +181,44 @@ def test_instruments_stand_side_by_side_in_the_same_colours(lai):
     assert f"mean {mean:.3f}" in panels[1].get_title() and "30 m" in panels[1].get_title()
     with pytest.raises(ValueError, match="no image has a red and a near infrared band"):
         xr.DataTree.from_dict({"/TM": images["TM/dn"].isel(band=[0]).to_dataset()}).fifesim.plot_comparison()
+
+
+def scores_of(spread, seed=3):
+    """Scores of estimates whose intervals are too narrow by a factor, by two classes."""
+    rng = np.random.default_rng(seed)
+    truth = xr.DataArray(rng.normal(size=(8, 400)), dims=("landscape", "pixel"), name="lai")
+    guess = truth + rng.normal(0, 0.5, truth.shape)
+    level = xr.DataArray([0.5, 0.9], dims="level")
+    half = spread * 0.5 * xr.DataArray([0.674, 1.645], dims="level")
+    estimate = {"lai": guess, "lai_low": guess - half, "lai_high": guess + half, "lai_sd": 0 * guess + spread * 0.5}
+    classes = xr.DataArray(np.arange(400) % 2, dims="pixel", name="cover")
+    return fifesim.score(xr.Dataset(estimate, {"level": level}), truth, by=classes)
+
+
+def test_scores_are_drawn_with_their_errors_and_groups():
+    scores = scores_of(0.5)
+    figure = fifesim.plot_score(scores)
+    coverage, pit = figure.axes
+    drawn = [container[0] for container in coverage.containers]
+    assert len(drawn) == 2
+    for at, line in enumerate(drawn):
+        assert np.array_equal(line.get_xdata(), [0.5, 0.9])
+        assert np.array_equal(line.get_ydata(), scores.coverage.isel(cover=at))
+    bars = coverage.containers[0][2][0].get_segments()
+    lengths = [bar[1, 1] - bar[0, 1] for bar in bars]
+    assert lengths == pytest.approx(4 * scores.coverage_se.isel(cover=0).values)
+    assert [patch.get_data().values.tolist() for patch in pit.patches] == scores.pit.values.tolist()
+    assert [text.get_text() for text in coverage.get_legend().get_texts()] == ["cover 0", "cover 1"]
+    # Intervals that are too narrow lie below the line of a calibrated estimate.
+    assert (scores.coverage < scores.level).all()
+
+
+def test_scores_without_an_uncertainty_are_refused():
+    with pytest.raises(ValueError, match="neither coverage nor pit"):
+        fifesim.plot_score(scores_of(1.0)[["rmse"]])
+
+
+def test_scores_of_several_groupings_are_refused():
+    scores = xr.concat([scores_of(1.0), scores_of(1.0)], "product")
+    with pytest.raises(ValueError, match="select one"):
+        fifesim.plot_score(scores)

@@ -9,6 +9,8 @@ from lazy import ODD_CHUNKS, in_chunks
 
 import fifesim
 
+pytestmark = pytest.mark.filterwarnings("ignore:inversion_error is deprecated:FutureWarning")
+
 
 def test_inversion_holds_its_share_and_has_the_residual_as_error(scattered):
     """On the pixels that it was fitted to: no bias, and the residual deviation but for n - 2; 95 % within 4 errors."""
