@@ -61,7 +61,7 @@ def retrieve(image: xr.DataArray, retrieval: RetrievalLike, intervals: Sequence[
 
     Returns
     -------
-    estimates : xarray.Dataset, dims (y, x)
+    estimates : xarray.Dataset of float32, dims (y, x)
         For each quantity, such as ``lai``: its median, the standard deviation ``lai_sd``, and the ends ``lai_low`` and
         ``lai_high`` of intervals, with a first dimension ``level``. ``flag`` has the bits 1, outside of the training
         inputs, 2, at the edge of the prior, and 4, no convergence, as described by its CF attributes; use pixels with
@@ -105,15 +105,16 @@ def retrieve(image: xr.DataArray, retrieval: RetrievalLike, intervals: Sequence[
     places = [retrieval.levels.index(level) for level in levels]
     count, kinds = len(levels), len(retrieval.quantities)
     kernel = partial(_estimates, retrieval=retrieval, places=places)
-    found = chunks.pointwise(kernel, light, *angles, bands=kinds * (2 + 2 * count) + 1)
-    layers = iter(range(found.sizes["band"]))
+    layers = kinds * (2 + 2 * count) + 1
+    found = chunks.pointwise(kernel, light, *angles, bands=layers, dtype=np.float32)
+    numbers = iter(range(layers))
     history = f"retrieve: {retrieval.method} of {', '.join(retrieval.bands)}; prior: {retrieval.prior}"
     out = {}
     for name in retrieval.quantities:
-        out[name] = _layer(found, next(layers), image, name, history)
-        out[f"{name}_sd"] = _layer(found, next(layers), image, name, history, "standard deviation")
+        out[name] = _layer(found, next(numbers), image, name, history)
+        out[f"{name}_sd"] = _layer(found, next(numbers), image, name, history, "standard deviation")
         for end in ("low", "high"):
-            parts = [_layer(found, next(layers), image, name, history, f"{end} end of the interval") for _ in levels]
+            parts = [_layer(found, next(numbers), image, name, history, f"{end} end of the interval") for _ in levels]
             whole = xr.concat(parts, xr.DataArray(list(levels), dims="level", name="level"), combine_attrs="override")
             out[f"{name}_{end}"] = whole
         out[name].attrs["ancillary_variables"] = f"{name}_sd flag"
@@ -197,23 +198,35 @@ def _check_angles(angles, retrieval):
 _NADIR = 0.5
 
 
-def _angles_of(light, sza, saa, vza, vaa):
-    """Zenith angles and relative azimuth of the pixels of a block, shape (n, 3). [degree]"""
-    shape = light.shape[:-1]
-    sza, saa, vza, vaa = (np.broadcast_to(each, shape).ravel() for each in (sza, saa, vza, vaa))
-    return np.stack([sza, vza, np.where(vza < _NADIR, 0.0, azimuth_difference(saa, vaa))], axis=1)
+# Pixels that are estimated at once, so that hidden layers and likelihoods stay small.
+_BATCH = 2**16
 
 
-def _estimates(light, sza, saa, vza, vaa, *, retrieval, places):
+def _in_batches(function, layers, light, *angles):
+    """Layers of a block from a function of reflectance, shape (n, bands), and angles, shape (n, 3), in degrees."""
+    shape, spectra = light.shape[:-1], light.reshape(-1, light.shape[-1])
+    flat = [each if np.ndim(each) == 0 else np.broadcast_to(each, shape).reshape(-1) for each in angles]
+    out = np.empty((layers, len(spectra)), np.float32)
+    for start in range(0, len(spectra), _BATCH):
+        part = slice(start, start + _BATCH)
+        own = spectra[part].astype(float)
+        sza, saa, vza, vaa = (np.broadcast_to(each if np.ndim(each) == 0 else each[part], len(own)) for each in flat)
+        azimuth = np.where(vza < _NADIR, 0.0, azimuth_difference(saa, vaa))
+        out[:, part] = function(own, np.stack([sza, vza, azimuth], axis=1))
+    return out.reshape(layers, *shape)
+
+
+def _estimates(light, *angles, retrieval, places):
     """Layers of a block in the order of `retrieve`, and the flag as the last one; NaN for no data."""
-    angles = _angles_of(light, sza, saa, vza, vaa)
-    found = retrieval.estimate(light.reshape(-1, light.shape[-1]).astype(float), angles)
-    layers = []
-    for kind in range(len(retrieval.quantities)):
-        layers += [found.median[:, kind], found.sd[:, kind]]
-        layers += [end[:, kind, place] for end in (found.low, found.high) for place in places]
-    layers.append(np.where(np.isnan(found.median[:, 0]), np.nan, found.flag))
-    return np.stack(layers).reshape(len(layers), *light.shape[:-1])
+
+    def layers_of(spectra, directions):
+        found, layers = retrieval.estimate(spectra, directions), []
+        for kind in range(len(retrieval.quantities)):
+            layers += [found.median[:, kind], found.sd[:, kind]]
+            layers += [end[:, kind, place] for end in (found.low, found.high) for place in places]
+        return [*layers, np.where(np.isnan(found.median[:, 0]), np.nan, found.flag)]
+
+    return _in_batches(layers_of, len(retrieval.quantities) * (2 + 2 * len(places)) + 1, light, *angles)
 
 
 def _layer(found, at, image, name, history, what=""):
@@ -243,16 +256,19 @@ def _by_sl2p(image):
     """LAI, FPAR and cover of Sentinel-2 surface reflectance by ESA's networks."""
     _check_level(image, "surface")
     light = _selected(image, _SL2P_BANDS, None, "MSI")
-    found = chunks.pointwise(_sl2p_layers, light, *(_angle(image, name) for name in _ANGLES), bands=len(_SL2P) + 1)
+    angles = [_angle(image, name) for name in _ANGLES]
+    found = chunks.pointwise(_sl2p_layers, light, *angles, bands=len(_SL2P) + 1, dtype=np.float32)
     history = "retrieve: SL2P, ATBD 2.1"
     out = {name: _layer(found, at, image, name, history) for at, name in enumerate(_SL2P)}
     return xr.Dataset(out | {"flag": _flag(found.isel(band=-1), image, history)})
 
 
-def _sl2p_layers(light, sza, saa, vza, vaa):
+def _sl2p_layers(light, *angles):
     """LAI, FPAR, cover and flag of a block."""
-    angles = _angles_of(light, sza, saa, vza, vaa)
-    spectra, (cos_sza, cos_vza, cos_raa) = light.reshape(-1, light.shape[-1]), np.cos(np.radians(angles)).T
-    values, outside = zip(*(sl2p(spectra, cos_vza, cos_sza, cos_raa, name) for name in _SL2P.values()), strict=True)
-    flag = np.where(np.isnan(values[0]), np.nan, OUTSIDE * np.any(outside, axis=0))
-    return np.stack([*values, flag]).reshape(len(values) + 1, *light.shape[:-1])
+
+    def layers_of(spectra, directions):
+        cos_sza, cos_vza, cos_raa = np.cos(np.radians(directions)).T
+        values, outside = zip(*(sl2p(spectra, cos_vza, cos_sza, cos_raa, name) for name in _SL2P.values()), strict=True)
+        return [*values, np.where(np.isnan(values[0]), np.nan, OUTSIDE * np.any(outside, axis=0))]
+
+    return _in_batches(layers_of, len(_SL2P) + 1, light, *angles)

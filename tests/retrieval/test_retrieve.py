@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.retrieval import methods, training
+from fifesim.retrieval import labels, methods, training
 from fifesim.retrieval.description import Retrieval
 from tests.lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 
@@ -227,3 +227,12 @@ def test_a_retrieval_is_a_public_description(chips):
     retrieval = fifesim.train(chips, "line")
     assert isinstance(retrieval, Retrieval)
     assert "lai mean" in retrieval.prior and "12 landscapes" in retrieval.prior
+
+
+def test_batches_do_not_change_the_estimates(chips, image, monkeypatch):
+    retrieval = fifesim.train(chips, "quantiles")
+    light = image["image"]["dn"].fifesim.to_reflectance().compute()
+    whole = light.fifesim.retrieve(retrieval)
+    monkeypatch.setattr(labels, "_BATCH", 100)
+    for name, values in light.fifesim.retrieve(retrieval).data_vars.items():
+        assert np.allclose(values, whole[name], rtol=1e-6, atol=1e-6, equal_nan=True), name
