@@ -135,6 +135,9 @@ _BLOCK = 512
 # Blocks of several bands are written together up to this size. [byte]
 _AT_ONCE = 16 * 2**20
 
+# Coordinates that each band of an image has.
+_OF_A_BAND = ("wavelength", "gain", "offset", "compression", "solar_irradiance", "adjustment_error", "contrast_left")
+
 _TILED = {"driver": "GTiff", "tiled": True, "blockxsize": _BLOCK, "blockysize": _BLOCK, "bigtiff": "if_safer"}
 # Noisy data compress little. The lowest level of zlib takes 60 % of the time, and files are 2 % (floats) or 5 %
 # (digital numbers) larger.
@@ -154,8 +157,8 @@ def to_geotiff(
     Parameters
     ----------
     raster : xarray.DataArray, dims ([band], y, x), or xarray.Dataset of variables over (y, x)
-        The variables of a dataset become bands; intervals by ``level`` become one band for each level, such as
-        ``lai_low_95``.
+        One selected band of an image is written with a dimension ``band``. The variables of a dataset become bands;
+        intervals by ``level`` become one band for each level, such as ``lai_low_95``.
     path : str or path
     overwrite : bool, optional
         Replace an existing file.
@@ -173,7 +176,7 @@ def to_geotiff(
     FileExistsError
         If the file exists and ``overwrite`` is False.
     OSError
-        If the file cannot be written.
+        If the path is a folder, or the file cannot be written.
 
     Notes
     -----
@@ -195,10 +198,17 @@ def to_geotiff(
     (90, 90)
     """
     path = Path(path)
+    if path.is_dir():
+        raise IsADirectoryError(f"{in_a_line(path, 150)} is a folder: give the name of a file, such as image.tif")
     if path.exists() and not overwrite:
         raise FileExistsError(
             f"there is a file {in_a_line(path, 150)}: type overwrite=True to replace it, or another name"
         )
+    if isinstance(raster, xr.DataArray) and "band" in raster.coords and "band" not in raster.dims:
+        # One band of an image keeps its calibration and wavelength along the dimension.
+        raster = raster.expand_dims("band")
+        own = [name for name in _OF_A_BAND if name in raster.coords]
+        raster = raster.assign_coords({name: raster.coords[name].expand_dims("band") for name in own})
     array = _stacked(raster) if isinstance(raster, xr.Dataset) else raster
     if "line" in array.dims:
         raise ValueError("a GeoTIFF needs a map, got dimensions line and sample: map the scan with .grid_swath(grid)")

@@ -311,3 +311,18 @@ def test_what_gdal_kept_of_a_replaced_file_goes_with_it(image, tmp_path):
     fifesim.to_geotiff(image, path, overwrite=True)
     with rasterio.open(path) as source:
         assert source.descriptions[0] == str(image["band"].values[0])
+
+
+def test_one_selected_band_keeps_its_calibration(image, tmp_path):
+    name = str(image["band"].values[1])
+    one = image.sel(band=name)
+    again = fifesim.open_image(one.fifesim.to_geotiff(tmp_path / "one.tif"))
+    assert again.sizes["band"] == 1 and again["band"].item() == name
+    assert again.identical(image.sel(band=[name]))
+    assert np.array_equal(again.fifesim.to_radiance()[0], image.fifesim.to_radiance()[1], equal_nan=True)
+
+
+def test_a_folder_is_no_file_to_write(image, tmp_path):
+    for overwrite in (False, True):
+        with pytest.raises(IsADirectoryError, match="is a folder: give the name of a file"):
+            image.fifesim.to_geotiff(tmp_path, overwrite=overwrite)
