@@ -20,6 +20,9 @@ _DASHES = ("-", "--", ":")
 _BLACK, _GREY = "#222222", "#767676"
 _DOT = {"s": 9, "linewidths": 0, "alpha": 0.75}
 
+# Marker and colour of the first and of the second reading.
+_OF_READINGS = (("o", "#0072B2"), ("x", "#D55E00"))
+
 _LABELS = {"lai": "LAI [m² m⁻²]", "fpar": "FPAR", "ndvi": "NDVI"}
 _FIGURE_WIDTH = 7.2
 
@@ -83,6 +86,31 @@ def plot_reproduction(number: int, found: Reproduced, *, reading: str | None = N
     if reading not in names:
         raise ValueError(f"reading must be one of {', '.join(names)}, which were computed, got {reading!r}")
     return _DRAWN[number](found, reading)
+
+
+def table2_figure(tables):
+    """Figure of Table 2 by reading, compared with the published values."""
+    first = next(iter(tables.values()))
+    figure = Figure(figsize=(_FIGURE_WIDTH, 5.2), layout="constrained")
+    axes = figure.subplots(2, 3, sharey=True)
+    scenes = first[first["variable"] == "lai"]
+    labels = [f"{row.distribution.replace('-', ', ')}, {row.arp:g}" for row in scenes.itertuples()]
+    for line, variable in zip(axes, VARIABLES, strict=True):
+        for axis, name in zip(line, friedl1995_table.COEFFICIENTS, strict=True):
+            for (reading, table), (marker, color) in zip(tables.items(), _OF_READINGS, strict=True):
+                rows = table[table["variable"] == variable]
+                spread = rows[f"{name}_deviation"].fillna(0)
+                axis.errorbar(rows[name], range(len(rows)), xerr=spread, fmt=marker, color=color, ms=4, label=reading)
+            paper = first[first["variable"] == variable][f"paper_{name}"]
+            axis.plot(paper, range(len(paper)), "s", color=_BLACK, mfc="none", ms=7, label="paper")
+            axis.set_title(f"{variable.upper()}: {'R²' if name == 'r2' else name}", fontsize="medium")
+            axis.grid(axis="y", color="0.92")
+            axis.spines[["top", "right"]].set_visible(False)
+    axes[0, 0].invert_yaxis()
+    for axis in axes[:, 0]:
+        axis.set_yticks(range(len(labels)), labels, fontsize=8)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    return figure
 
 
 def sample(found, reading, arp):

@@ -10,7 +10,7 @@ from fifesim.experiments.friedl1995 import effects as table_effects
 from fifesim.experiments.friedl1995 import figures, reproduction
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import ALIGNED, ARPS, NATIVE, PASSAGES, READINGS, TABLE_1, beside
-from fifesim.experiments.friedl1995.figures import caption_numbers
+from fifesim.experiments.friedl1995.figures import caption_numbers, table2_figure
 from fifesim.experiments.friedl1995.reproduction import REALISATIONS, SEED, reproduce_case
 from fifesim.ground.landscape.distribution import treatments
 from fifesim.output import report
@@ -45,7 +45,8 @@ def reproduction_page(case, found, effects, figures, run):
         limits=table_effects.limits(*tables.values()), origins=table_effects.number_sources(case),
         fitted=table_effects.fitted_count(case),
         agreements={name: friedl1995_table.agreement(table) for name, table in tables.items()},
-        figures=figures, own_densities=case.own_densities, cell=found.attrs["cell"],
+        table2=report.png(table2_figure(tables), _DPI), figures=figures,
+        own_densities=case.own_densities, cell=found.attrs["cell"],
         captions={name: caption_numbers(found, name) for name in (shown, beside)},
         **conclusions(effects),
     )  # fmt: skip

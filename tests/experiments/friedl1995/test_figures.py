@@ -1,12 +1,14 @@
 """Figures 3 to 9."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 import fifesim
 from fifesim.analysis import scaling
-from fifesim.experiments.friedl1995 import figures
+from fifesim.experiments.friedl1995 import figures, table
 
 
 @pytest.mark.parametrize("number", figures.FIGURE_NUMBERS)
@@ -80,3 +82,19 @@ def test_figure_that_there_is_not_is_refused(small, number, options, said):
 def test_what_reproduce_did_not_give_is_refused(small):
     with pytest.raises(TypeError, match=r"found must be an xarray\.Dataset, as fifesim\.reproduce gives it"):
         fifesim.plot_reproduction(5, small[["slope"]])
+
+
+def test_figure_of_table_2_shows_the_numbers_of_the_table(found):
+    tables = {str(name): table.table2(found.sel(reading=name)) for name in found["reading"].values}
+    axes = figures.table2_figure(tables).axes
+    assert [axis.get_title() for axis in axes] == [
+        f"{variable}: {name}" for variable in ("LAI", "FPAR") for name in ("intercept", "slope", "R²")
+    ]
+    for axis, (variable, name) in zip(axes, product(("lai", "fpar"), ("intercept", "slope", "r2")), strict=True):
+        lines = {line.get_label(): line for line in axis.lines}
+        drawn = [container[0].get_xdata() for container in axis.containers]
+        for values, rows in zip(drawn, tables.values(), strict=True):
+            assert np.array_equal(values, rows.loc[rows["variable"] == variable, name])
+        first = next(iter(tables.values()))
+        assert np.array_equal(lines["paper"].get_xdata(), first.loc[first["variable"] == variable, f"paper_{name}"])
+    assert axes[0].yaxis_inverted() and len(axes[0].get_yticks()) == 9

@@ -61,7 +61,7 @@ def test_command_writes_tables_figures_scenarios_and_page(prepared, tmp_path):
     assert len(scenes) == 9 and all([path.name for path in scene.iterdir()] == ["scenario.toml"] for scene in scenes)
     assert read_scenario(scenes[0] / "scenario.toml").ground.seed == 1995
     page = (tmp_path / "out" / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 11
+    assert page.count("data:image/png;base64,") == 1 + 11
     assert "http" not in page.replace("http-equiv", "") and "nan" not in page.split("base64")[0].lower()
     # Every reading has a row of R2 and slopes, and the aligned one a column of Table 2.
     assert "Drift or blur?" in page and "slope: native</th>" in page and "aligned</th>" in page
