@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated, TypeAlias
+
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
@@ -13,6 +15,7 @@ from matplotlib.figure import Figure
 from fifesim.analysis.regression import Regression
 from fifesim.analysis.regression_labels import matched
 from fifesim.base.annotations import Pairing
+from fifesim.base.arguments import Kind
 from fifesim.base.scan_pixels import corners
 from fifesim.chain.comparison import image_origins, recorded_images, shows_ndvi
 from fifesim.chain.steps import ndvi
@@ -21,6 +24,11 @@ from fifesim.grids import swaths
 from fifesim.grids.reductions import computed
 from fifesim.output import colours
 from fifesim.output.maps import Composite, check_composite, composite_bands, rgb, thinned, valid
+
+Scored: TypeAlias = Annotated[
+    xr.Dataset,
+    Kind("an xarray.Dataset, as fifesim.score gives it", lambda value: isinstance(value, xr.Dataset), numbers=None),
+]
 
 # Maximum pixels along the longer side of a picture.
 _SIZE = 1500
@@ -191,15 +199,15 @@ def plot_fit(
     return axes
 
 
-def plot_score(scores: xr.Dataset) -> Figure:
+def plot_score(scores: Scored) -> Figure:
     """
     Plot how well intervals and distributions of an estimate agree with the truth.
 
     Parameters
     ----------
-    scores : xarray.Dataset
-        From `fifesim.score`, of an estimate with intervals, a standard deviation or members. Groups are drawn one by
-        one.
+    scores : dataset
+        Result of `fifesim.score` for an estimate with intervals, a standard deviation or members. Groups are
+        drawn one by one.
 
     Returns
     -------
