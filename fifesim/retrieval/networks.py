@@ -51,7 +51,7 @@ _HIDDEN = 32
 _MEAN, _SQUARE, _TINY = 0.9, 0.999, 1e-8
 
 
-def train_quantiles(inputs, targets, probabilities, seed, weights=None, epochs=60, rate=5e-3):
+def train_quantiles(inputs, targets, probabilities, seed, epochs=60, rate=5e-3):
     """
     Train a network that gives quantiles of each target.
 
@@ -67,8 +67,6 @@ def train_quantiles(inputs, targets, probabilities, seed, weights=None, epochs=6
         Probabilities of the quantiles, in (0, 1).
     seed : int
         Seed of the first weights and of the order of the pixels.
-    weights : array, shape (n,), optional
-        Weight of each pixel in the loss.
     epochs : int, optional
         Passes over the pixels.
     rate : float, optional
@@ -92,7 +90,6 @@ def train_quantiles(inputs, targets, probabilities, seed, weights=None, epochs=6
     first = np.quantile(targets, probabilities, axis=0).T.ravel()
     found += [np.zeros(_HIDDEN), np.zeros(_HIDDEN), first]
     mean, square = [np.zeros_like(each) for each in found], [np.zeros_like(each) for each in found]
-    share = np.ones(len(inputs)) if weights is None else weights / weights.mean()
     wanted = np.tile(probabilities, count)
     steps = -(-len(inputs) // _BATCH) * epochs
     done = 0
@@ -100,7 +97,7 @@ def train_quantiles(inputs, targets, probabilities, seed, weights=None, epochs=6
         order = rng.permutation(len(inputs))
         for start in range(0, len(inputs), _BATCH):
             some = order[start : start + _BATCH]
-            slopes = _slopes(found, inputs[some], np.repeat(targets[some], width, axis=1), wanted, share[some])
+            slopes = _slopes(found, inputs[some], np.repeat(targets[some], width, axis=1), wanted)
             done += 1
             pace = rate * 0.5 * (1 + np.cos(np.pi * done / steps))
             pace *= np.sqrt(1 - _SQUARE**done) / (1 - _MEAN**done)
@@ -111,14 +108,14 @@ def train_quantiles(inputs, targets, probabilities, seed, weights=None, epochs=6
     return Network(tuple(found[:3]), tuple(found[3:]))
 
 
-def _slopes(found, inputs, targets, probabilities, share):
+def _slopes(found, inputs, targets, probabilities):
     """Derivatives of the mean pinball loss with respect to weights and biases."""
     one, two, three, bias_one, bias_two, bias_three = found
     first = np.tanh(inputs @ one + bias_one)
     second = np.tanh(first @ two + bias_two)
     error = targets - (second @ three + bias_three)
     # The loss is p e for positive and (p - 1) e for negative errors.
-    back = np.where(error > 0, -probabilities, 1 - probabilities) * (share / len(inputs))[:, None]
+    back = np.where(error > 0, -probabilities, 1 - probabilities) / len(inputs)
     back_two = (back @ three.T) * (1 - second * second)
     back_one = (back_two @ two.T) * (1 - first * first)
     return [inputs.T @ back_one, first.T @ back_two, second.T @ back, back_one.sum(0), back_two.sum(0), back.sum(0)]

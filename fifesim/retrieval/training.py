@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Literal
 
@@ -132,7 +133,7 @@ def train(
         tables=tables,
         version=FORMAT,
     )
-    object.__setattr__(retrieval, "score", _score(retrieval, parts["test"]))
+    retrieval = replace(retrieval, score=_score(retrieval, parts["test"]))
     if path is not None:
         retrieval.to_netcdf(path)
     return retrieval

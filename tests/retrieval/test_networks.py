@@ -76,26 +76,18 @@ def test_trained_quantiles_are_those_of_a_known_distribution():
     assert np.abs(networks.network(at, layers) - expected).max() < 0.06
 
 
-def test_training_follows_the_weights_of_pixels():
-    x = np.zeros((2000, 1))
-    y = np.repeat([[0.0], [1.0]], 1000, axis=0)
-    weights = np.repeat([3.0, 1.0], 1000)
-    layers = networks.train_quantiles(x, y, np.array([0.5]), seed=0, weights=weights, epochs=30)
-    assert abs(networks.network(np.zeros((1, 1)), layers)[0, 0]) < 0.05
-
-
 def test_slopes_are_the_derivatives_of_the_loss():
     rng = np.random.default_rng(2)
     found = [rng.normal(size=shape) for shape in ((3, 4), (4, 4), (4, 2), (4,), (4,), (2,))]
-    inputs, targets, share = rng.normal(size=(50, 3)), rng.normal(size=(50, 2)), rng.uniform(0.5, 2, 50)
+    inputs, targets = rng.normal(size=(50, 3)), rng.normal(size=(50, 2))
     wanted = np.array([0.2, 0.7])
 
     def loss(values):
         outputs = networks.network(inputs, networks.Network(tuple(values[:3]), tuple(values[3:])))
         error = targets - outputs
-        return (np.maximum(wanted * error, (wanted - 1) * error).sum(1) * share).mean()
+        return (np.maximum(wanted * error, (wanted - 1) * error).sum(1)).mean()
 
-    slopes = networks._slopes(found, inputs, targets, wanted, share)
+    slopes = networks._slopes(found, inputs, targets, wanted)
     for at, place in ((0, (1, 2)), (1, (3, 0)), (2, (0, 1)), (3, (2,)), (4, (1,)), (5, (0,))):
         step = 1e-6
         moved = [each.copy() for each in found]

@@ -136,9 +136,8 @@ def _sun(sza):
 
 
 def _instrument_title(sweep, name):
-    found, size = instrument(name), sweep.at(replace(sweep.settings[0], instrument=name)).sensor.size
-    bands = sweep.at(replace(sweep.settings[0], instrument=name)).sensor.bands
-    return found.name, f"{found.title}, {size:g} m; blur: {origin_text(found, 'blur', bands)}"
+    found, own = instrument(name), sweep.at(replace(sweep.settings[0], instrument=name)).sensor
+    return found.name, f"{found.title}, {own.size:g} m; blur: {origin_text(found, 'blur', own.bands)}"
 
 
 def _displacement(offset):

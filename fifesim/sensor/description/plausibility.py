@@ -24,7 +24,7 @@ _UNITS = {
 # The agencies' solar spectra differ from ASTM G173 by up to 6 % in a band; units differ by 10 and more.
 _SOLAR = 0.15
 
-# Radiance of the largest digital number, in those of a white surface below an overhead sun. Bands for the ocean
+# Radiance of the largest digital number, relative to a white surface below an overhead sun. Bands for the ocean
 # saturate early, but not all bands of an instrument do; Landsat's tables of 1986 in mW cm-2 sr-1 um-1 reach 0.06.
 _RADIANCE = (0.02, 5.0)
 _BRIGHTEST = 0.1
@@ -37,7 +37,7 @@ _NARROWEST = 0.1
 # Response at the ends of its table, in its maximum, above which the table was cut inside the band.
 _END = 0.2
 
-# Published swaths are round numbers, and that of a plane is up to 20 % narrower than that of the sphere.
+# Published swaths are round numbers. A swath on a plane is up to 20 % narrower than on the sphere.
 _SWATH = 0.25
 
 # Samples times interval and the angle of the scan: published swaths, from which angles are derived, are rounded.
