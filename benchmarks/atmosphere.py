@@ -1,5 +1,5 @@
 """
-What the atmosphere costs: the terms of a band by each engine, and applying them to a raster.
+Time of the atmosphere: the terms of a band by each engine, and their application to a raster.
 
 Times of one process on a machine that does other things too: read the ratios.
 
@@ -23,7 +23,7 @@ def terms_of_a_band(engine, band, repeat):
     def call():
         engines.band_terms(fifesim.Atmosphere(visibility=next(visibilities), engine=engine), (band,), 35.0, 10.0, 60.0)
 
-    # 6S is a process of its own.
+    # 6S runs in a separate process.
     return both_times(call, repeat)[1]
 
 

@@ -154,7 +154,7 @@ def of_folder(name, folder):
 
 
 def command(name):
-    """Hashes of what a command writes, in a folder that also holds its inputs."""
+    """Hashes of the files that a command writes, in a folder that also holds its inputs."""
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
         heights = 400 + 30 * np.sin(np.arange(100) / 9)[:, None] * np.cos(np.arange(120) / 7)
@@ -345,7 +345,7 @@ def compare(before, after):
 
 
 def main():
-    """Write the hashes of this version, or compare those of two."""
+    """Write the hashes of this version, or compare the hashes of two versions."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument("output", type=Path, nargs="?", help="JSON file for the hashes")
     parser.add_argument("--compare", type=Path, nargs=2, metavar=("A", "B"), help="exit with 1 if hashes differ")

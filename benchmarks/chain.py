@@ -1,5 +1,5 @@
 """
-The flat two-band chain, from field to digital numbers, beside a floor in the same process, with one thread and two.
+Time of the flat two-band chain, from field to digital numbers, with one and two threads, relative to a floor.
 
 The floor draws as many normals as there are cells and filters them by one Fourier transform. Absolute times differ from
 machine to machine and hour to hour: read the ratios.
@@ -22,7 +22,7 @@ BANDS = ["TM3", "TM4"]
 CASE = {"geometry": fifesim.fife_geometry(), "atmosphere": fifesim.Atmosphere()}  # wherever a large scene reaches
 WEST, NORTH = 704970.0, 4334220.0
 
-# A landscape of its own for each call: the last tiles of one are kept.
+# Each call has another landscape, because the last tiles of a landscape are cached.
 SEEDS = count(100)
 
 

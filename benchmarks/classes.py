@@ -1,4 +1,4 @@
-"""What classes of cover cost, as ratios of processor time to the same scene without classes, in one run."""
+"""Processor time of scenes with cover classes, relative to the same scene without classes, in one run."""
 
 from itertools import count
 
@@ -10,7 +10,7 @@ import fifesim
 BANDS = ["TM3", "TM4"]
 CELLS = 2016
 
-# A landscape of its own for each call: the last tiles of a field are kept.
+# Each call has another landscape, because the last tiles of a field are cached.
 SEEDS = count(100)
 
 

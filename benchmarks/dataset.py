@@ -47,7 +47,7 @@ def measured(study, chips, workers, folder):
         memory = 0
         for process in processes_of(run.pid):
             try:
-                # Of what several share, its part.
+                # Pages that several processes share count in proportion.
                 memory += process.memory_full_info().pss
                 spent[process.pid] = sum(process.cpu_times()[:2])
             except psutil.Error:

@@ -1,4 +1,4 @@
-"""Scenes a second of ensembles: of one setup by size, and chips of which each has sun, air, canopy and sensor anew."""
+"""Scenes per second: one setup by size, and chips that each have another sun, atmosphere, canopy and sensor."""
 
 import time
 

@@ -1,5 +1,5 @@
 """
-What fields that correlate and soils that vary cost, beside the floor of `chain.py` in the same process.
+Time of correlated fields and variable soils, relative to the floor of `chain.py` in the same process.
 
     python benchmarks/fields.py --cells 3000
 """
@@ -37,7 +37,7 @@ def cases(cells):
     follows = {"elevation": 0.3, "wetness": 0.5, "illumination": -0.2}
     return {
         "leaf area alone": fields({"lai": 0.15}),
-        "and soil, on its own": fields(ARPS),
+        "and soil, independent": fields(ARPS),
         "and soil, of one arp, correlated": fields(alike, {("lai", "soil"): -0.4}),
         "and soil, of two arps, correlated": fields(ARPS, {("lai", "soil"): -0.4}),
         "leaf area that follows elevation": fields({"lai": 0.15}, {("lai", "elevation"): 0.3}, ground),

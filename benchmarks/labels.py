@@ -10,7 +10,7 @@ BANDS = ("TM3", "TM4")
 
 
 def cases():
-    """Calls of a public function and of the same on arrays, by what they do."""
+    """Calls of public functions and of their kernels on arrays, by name."""
     lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 333), (0, 333))), seed=7)
     setup = fifesim.Setup("TM", bands=BANDS, geometry=fifesim.fife_geometry(), atmosphere=fifesim.Atmosphere())
     driver = Driver(setup)

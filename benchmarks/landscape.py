@@ -1,4 +1,4 @@
-"""What dead leaves, crowns and soil by cell cost the canopy, beside the whole flat chain, in one run."""
+"""Time of dead leaves, crowns and soil by cell, relative to the whole flat chain, in one run."""
 
 from functools import partial
 from itertools import count
@@ -32,7 +32,7 @@ def image_of(scene):
 
 
 def chains(grid, seeds, names, lazy=False):
-    """The flat chain, and those of landscapes of three classes with properties that vary, of a new scene each time."""
+    """The flat chain and chains of landscapes with three classes and variable properties, with a new scene per call."""
     dem, chunks = fifesim.flint_hills(grid, seed=7), {"chunks": "auto"} if lazy else {}
     dem = dem.chunk(fifesim.lai_scene(grid, **chunks).chunksizes) if lazy else dem
 

@@ -1,4 +1,4 @@
-"""What leaves that differ from cell to cell cost, as ratios to the same scene of equal leaves, in one run."""
+"""Time of leaves that differ between cells, relative to the same scene with equal leaves, in one run."""
 
 import numpy as np
 import xarray as xr

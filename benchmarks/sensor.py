@@ -1,5 +1,5 @@
 """
-Speed of the regularization of a whole site, beside a plain mean of blocks in the same process.
+Speed of the regularization of a whole site, relative to a plain mean of blocks in the same process.
 
 The mean of 9 x 9 cells is what numpy takes for it: a reshape and a mean over two axes. Read the ratios.
 

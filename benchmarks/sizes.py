@@ -1,5 +1,5 @@
 """
-Size of the package, what a call enters, and the time to compile the kernels of the default run, as one table.
+Table of the size of the package, the call trace of a function, and the time to compile the kernels of the default run.
 
 Below the table are the names that several modules define.
 
@@ -58,7 +58,7 @@ def code_lines(path):
 
 
 def exported():
-    """Modules and qualified names of what users reach: the package's names, and those of ``fifesim.atmosphere``."""
+    """Modules and qualified names of the public functions and classes, including ``fifesim.atmosphere``."""
     found = set()
     for module in (fifesim, fifesim.atmosphere):
         for name in dir(module):
@@ -107,7 +107,7 @@ def entered(call):
         code = frame.f_code
         if not code.co_filename.startswith(f"{PACKAGE}{os.sep}"):
             return
-        # Frames are counted, because those of compiled kernels do not know their caller.
+        # Count frames, because frames of compiled kernels do not know their caller.
         if event == "call":
             depth += 1
             deepest = max(deepest, depth)
@@ -124,7 +124,7 @@ def entered(call):
 
 
 def surface_reflectance():
-    """What the second call of ``surface_reflectance`` enters, on 270 x 270 cells in memory."""
+    """Call trace of the second call of ``surface_reflectance``, on 270 x 270 cells in memory."""
     lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 270), (0, 270))), seed=7)
 
     def call():

@@ -3,7 +3,7 @@ Cells a second and peak memory of each stage and chain, at several sizes, compar
 
     python benchmarks/stages.py --million 1 4 16 64
 
-Every number is from a process of its own. Speeds are cells in a second of processor time, the best of some calls after
+Every number is from a separate process. Speeds are cells in a second of processor time, the best of some calls after
 one that warms up, because other work on a machine changes the time on the clock more.
 """
 
@@ -52,7 +52,7 @@ def on_workers(side, workers):
 
 
 def apart(*arguments):
-    """What another process of this program prints."""
+    """Output of another process of this program."""
     command = [sys.executable, __file__, *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
@@ -62,7 +62,7 @@ def apart(*arguments):
 
 
 def exponent(rows):
-    """Of the growth of processor time with cells, fitted to all sizes."""
+    """Exponent of the growth of processor time with cells, fitted to all sizes."""
     known = [(row["cells"], row["seconds"]) for row in rows if row]
     if len(known) < 2:
         return None

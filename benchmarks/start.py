@@ -14,7 +14,7 @@ FLAT = '[grid]\nwidth = 300.0\nheight = 300.0\n[terrain]\ndem = "flat"\n'
 
 
 def processor_time(code, *arguments, folder=None):
-    """Of a Python process and of those that it starts. [s]"""
+    """Processor time of a Python process and its children. [s]"""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([sys.executable, "-c", code, *arguments], cwd=folder, capture_output=True, check=False)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -35,7 +35,7 @@ def main():
             "`fifesim simulate` of a misspelt key": (COMMAND, "simulate", "typo.toml"),
             "`fifesim simulate`, 300 m, flat": (COMMAND, "simulate", "flat.toml", "--overwrite"),
         }
-        # What numba keeps on disk is there from the second round on; all take turns, as the machine's load varies.
+        # Numba's cache on disk exists from the second round on. The commands take turns, because the load varies.
         rounds = [
             {name: processor_time(*case, folder=folder) for name, case in cases.items()} for _ in range(times + 1)
         ]

@@ -1,5 +1,5 @@
 """
-What terrain costs, beside a floor in the same process: draw one normal a cell and filter them by one Fourier transform.
+Time of terrain, relative to a floor: draw one normal per cell and filter them by one Fourier transform.
 
 The ground is a sum of waves, and of the synthetic hills, made anew each time. Processor time, the best of some rounds
 in which each call has its turn; absolute times differ from machine to machine and hour to hour: read the ratios.
@@ -44,7 +44,7 @@ def chain(lai, dem=None):
 
 
 def calls(grid, dem):
-    """What is measured, by name, each of a landscape of its own."""
+    """Measured calls by name, each with another landscape."""
     seeds = count(100)
     lazy, lai = dem.chunk(1008), fifesim.lai_scene(grid, arp=0.15, seed=7, chunks="auto").persist()
     geometry, known = fife_geometry(), fifesim.horizon(dem)

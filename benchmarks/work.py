@@ -1,5 +1,5 @@
 """
-What is measured: calls without arguments, by name, for a number of cells along each side.
+Measured calls without arguments, by name, for a number of cells along each side.
 
 Each gives, as a pair, the call and how many cells it makes.
 """

@@ -17,7 +17,7 @@ DATA = Path(__file__).parent
 
 RADIUS = np.geomspace(1e-3, 20.0, 1000)  # [um], the range of d'Almeida et al. (1991)
 
-# Scattering angle [degree], fine where the largest dust particles diffract: their first minimum lies at .6 degrees.
+# Scattering angle [degree], fine where the largest dust particles diffract: their first minimum lies at 0.6 degrees.
 ANGLE = np.concatenate(
     [np.arange(0, 2, 0.1), np.arange(2, 10, 0.25), np.arange(10, 30, 0.5), np.arange(30, 181, 1.0)]
 ).round(2)

@@ -60,7 +60,7 @@ def drawn(table, spectra):
     table = table[np.all((spectra > 0) & (spectra < 1), axis=1)]
     soils = table[(table["LEVEL_3"] == "soil") & (table["SOURCE"] == "icraf-isric-soil-database")]
     sites = random.permutation(soils.drop_duplicates(["LAT", "LON"]).index)
-    # The dead grass of ground_spectra.csv is in a table of its own, and stays unknown to the library.
+    # The dead grass of ground_spectra.csv is in a separate table and stays unknown to the library.
     dead = table[(table["LEVEL_2"] == "npv") & table["LEVEL_3"].isin(["litter", "npv"])]
     others = dead[~dead["NAME"].isin(DEAD_GRASS.values())].drop_duplicates("NAME")
     litter = random.permutation(others.index)

@@ -16,7 +16,7 @@ from fifesim.base.bands import Band, solar_spectrum
 NAMES = ["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]
 CALIBRATED = [2, 3]
 LEAF_REFLECTANCE, LEAF_TRANSMITTANCE, BACKGROUND = (0.07, 0.45), (0.04, 0.42), (0.15, 0.19)
-WATER = 0.012  # equivalent water thickness [cm], assumed: TM3 and TM4 say nothing about it
+WATER = 0.012  # equivalent water thickness [cm], assumed, because TM3 and TM4 do not depend on it
 CAROTENOIDS = 0.25  # of the chlorophyll, assumed
 
 WAVELENGTH = np.arange(400, 2501) / 1000

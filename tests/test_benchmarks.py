@@ -143,7 +143,12 @@ def test_fields_have_the_covariance_of_their_models(load):
 
 
 def test_6s_has_the_same_atmosphere(load):
-    own, other = errors(load("peers"), "atmosphere: 6S once a band through Py6S, then its formula", 18)
+    try:
+        own, other = errors(load("peers"), "atmosphere: 6S once a band through Py6S, then its formula", 18)
+    except RuntimeError as error:
+        if "the system lacks" in str(error):
+            pytest.skip(str(error))
+        raise
     assert max(own) < 0.003 and other[0] < 3e-5
 
 
