@@ -103,12 +103,10 @@ def budget(
         raise TypeError(f"budget needs a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     _check_map(scenario)
     cases = budget_cases(scenario, realisations=realisations, cells=cells, seed=seed)
-    found = [_one(case) for case in (_shown if each is None else each)(cases)]
-    names = {"stage": list(STAGES), "variable": list(VARIABLES)}
-    stacked = {name: np.stack([one[name] for one in found]) for name in found[0]}
-    dims = {3: ("realisation", "variable", "stage"), 2: ("realisation", "variable")}
-    attrs = {"units": "1", "long_name": "share of the variance"}
-    made = xr.Dataset({name: (dims[values.ndim], values, attrs) for name, values in stacked.items()}, coords=names)
+    shown = steps(cases, "stage by stage") if each is None else each(cases)
+    made = xr.concat([_one(case) for case in shown], "realisation")
+    for values in made.data_vars.values():
+        values.attrs = {"units": "1", "long_name": "share of the variance"}
     origins = stage_origins(scenario)
     made = made.assign_coords(origin=("stage", [origins.get(stage, "") for stage in STAGES]))
     # A stage that could not be simulated has an unknown share, not a share of zero.
@@ -119,17 +117,16 @@ def budget(
 def stage_origins(scenario):
     """Origin of the blur, geolocation and noise of the instrument by the stage that they affect; a dash if unknown."""
     own = scenario.complete().sensor
-    found = {
-        stage: origin_text(own.description, quantity, own.bands)
-        for stage, quantity in (("point spread", "blur"), ("registration", "geolocation"), ("noise", "noise"))
-    }
     # The ideal response, a displacement and a noise model are given by the scenario.
-    given = {
-        "point spread": own.response == "detector",
-        "registration": any(own.offset),
-        "noise": bool(own.noise_model),
+    by_stage = {
+        "point spread": ("blur", own.response == "detector"),
+        "registration": ("geolocation", any(own.offset)),
+        "noise": ("noise", bool(own.noise_model)),
     }
-    return {stage: "given" if given[stage] else text for stage, text in found.items()}
+    return {
+        stage: "given" if is_given else origin_text(own.description, quantity, own.bands)
+        for stage, (quantity, is_given) in by_stage.items()
+    }
 
 
 def total_range(scenario, **options):
@@ -229,27 +226,21 @@ def unexplained(truth, ndvi):
     return 1 - explained
 
 
-def _shown(cases):
-    return steps(cases, "stage by stage")
-
-
 def _one(scenario):
-    """Results of one realisation by name, shape (variable, stage) or (variable,)."""
-    seen, found = pixels(scenario), {}
-    place = [list(STAGES).index(stage) for stage in seen.stages]
-    count = len(place)
+    """Results of one realisation, over (variable, stage) or variable."""
+    seen, rows = pixels(scenario), []
+    count = len(seen.stages)
     for variable in VARIABLES:
         values = unexplained(seen.truth[variable], seen.ndvi)
         total, curvature = values[(1,) * count], values[(0,) * count]
         uniform = unexplained(seen.homogeneous_truth[variable], seen.homogeneous_ndvi)
-        one = {"total": total, "curvature": curvature, "variation": total - uniform}
+        row = {"total": total, "curvature": curvature, "variation": total - uniform}
         for name, attribute in (("share", shapley), ("alone", taken_away), ("first", by_itself)):
             # A stage that is already ideal has no effect.
-            one[name] = np.zeros(len(STAGES))
-            one[name][place] = attribute(values, count)
-        for name, value in one.items():
-            found.setdefault(name, []).append(value)
-    return {name: np.array(values) for name, values in found.items()}
+            effects = dict.fromkeys(STAGES, 0.0) | dict(zip(seen.stages, attribute(values, count), strict=True))
+            row[name] = ("stage", list(effects.values()))
+        rows.append(xr.Dataset(row, {"stage": list(STAGES), "variable": variable}))
+    return xr.concat(rows, "variable")
 
 
 def _windows(scenario, cells):

@@ -1,10 +1,15 @@
-"""What the page of a budget says of its mechanisms."""
+"""Page, mechanisms and folder of a budget, and the command."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
+from typer.testing import CliRunner
 
+from fifesim.cli import app
 from fifesim.experiments.scatter import report
+from fifesim.experiments.scatter import report as scatter_run
+from fifesim.experiments.scatter import shares as scatter
 from fifesim.experiments.scatter.shares import CURVATURE
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES
 
@@ -28,11 +33,9 @@ def test_mechanisms_share_out_the_stages_once(budget):
     rows = report.mechanisms(budget)
     parts = [part for row in rows for part in report.MECHANISMS[row["name"]]]
     assert len(parts) == len(set(parts)) and set(parts) <= {*STAGES, CURVATURE}
+    known = dict(zip(STAGES, np.arange(1, len(STAGES) + 1) / 100, strict=True)) | {CURVATURE: 0.09}
     for row in rows:
-        expected = sum(
-            0.09 if part == CURVATURE else (list(STAGES).index(part) + 1) / 100
-            for part in report.MECHANISMS[row["name"]]
-        )
+        expected = sum(known[part] for part in report.MECHANISMS[row["name"]])
         assert row["lai"]["share"] == pytest.approx(expected, rel=1e-12)
         assert row["lai"]["of_total"] == pytest.approx(expected / float(budget["total"][0, 0]), rel=1e-12)
         assert row["lai"]["error"] == pytest.approx(0, abs=1e-12)
@@ -43,3 +46,59 @@ def test_registration_is_no_mechanism_of_the_paper():
     (name,) = (name for name, parts in report.MECHANISMS.items() if "registration" in parts)
     assert "not discussed" in name and report.MECHANISMS[name] == ("registration",)
     assert report.MECHANISMS["iii. Regularization by the sensor"] == ("point spread",)
+
+
+@pytest.fixture
+def command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(scatter_run, "_DPI", 40)
+    text = "[grid]\nwidth = 360\nheight = 330\n[terrain]\ndem = 'flat'\n[sensor]\nbands = ['TM2', 'TM3', 'TM4']\n"
+    (tmp_path / "mine.toml").write_text(text)
+
+    def call(*arguments):
+        return CliRunner().invoke(app, ["budget", *map(str, arguments)])
+
+    return call
+
+
+def test_command_writes_table_chart_and_page(command, tmp_path):
+    result = command("mine.toml", "-o", "out", "--realisations", 2)
+    assert result.exit_code == 0, result.output
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(scatter_run.BUDGET_FILES)
+    table = pd.read_csv(tmp_path / "out" / "budget.csv")
+    assert set(table["stage"]) == {*STAGES, scatter.CURVATURE, scatter.TOTAL, scatter.VARIATION}
+    assert {"stage", "variable", "alone", "alone_error", "share", "share_error"} <= set(table.columns)
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 1 and "http" not in page
+    total = table[(table["stage"] == "total") & (table["variable"] == "lai")].iloc[0]
+    assert f"{100 * total['share']:.1f}" in page
+    first = {name: (tmp_path / "out" / name).read_bytes() for name in scatter_run.BUDGET_FILES}
+    assert command("mine.toml", "-o", "out", "--realisations", 2).exit_code == 2
+    again = command("out/scenario.toml", "-o", "again", "--realisations", 2)
+    assert again.exit_code == 0, again.output
+    assert {name: (tmp_path / "again" / name).read_bytes() for name in scatter_run.BUDGET_FILES} == first
+
+
+def test_one_realisation_has_no_error(command, tmp_path):
+    assert command("mine.toml", "-o", "out", "--realisations", 1).exit_code == 0
+    table = pd.read_csv(tmp_path / "out" / "budget.csv")
+    assert table["share_error"].isna().all() and table["share"].notna().sum() == 2 * (len(STAGES) + 2)
+    assert "nan" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8").split("base64")[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "said"),
+    [
+        ("", ("--realisations", 0), "realisations must be at least 1, got 0"),
+        ("", ("--cells", 50), "holds 5 x 5 pixels of 30 m"),
+        ("[sensor]\nbands = ['TM3']", (), "no near infrared band"),
+        ("[sensor]\noffset = 3.0", (), "sensor.offset"),
+        ("[sensor]\ninstrument = 'AVHRR'\nbands = ['AVHRR1', 'AVHRR2']", (), "1 x 1 pixels of 1100 m"),
+    ],
+)
+def test_mistake_is_one_line_and_leaves_nothing(command, tmp_path, text, arguments, said):
+    (tmp_path / "wrong.toml").write_text(text)
+    result = command("wrong.toml", "-o", "out", *arguments)
+    assert result.exit_code == 2
+    assert said in result.stderr and len(result.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()

@@ -57,15 +57,6 @@ def test_other_seeds_give_the_same_shares_within_their_errors(scenario):
         assert (np.abs(difference) <= 4 * error).all()
 
 
-def test_realisations_lie_side_by_side_and_have_seeds_of_their_own(scenario):
-    cases = scatter.budget_cases(fifesim.Scenario(), realisations=4, cells=333, seed=3)
-    corners = {(case.grid.west, case.grid.north) for case in cases}
-    assert len(corners) == 4 and [case.ground.seed for case in cases] == [3, 4, 5, 6]
-    assert all(case.geobox().shape == (333, 333) for case in cases)
-    one_place = scatter.budget_cases(scenario(), realisations=3, cells=333)
-    assert {case.grid.west for case in one_place} == {case.grid.west for case in [scenario()]}
-
-
 def test_map_has_as_many_realisations_as_it_has_filled_windows(tmp_path):
     rng = np.random.default_rng(2)
     lai = np.exp(rng.normal(0, 0.3, (100, 200))).astype("float32")
@@ -83,3 +74,11 @@ def test_map_has_as_many_realisations_as_it_has_filled_windows(tmp_path):
     finer = parse_scenario({"grid": {"cell": 5.0}, "ground": {"lai_file": str(tmp_path / "lai.tif")}})
     with pytest.warns(UserWarning, match=r"lai\.tif has pixels of 10 m, and cells of 5 m.*fifesim\.downscale"):
         fifesim.budget(finer, realisations=1, cells=70)
+
+
+def test_realisations_lie_side_by_side_and_have_seeds_of_their_own(scenario):
+    cases = scatter.budget_cases(fifesim.Scenario(), realisations=4, cells=333, seed=3)
+    assert len({(case.grid.west, case.grid.north) for case in cases}) == 4
+    assert [case.ground.seed for case in cases] == [3, 4, 5, 6] and len({case.sensor.seed for case in cases}) == 4
+    assert all(case.geobox().shape == (333, 333) for case in cases)
+    assert len({case.grid.west for case in scatter.budget_cases(scenario(), realisations=3, cells=333)}) == 1

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import fifesim
 from fifesim.experiments.scatter import shares as scatter
@@ -13,10 +14,16 @@ from fifesim.experiments.scatter.stages import (
     STAGES,
     STEP,
     _Scene,
+    _scene,
     along_tangent,
     displaced_pixels,
+    images_of,
+    middle_cells,
     pixels,
+    spread_out,
 )
+from fifesim.grids import grid as grids
+from fifesim.scenario.scenario import Scenario
 
 
 def of(seen, **at_work):
@@ -32,21 +39,26 @@ def test_physics_page_lists_the_stages_and_the_ideal_ground():
     assert {name: rows[name] for name in IDEAL_PROPERTIES} == IDEAL_PROPERTIES
 
 
-def test_all_stages_at_work_are_the_simulation(rough):
-    seen = pixels(rough)
-    run = fifesim.simulate(rough)
-    assert seen.stages == tuple(name for name in STAGES if name not in IDEAL_PROPERTIES)
+@pytest.mark.parametrize("clumped", [False, True])
+def test_all_stages_at_work_are_the_simulation(rough, scenario, clumped):
+    """Pixels have data where the displaced image has; only the truth of rough ground has an axis of one or two."""
+    case = scenario(crown_cover=0.6) if clumped else rough
+    seen, run = pixels(case), fifesim.simulate(case)
+    assert set(STAGES) - set(seen.stages) == (
+        set(IDEAL_PROPERTIES) - {"clumping"} | {"registration", "noise", "topography"}
+        if clumped
+        else set(IDEAL_PROPERTIES)
+    )
+    at_work = (1,) * len(seen.stages)
     rows, columns = (min(run[name].sizes[axis] for name in ("truth", "image")) for axis in ("y", "x"))
     ndvi = run["image"]["ndvi"].values[:rows, :columns]
     found = np.isfinite(ndvi)
-    # The ideal images have data where the displaced one has.
-    np.testing.assert_array_equal(seen.ndvi[(1,) * 8], ndvi[found])
+    np.testing.assert_array_equal(seen.ndvi[at_work], ndvi[found])
     for name in ("lai", "fpar"):
-        np.testing.assert_array_equal(seen.truth[name][1].ravel(), run["truth"][name].values[:rows, :columns][found])
+        truth = np.broadcast_to(seen.truth[name], seen.ndvi.shape)[at_work]
+        np.testing.assert_array_equal(truth, run["truth"][name].values[:rows, :columns][found])
         line = fifesim.regress(run["truth"][name], run["image"]["ndvi"], pair="index")
-        assert scatter.unexplained(seen.truth[name][1].ravel(), seen.ndvi[(1,) * 8]) == pytest.approx(
-            1 - line.r2, abs=1e-12
-        )
+        assert scatter.unexplained(truth, seen.ndvi[at_work]) == pytest.approx(1 - line.r2, abs=1e-12)
 
 
 def test_ideal_of_ndvi_scaling_is_the_mean_over_the_cells(scenario):
@@ -91,11 +103,6 @@ def test_pixels_at_several_displacements_are_those_of_each(rough):
         np.testing.assert_array_equal(seen.truth["fpar"], alone.truth["fpar"])
 
 
-def test_without_displacement_registration_is_ideal(scenario):
-    still, moved = displaced_pixels(scenario(), [(0.0, 0.0), (0.0, 0.5)])
-    assert "registration" not in still.stages and "registration" in moved.stages
-
-
 @pytest.mark.parametrize("hills", [False, True])
 def test_plain_arrays_and_labelled_functions_give_the_same_pixels(scenario, monkeypatch, hills):
     case = scenario(dem="flint-hills" if hills else "flat")
@@ -126,3 +133,77 @@ def test_a_tangent_has_the_value_and_slope_of_the_curve_at_the_middle():
     left = np.exp(-extinction * 1.2)
     np.testing.assert_allclose(found, 1 - left + extinction * left * (lai - 1.2), rtol=0, atol=STEP**2 / 10)
     assert np.ptp(np.diff(found.ravel()) / np.diff(lai.ravel())) < 1e-10
+
+
+IDEAL = ((False,), (False,), (False,), (False,), (False,))
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return _scene(Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"}, sensor={"offset": [0.0, 1.0]}))
+
+
+@pytest.fixture(scope="module")
+def cells(scene):
+    red, nir = np.random.default_rng(2).uniform([[[0.04]], [[0.2]]], [[[0.1]], [[0.4]]], (2, 90, 90))
+    return np.stack([red, nir, (nir - red) / (nir + red)])
+
+
+def blocks(cells):
+    return cells.reshape(len(cells), 10, 9, 10, 9).mean((2, 4))
+
+
+def test_scaling_is_the_ndvi_of_the_mean_reflectances(scene, cells):
+    found = images_of(scene, cells, ((False, True), *IDEAL[1:]))
+    red, nir, of_cells = blocks(cells)[:, : scene.shape[0], : scene.shape[1]]
+    assert found.shape == (2, 1, 1, 1, 1, *scene.shape)
+    np.testing.assert_allclose(found[0, 0, 0, 0, 0], of_cells, atol=1e-12)
+    np.testing.assert_allclose(found[1, 0, 0, 0, 0], (nir - red) / (nir + red), atol=1e-12)
+
+
+def test_counts_move_an_ideal_image_by_what_they_move_that_of_the_means(scene, cells):
+    """Whether NDVI is of cells or of means, the detector's steps are the same, and not larger than a count or two."""
+    found = images_of(scene, cells, ((False, True), (False,), (False,), (False, True), (False,)))[:, 0, 0, :, 0]
+    steps = found[:, 1] - found[:, 0]
+    np.testing.assert_allclose(steps[0], steps[1], atol=1e-12)
+    assert 1e-4 < np.abs(steps).max() < 0.03
+
+
+def test_a_displaced_image_sees_the_pixel_beside(scene, cells):
+    found = images_of(scene, cells, ((False,), (False,), (False, True), (False,), (False,)))[0, 0, :, 0, 0]
+    np.testing.assert_allclose(found[1, :, :-1], found[0, :, 1:], atol=1e-12)
+
+
+# Seven cells of 10 m along each axis: two blocks of 30 m, and a cell of none.
+GRID = fifesim.grid_at("EPSG:26914", 707970.0, 4331220.0, 70.0, 70.0, 10.0)
+BLOCKS = grids.aligned_grid(GRID, 30.0)
+
+
+@pytest.fixture
+def land():
+    lai = fifesim.lai_scene(GRID, "burned-grazed", arp=0.15, seed=7)
+    return lai.copy(data=np.arange(49.0).reshape(7, 7))
+
+
+def test_each_cell_of_a_block_has_its_mean(land):
+    found = spread_out(land, BLOCKS, 0.98).values
+    expected = [[8.0, 11.0], [29.0, 32.0]]
+    np.testing.assert_array_equal(found[:6, :6], np.kron(expected, np.ones((3, 3))))
+    np.testing.assert_array_equal(found[6], land.values[6])
+    np.testing.assert_array_equal(found[:, 6], land.values[:, 6])
+
+
+def test_a_cell_without_data_has_none_and_a_block_without_a_mean_keeps_its_cells(land):
+    land[0, 0] = np.nan
+    found = spread_out(land, BLOCKS, 0.98).values
+    np.testing.assert_array_equal(found[:3, :3], land.values[:3, :3])
+    found = spread_out(land, BLOCKS, 0.5).values
+    assert np.isnan(found[0, 0]) and found[1, 1] == pytest.approx((9 * 8 - 0) / 8)
+
+
+def test_the_middle_cell_stands_for_its_block(land):
+    codes = xr.where(land == 0, -1, land, keep_attrs=True).astype(np.int16)
+    found = middle_cells(land.copy(data=codes.values), BLOCKS).values
+    assert found[0, 0] == -1 and set(found[:3, :3].ravel()) == {-1, 8}
+    np.testing.assert_array_equal(found[3:6, 3:6], 32)
+    np.testing.assert_array_equal(found[6], land.values[6])
