@@ -16,7 +16,6 @@ from fifesim.experiments.explorer.page import layer_words
 from fifesim.grids import cf
 from fifesim.output.chips.datasheet import contact_sheet
 from fifesim.output.colours import (
-    LAND,
     axis_label,
     colours_of,
     dark_and_bright,
@@ -24,11 +23,11 @@ from fifesim.output.colours import (
     percentile_limits,
     short_name,
     stops_of,
+    subject,
     unit,
 )
-from fifesim.output.maps import composite_bands, false_colour_names, relief_map, value_map
+from fifesim.output.maps import composite_bands, false_colour_names, value_map
 from fifesim.output.report import fit_figure, main_results
-from fifesim.scenario.keys import GroundKeys
 from fifesim.sensor.description.fields import false_colour_bands
 from fifesim.sensor.description.instruments import instrument, instrument_names
 
@@ -103,15 +102,6 @@ def test_quantities_have_short_words_a_range_and_a_colour_map(name):
     assert all(end is None or lowest <= end for end in quantity.ends)
 
 
-def test_land_is_the_same_in_all_pictures(lai, tmp_path):
-    dem = cf.label(400 + lai, "dem", history="made")
-    stops = [to_hex(LAND(share)) for share in np.linspace(0, 1, 9)]
-    assert relief_map(dem, "").bar.stops == value_map(dem, "").bar.stops == stops
-    assert dem.fifesim.plot().images[0].get_cmap() == LAND
-    shown = ramp(fifesim.write_style(dem.fifesim.to_geotiff(tmp_path / "dem.tif")))
-    assert [colour for _, colour in shown] == stops
-
-
 @pytest.mark.parametrize("name", ["brown", "dissociation", "crown_cover", "crown_shape", "hotspot", "soil", "moisture"])
 def test_ranges_of_canopies_are_those_of_the_verb(name, lai):
     few, canopy = lai[:2, :2], fifesim.Canopy(brown=0.3, crown_cover=0.9)
@@ -121,16 +111,6 @@ def test_ranges_of_canopies_are_those_of_the_verb(name, lai):
     for value in (quantity.lowest - step, quantity.highest + step):
         with pytest.raises(ValueError, match=f"{name} must be"):
             canopy.replace(**{name: value})
-
-
-@pytest.mark.parametrize("name", ["brown", "dissociation", "crown_cover", "crown_shape", "hotspot"])
-def test_ranges_of_canopies_are_those_of_scenario_keys(name):
-    quantity = cf.QUANTITIES[name]
-    for value in (quantity.lowest, quantity.highest):
-        assert getattr(GroundKeys(**{name: value}), name) == value
-    for value in (quantity.lowest - 1e-6, quantity.highest + 1e-6):
-        with pytest.raises(ValueError, match=name):
-            GroundKeys(**{name: value})
 
 
 def test_rasters_of_a_run_lie_within_the_ranges(whole, site):
@@ -190,3 +170,35 @@ def test_limits_pass_over_what_is_missing():
     values = np.arange(101.0)
     assert percentile_limits(xr.DataArray(values)) == (1.0, 99.0)
     assert dataclasses.replace(CLUMPING, label="").label == "clumping index"
+
+
+@pytest.mark.parametrize(
+    ("name", "units", "said"),
+    [
+        ("toa_radiance", "W m-2 sr-1 um-1", "[W m⁻² sr⁻¹ µm⁻¹]"),
+        ("dem", "m", "[m]"),
+        ("lai", "1", "[m² m⁻²]"),
+        ("ndvi", "1", ""),
+        ("wavelength", "um", "[µm]"),
+        (None, None, ""),
+    ],
+)
+def test_units_are_written_as_in_print(name, units, said):
+    assert unit(xr.DataArray(0.0, name=name, attrs={} if units is None else {"units": units})) == said
+
+
+def test_quantities_have_a_short_and_a_long_name(whole):
+    assert short_name(whole["image"]) == "digital number" and short_name(whole["ndvi"]) == "NDVI"
+    assert long_name(whole["ndvi"]) == "Normalized difference vegetation index"
+    assert long_name(whole["image"].sel(band="TM3")) == "TM3: digital number"
+    assert long_name(xr.DataArray(0.0, name="my_field")) == "My field" and long_name(xr.DataArray(0.0)) == "Values"
+
+
+def test_a_picture_says_whose_it_is(whole):
+    said = subject(whole["image"].assign_coords(time=np.datetime64("1987-06-06T16:35", "ns")))
+    assert said == "Landsat-5 Thematic Mapper, 6 June 1987, 39.13° N, 96.62° W"
+    own = whole["lai"].assign_attrs(instrument="mine").drop_vars("time", errors="ignore")
+    assert subject(own) == "mine, 39.13° N, 96.62° W"
+    south = fifesim.grid_at("EPSG:32734", 300000.0, 6200000.0, 300.0, 300.0, 30.0)
+    assert subject(fifesim.lai_scene(south, "burned-grazed", seed=1)).endswith("34.32° S, 18.83° E")
+    assert subject(xr.DataArray(np.zeros(3))) == ""

@@ -2,12 +2,15 @@
 
 import multiprocessing
 import os
+import platform
 import signal
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, results
+import fifesim
+from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, results, versions
 
 NAMES = ("one.txt", "two.txt")
 
@@ -20,15 +23,6 @@ def write(folder, text, names=NAMES, **options):
     with results(folder, names, **options) as hidden:
         for name in names:
             (hidden / name).write_text(text)
-
-
-def test_files_are_there_when_all_are_written(tmp_path):
-    out = tmp_path / "a" / "out"
-    with results(out, NAMES) as hidden:
-        (hidden / "one.txt").write_text("1")
-        assert list(out.iterdir()) == [hidden]
-        (hidden / "two.txt").write_text("2")
-    assert contents(out) == {"one.txt": "1", "two.txt": "2"}
 
 
 def test_files_replace_those_of_their_names_and_no_others(tmp_path):
@@ -44,14 +38,6 @@ def test_what_gdal_kept_of_a_replaced_raster_goes_with_it(tmp_path):
     with results(tmp_path, ["image.tif"], overwrite=True) as partial:
         (partial / "image.tif").write_text("new")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["image.tif", "other.tif.aux.xml"]
-
-
-def test_a_folder_replaces_a_folder(tmp_path):
-    for text in ("old", "new"):
-        with results(tmp_path, ["store"], overwrite=True) as hidden:
-            (hidden / "store").mkdir()
-            (hidden / "store" / text).touch()
-    assert [path.name for path in (tmp_path / "store").iterdir()] == ["new"]
 
 
 class Killed(BaseException):
@@ -112,8 +98,7 @@ def test_a_run_killed_between_its_moves_leaves_no_mix_of_two_runs(tmp_path, monk
     assert all_files(out) == NEW and not (out / UNFINISHED).exists()
 
 
-@pytest.mark.parametrize("error", [OSError, KeyboardInterrupt])
-@pytest.mark.parametrize("number", range(1, 9))
+@pytest.mark.parametrize(("number", "error"), [(1, OSError), (4, KeyboardInterrupt), (8, OSError)])
 def test_an_error_between_the_moves_leaves_the_old_results(tmp_path, monkeypatch, number, error):
     out = tmp_path / "out"
     old = old_run(out)
@@ -121,15 +106,6 @@ def test_an_error_between_the_moves_leaves_the_old_results(tmp_path, monkeypatch
         failing_moves(patch, out, number, error, forever=False)
         replaced_run(out, overwrite=True)
     assert all_files(out) == old and not (out / UNFINISHED).exists()
-
-
-def test_eight_moves_replace_a_run(tmp_path, monkeypatch):
-    """The tests of killed runs know each of them."""
-    out = tmp_path / "out"
-    old_run(out)
-    failing_moves(monkeypatch, out, 9, Killed, forever=True)
-    replaced_run(out, overwrite=True)
-    assert all_files(out) == NEW
 
 
 @pytest.mark.parametrize("error", [ValueError, OSError, KeyboardInterrupt])
@@ -164,16 +140,13 @@ def test_what_is_worth_it_is_kept_and_gone_on_with(tmp_path):
     assert contents(out) == {"one.txt": "whole", "two.txt": "whole"}
 
 
-def test_what_is_not_worth_it_goes(tmp_path):
-    assert not keep_from(tmp_path, ValueError).exists()
-
-
 def test_another_beginning_finds_nothing_of_the_one_before(tmp_path):
     out = keep_from(tmp_path, OSError)
     kept = {"overwrite": True, "worth_keeping": lambda hidden, error: True}
     with pytest.raises(OSError), results(out, NAMES, **kept) as hidden:
         assert contents(hidden) == {}
         raise OSError("again")
+    assert not keep_from(tmp_path / "another", ValueError).exists()
 
 
 @pytest.mark.parametrize(
@@ -187,6 +160,8 @@ def test_another_beginning_finds_nothing_of_the_one_before(tmp_path):
     ],
 )
 def test_a_folder_in_use_is_refused_with_what_to_type(tmp_path, held, options, said):
+    with pytest.raises(ValueError, match="is a file"):
+        check_folder(Path(__file__), overwrite=True)
     for name in held:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("kept")
@@ -197,33 +172,11 @@ def test_a_folder_in_use_is_refused_with_what_to_type(tmp_path, held, options, s
     assert all((tmp_path / name).read_text() == "kept" for name in held)
 
 
-@pytest.mark.parametrize("options", [{"overwrite": True}, {"overwrite": False, "resume": True}])
-def test_a_folder_in_use_is_taken_when_asked_to(tmp_path, options):
-    (tmp_path / UNFINISHED).mkdir()
-    (tmp_path / UNFINISHED / BEGUN).touch()
-    check_folder(tmp_path, **options)
-
-
 def test_what_a_dead_run_left_before_it_began_is_no_run(tmp_path):
     (tmp_path / UNFINISHED).mkdir()
     (tmp_path / UNFINISHED / "half").touch()
     write(tmp_path, "1")
     assert contents(tmp_path) == dict.fromkeys(NAMES, "1")
-
-
-def test_a_file_is_no_folder(tmp_path):
-    (tmp_path / "out").touch()
-    with pytest.raises(ValueError, match="is a file"):
-        check_folder(tmp_path / "out", overwrite=True)
-
-
-@pytest.mark.parametrize("error", [ValueError, OSError])
-def test_files_of_others_stay_in_a_folder_that_fails(tmp_path, error):
-    out = tmp_path / "new"
-    with pytest.raises(error), results(out, NAMES):
-        (out / "notes.txt").write_text("mine")
-        raise error
-    assert contents(out) == {"notes.txt": "mine"}
 
 
 def hold(folder, ready, end):
@@ -303,3 +256,9 @@ def test_a_dead_run_holds_nothing(tmp_path, rival):
     process.join(60)
     write(tmp_path / "out", "second")
     assert contents(tmp_path / "out") == dict.fromkeys(NAMES, "second")
+
+
+def test_versions_are_those_of_the_packages_that_run():
+    found = versions()
+    assert (found["python"], found["numpy"]) == (platform.python_version(), np.__version__)
+    assert found["fifesim"] == fifesim.__version__

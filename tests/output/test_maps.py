@@ -1,14 +1,31 @@
 """Maps of a page show the values at their places, in the colours that their bars say."""
 
 import io
+from xml.etree import ElementTree
 
+import dask
 import numpy as np
 import pytest
+import xarray as xr
+from lazy import CHUNKS, in_chunks
 from matplotlib import colormaps
 from PIL import Image
 
 import fifesim
-from fifesim.output.maps import encoded, false_colour_names, image_map, relief_map, stretch_of, value_map
+from fifesim.grids import grid as grids
+from fifesim.output.maps import (
+    composite_bands,
+    encoded,
+    false_colour_names,
+    image_map,
+    relief_map,
+    rgb,
+    stretch_of,
+    thinned,
+    valid,
+    value_map,
+    write_style,
+)
 
 
 @pytest.fixture(scope="module")
@@ -55,11 +72,6 @@ def test_colours_are_those_of_the_bar(lai):
     assert dict((text, place) for place, text in found.bar.ticks)["1.0"] == pytest.approx(50.0)
 
 
-def test_colours_diverge_from_their_middle(lai):
-    found = value_map(lai - 10.0, "less", "RdBu", middle=0.0)
-    assert dict((text, place) for place, text in found.bar.ticks)["0"] == pytest.approx(50.0)
-
-
 def test_a_frame_lies_where_its_ground_is(lai):
     """The ground is 600 m wide and 300 m high; the right half of its lowest 90 m is marked."""
     part = fifesim.grids.grid.geobox(lai[21:, 30:]).boundingbox
@@ -74,13 +86,6 @@ def test_leaves_are_red_and_soil_is_not(dn):
     red = found[..., 0] - found[..., 1:].mean(axis=-1)
     assert np.corrcoef(red.ravel(), ndvi.ravel())[0, 1] > 0.9
     assert false_colour_names(dn) == ["TM4", "TM3", "TM2"]
-
-
-def test_an_image_without_green_is_grey(dn):
-    two = dn.sel(band=["TM3", "TM4"])
-    assert false_colour_names(two) == []
-    pixels = image_map(two, "", stretch_of(two)).pixels
-    assert (pixels[..., 0] == pixels[..., 2]).all()
 
 
 def test_no_data_is_grey_in_an_image(dn):
@@ -106,3 +111,164 @@ def test_few_pixels_keep_their_edges(size, kind):
     assert picture.format == kind and picture.size == (size, size)
     np.testing.assert_allclose(np.asarray(picture.convert("RGB"), int)[[2, -2]], pixels[[2, -2]], atol=4)
     assert Image.open(io.BytesIO(encoded(pixels, lossless=True))).format == "PNG"
+
+
+GRID = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 1200.0, 900.0, 30.0)
+WAVELENGTHS = {"B2": 0.48, "B3": 0.56, "B4": 0.66, "B8": 0.84}
+
+
+def image_in(bands=tuple(WAVELENGTHS), dtype=float):
+    values = np.random.default_rng(4).uniform(1, 200, (len(bands), 30, 40)).astype(dtype)
+    array = xr.DataArray(values, dims=("band", "y", "x"), coords={"band": list(bands)})
+    array = array.assign_coords(wavelength=("band", [WAVELENGTHS[name] for name in bands]), sza=30.0)
+    return grids.place(array, GRID).assign_attrs(instrument="MSI")
+
+
+def test_colours_are_percentiles_of_the_bands():
+    array = image_in()
+    found = rgb(array, stretch=(10, 80))
+    assert found.dims == ("y", "x", "rgb") and found["rgb"].values.tolist() == ["red", "green", "blue"]
+    for colour, name in zip(("red", "green", "blue"), ("B8", "B4", "B3"), strict=True):
+        band = array.sel(band=name).values
+        low, high = np.percentile(band, (10, 80))
+        expected = np.clip((band - low) / (high - low), 0, 1)
+        np.testing.assert_allclose(found.sel(rgb=colour), expected, rtol=0, atol=1e-7)
+    assert found.attrs["long_name"] == "B8, B4, B3 as red, green, blue"
+    assert found.rio.crs.to_epsg() == 26914
+    # xarray makes its titles of scalars.
+    assert not {"sza", "band", "wavelength"} & set(found.coords)
+
+
+@pytest.mark.parametrize(
+    ("bands", "composite", "message"),
+    [
+        (("B4", "B8"), "natural colour", "natural colour needs a green and a blue band, the image has B4, B8"),
+        (("B3", "B4"), "false colour", "false colour needs a near infrared band"),
+        (("B3", "B4"), "colour", "composite must be 'false colour' or 'natural colour', or the names of three bands"),
+        (("B3", "B4"), ("B3", "B4", "B9"), "a composite is of three of the bands B3, B4"),
+        (("B3", "B4"), ("B3", "B4"), "a composite is of three of the bands B3, B4"),
+    ],
+)
+def test_bands_that_are_missing_are_named(bands, composite, message):
+    with pytest.raises(ValueError, match=message):
+        rgb(image_in(bands), composite)
+
+
+def test_other_mistakes_are_named():
+    with pytest.raises(ValueError, match="stretch must be two percentiles"):
+        rgb(image_in(), stretch=(98, 2))
+    with pytest.raises(ValueError, match="along a dimension band"):
+        rgb(image_in().isel(band=0))
+    with pytest.raises(ValueError, match=r"has no wavelength .*composite=\('\w+', '\w+', '\w+'\)"):
+        rgb(image_in().drop_vars("wavelength"))
+
+
+def test_bands_of_a_composite_may_be_numbers_and_have_no_contrast():
+    assert composite_bands(image_in(), "natural colour") == ["B4", "B3", "B2"]
+    numbered = image_in().assign_coords(band=[2, 3, 4, 8])
+    found = rgb(numbered, (8, 4, 3))
+    np.testing.assert_array_equal(found, rgb(image_in(), ("B8", "B4", "B3")))
+    assert found.attrs["long_name"] == "8, 4, 3 as red, green, blue"
+    numbered[3] = 7.0
+    assert (rgb(numbered).sel(rgb="red") == 0.5).all()
+
+
+def test_no_data_have_no_colour():
+    array = image_in(dtype=np.uint8)
+    array[2, 3, 4] = 0
+    found = rgb(array)
+    assert found[3, 4].isnull().all() and int(found.isnull().sum()) == 3
+    assert np.isnan(valid(array.isel(band=2)).values[3, 4])
+    other = array.isel(band=0).assign_attrs(_FillValue=array.values[0, 1, 1])
+    assert np.isnan(valid(other).values[1, 1])
+
+
+def test_colours_of_a_lazy_image_are_lazy_and_the_same():
+    array = image_in()
+    read = []
+    lazy = in_chunks(array, CHUNKS)
+    lazy = lazy.copy(data=lazy.data.map_blocks(lambda block: read.append(1) or block, meta=np.empty((0, 0, 0))))
+    found = rgb(lazy)
+    assert found.chunks is not None
+    # Colours are stretched between limits of the whole image, which is read once for them; no pixel is kept.
+    limits = len(read)
+    assert limits == lazy.data.npartitions
+    with dask.config.set(scheduler="synchronous"):
+        xr.testing.assert_identical(found.compute(), rgb(array))
+
+
+def test_a_large_raster_is_thinned_from_the_middle_of_its_blocks():
+    array = xr.DataArray(np.arange(12.0)[:, None] * np.ones(7), dims=("y", "x"))
+    assert thinned(array, 12) is array
+    few = thinned(array, 4)
+    assert few.shape == (4, 2) and few[:, 0].values.tolist() == [1, 4, 7, 10]
+    assert thinned(array.rename(y="line", x="sample"), 4).sizes == {"line": 4, "sample": 2}
+
+
+def style(raster, path):
+    return ElementTree.parse(write_style(fifesim.to_geotiff(raster, path))).getroot().find("pipe/rasterrenderer")
+
+
+@pytest.fixture(scope="module")
+def image(travelled):
+    return fifesim.open_image(travelled / "image.tif")
+
+
+def limits(renderer, colour):
+    found = renderer.find(f"{colour}ContrastEnhancement" if colour else "contrastEnhancement")
+    assert found.find("algorithm").text == "StretchToMinimumMaximum"
+    return [float(found.find(name).text) for name in ("minValue", "maxValue")]
+
+
+@pytest.mark.parametrize(
+    ("bands", "numbers"),
+    [
+        (["TM2", "TM3", "TM4"], "3 2 1"),
+        (["TM3", "TM4"], "2 1 1"),
+        (["TM4", "TM2", "TM3"], "1 3 2"),
+        (["TM1", "TM2", "TM3"], "3 2 1"),
+        (["TM2", "TM3"], None),
+    ],
+)
+def test_bands_are_found_by_their_wavelengths(lai, tmp_path, bands, numbers):
+    """In false colour, else in natural colour, else the first band in grey."""
+    rho = fifesim.surface_reflectance(lai[:6, :6], bands=bands)
+    renderer = style(rho, tmp_path / "image.tif")
+    if numbers is None:
+        assert (renderer.get("type"), renderer.get("grayBand")) == ("singlebandgray", "1")
+        return
+    assert renderer.get("type") == "multibandcolor"
+    assert " ".join(renderer.get(f"{colour}Band") for colour in ("red", "green", "blue")) == numbers
+
+
+def ramp(renderer):
+    return [(float(item.get("value")), item.get("color")) for item in renderer.iter("item")]
+
+
+def test_leaf_area_and_ndvi_have_ramps_of_their_own(image, travelled, tmp_path):
+    truth = fifesim.open_image(travelled / "truth.tif")
+    shown = ramp(style(truth, tmp_path / "truth.tif"))
+    assert shown[0] == (0.0, "#ffffe5")
+    assert shown[-1][0] == pytest.approx(float(np.percentile(truth.sel(band="lai"), 99)), rel=1e-5)
+    assert [value for value, _ in shown] == sorted(value for value, _ in shown)
+    ndvi = ramp(style(image.fifesim.ndvi(), tmp_path / "ndvi.tif"))
+    assert (ndvi[0], ndvi[-1]) == ((0.0, "#440154"), (1.0, "#fde725"))
+
+
+def test_no_data_is_not_stretched(image, tmp_path):
+    holed = image.sel(band=["TM4"]).copy()
+    holed[:, :, :15] = 0
+    renderer = style(holed, tmp_path / "holed.tif")
+    expected = np.percentile(fifesim.to_radiance(image).sel(band="TM4")[:, 15:], (1, 99))
+    np.testing.assert_allclose(limits(renderer, ""), expected, rtol=1e-5)
+    low, high = limits(style(image.sel(band=["TM4"]).where(False, 7).astype("uint8"), tmp_path / "flat.tif"), "")
+    assert low < high
+
+
+def test_a_style_of_ones_own_stays(image, tmp_path):
+    path = fifesim.to_geotiff(image, tmp_path / "image.tif")
+    (tmp_path / "image.qml").write_text("mine")
+    with pytest.raises(FileExistsError, match="overwrite=True"):
+        write_style(path)
+    assert (tmp_path / "image.qml").read_text() == "mine"
+    assert "multibandcolor" in write_style(path, overwrite=True).read_text(encoding="utf-8")

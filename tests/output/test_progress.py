@@ -9,7 +9,7 @@ import pytest
 
 from fifesim.base.messages import quiet
 from fifesim.output import progress
-from fifesim.output.progress import CellProgress, ChipProgress, doing, memory, since_start, steps
+from fifesim.output.progress import CellProgress, ChipProgress, doing, since_start, steps
 
 
 def test_lines_say_where_the_run_is(capsys):
@@ -19,13 +19,6 @@ def test_lines_say_where_the_run_is(capsys):
     assert (first["cells_done"], first["seconds_left"]) == (40, None)
     assert (last["cells_done"], last["cells"], last["seconds_left"]) == (100, 100, 0)
     assert last["cells_per_second"] > 0 and last["memory"] > 10e6
-
-
-def test_lines_are_a_second_apart(capsys):
-    with CellProgress(cells=10**6, as_json=True) as progress:
-        for _ in range(50):
-            progress.advance(1)
-    assert len(capsys.readouterr().out.splitlines()) < 10
 
 
 def test_a_line_a_minute_says_where_the_run_is_without_a_terminal(capsys, monkeypatch):
@@ -56,10 +49,6 @@ def test_nothing_is_printed_of_a_short_run_without_a_terminal(capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_memory_is_that_of_a_python_with_numpy():
-    assert 20e6 < memory() < 100e9
-
-
 @pytest.mark.parametrize(("widgets", "shown"), [(True, True), (False, False)])
 def test_a_notebook_shows_bars_where_it_has_widgets(monkeypatch, widgets, shown):
     """A notebook's standard error is no terminal; what rich draws there are widgets."""
@@ -76,25 +65,8 @@ def test_steps_are_logged(caplog):
     assert caplog.messages == ["scenes: 2", "scenes: 1 of 2", "scenes: 2 of 2"]
 
 
-def test_quiet_has_no_lines_either(capsys, monkeypatch):
-    now = iter(range(0, 10**6, 100))
-    monkeypatch.setattr(time, "monotonic", lambda: float(next(now)))
-    with quiet(), CellProgress(cells=10) as progress:
-        for _ in range(5):
-            progress.advance(2)
-    assert capsys.readouterr() == ("", "")
-
-
-def test_chips_are_counted_as_cells_are(capsys, monkeypatch):
+def test_chips_are_counted_as_cells_are(capsys):
     with ChipProgress(100, 40, as_json=True) as progress:
         progress.advance(60)
     *_, last = map(json.loads, capsys.readouterr().out.splitlines())
     assert (last["chips_done"], last["chips"], last["seconds_left"]) == (100, 100, 0)
-    now = iter(range(0, 10**6, 25))
-    monkeypatch.setattr(time, "monotonic", lambda: float(next(now)))
-    with ChipProgress(8) as progress:
-        for _ in range(8):
-            progress.advance(1)
-    assert re.match(
-        r"making chips: \d of 8 chips, 0\.0/s, \d+\.\d+ GB, .* left$", capsys.readouterr().err.splitlines()[0]
-    )

@@ -112,13 +112,6 @@ def test_gdal_opens_the_cells_with_their_crs(travelled):
         np.testing.assert_array_equal(source.read(), reflectance)
 
 
-def test_xarray_and_rioxarray_open_the_cells(travelled):
-    with xr.open_zarr(travelled / "scene.zarr", decode_coords="all") as cells:
-        assert cells.rio.crs.to_epsg() == 26914
-        np.testing.assert_allclose(cells.rio.bounds(), (WEST, NORTH - 600, WEST + 900, NORTH), rtol=0, atol=1e-6)
-        assert list(cells["band"].values) == ["TM2", "TM3", "TM4"]
-
-
 QGIS = """
 import json, sys
 from qgis.core import QgsApplication, QgsRasterLayer

@@ -1,35 +1,33 @@
 """What a page says of a scenario."""
 
+import base64
 import re
 
+import jinja2
+import matplotlib
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import fifesim
 from fifesim.analysis.regression_labels import regress
+from fifesim.output import report
 from fifesim.output.report import (
     cautions,
     engine_rows,
     finding,
+    fit_figure,
     fixed,
     headline,
+    histogram_figures,
     inputs_in_words,
     main_results,
     pairing,
+    pairing_rows,
     title,
 )
 from fifesim.scenario.scenario import parse_scenario
-
-
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        ({"ground": {"arp": 0.15}}, "arp 0.15, seen by TM"),
-        ({"sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]}}, "seen by OLI"),
-    ],
-)
-def test_title_names_ground_and_instrument_and_what_is_synthetic(values, said):
-    assert title(parse_scenario(values)).endswith(f"{said} (synthetic landscape, hypothetical overpass)")
+from fifesim.scenario.simulation import simulate
 
 
 def test_title_has_the_names_of_files_and_not_their_folders():
@@ -38,6 +36,8 @@ def test_title_has_the_names_of_files_and_not_their_folders():
     sensor = scenario.sensor.model_copy(update={"instrument": "/elsewhere/camera.toml"})
     scenario = scenario.model_copy(update={"ground": ground, "sensor": sensor})
     assert title(scenario) == "leaves.tif, seen by camera.toml"
+    oli = parse_scenario({"ground": {"arp": 0.15}, "sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]}})
+    assert title(oli).endswith("arp 0.15, seen by OLI (synthetic landscape, hypothetical overpass)")
 
 
 def engine_row(sza, **atmosphere):
@@ -122,3 +122,129 @@ def test_cautions_name_what_is_left_out(run):
     assert ("perfectly registered" in said) is not any(scenario.sensor.offset)
     assert "No detector noise" in said
     assert "visibility 45 km" in inputs_in_words(scenario, image) and "nadir view" in inputs_in_words(scenario, image)
+
+
+GRID = {"width": 1110, "height": 1110}
+
+
+class Fit:
+    """A line."""
+
+    r2 = 0.931
+
+
+def published(fits=None, **sections):
+    values = {"grid": GRID, "ground": {"distribution": "burned-grazed", "arp": 0.15}}
+    values |= {"sensor": {"response": "paper"}} | sections
+    return pairing_rows(parse_scenario(values).complete(), {"lai": Fit} if fits is None else fits)
+
+
+def test_run_of_the_papers_ground_says_why_its_r2_is_another():
+    (_, why), (_, typed) = published()
+    assert why.startswith("0.61, and 0.93 here") and "30.315 m apart" in why
+    assert 'interval = "native" in [sensor]' in typed and "fifesim reproduce" in typed
+    # What it says is what a run with that key gives, on level ground.
+    sections = {"terrain": {"dem": "flat"}, "sensor": {"interval": "native", "response": "paper"}}
+    ground = {"distribution": "burned-grazed", "arp": 0.15}
+    run = simulate(parse_scenario({"grid": GRID, "ground": ground, **sections}), chunks=None)
+    truth, ndvi = run["truth"]["lai"].values, run["image"]["ndvi"].values
+    n = min(len(truth), len(ndvi))
+    pairs = np.stack([truth[:n, :n].ravel(), ndvi[:n, :n].ravel()])
+    r2 = np.corrcoef(pairs[:, np.isfinite(pairs).all(axis=0)])[0, 1] ** 2
+    assert float(re.search(r"R² (0\.\d\d) for 333 x 333 cells", typed)[1]) == pytest.approx(r2, abs=0.0051)
+    assert 0.45 < r2 < 0.7
+
+
+@pytest.mark.parametrize(
+    "sections",
+    [
+        {"sensor": {"interval": "native", "response": "paper"}},
+        {"sensor": {"instrument": "OLI"}},
+        {"sensor": {}},
+        {"ground": {"arp": 0.2, "distribution": "burned-grazed"}},
+        {"fits": {}},
+    ],
+    ids=str,
+)
+def test_other_runs_are_not_compared(sections):
+    assert published(**sections) == []
+
+
+def test_small_scene_says_what_to_type_alone():
+    (_, why), (_, typed) = published(grid={"width": 120, "height": 120})
+    assert why.startswith("0.61") and typed.startswith("use interval")
+
+
+@pytest.fixture(scope="module")
+def level():
+    scenario = parse_scenario({"grid": {"width": 600, "height": 300}, "terrain": {"dem": "flat"}})
+    tree = fifesim.simulate(scenario.complete()).compute()
+    image = tree["image"].to_dataset()
+    return image.assign(ndvi=image["dn"].fifesim.ndvi()), tree["truth"].to_dataset(), tree["scene"]["lai"]
+
+
+def test_regression_is_written_above_its_line(level):
+    image, truth, _ = level
+    fit = regress(truth["lai"], image["ndvi"], pair="index")
+    axis = fit_figure(image, truth, "lai", fit).axes[0]
+    assert f"n = {fit.n}" in axis.get_title()
+    (line,) = axis.lines
+    np.testing.assert_allclose(line.get_ydata(), fit.intercept + fit.slope * line.get_xdata())
+
+
+def test_every_pixel_is_counted_where_it_lies(level):
+    image, truth, _ = level
+    axis = fit_figure(image, truth, "lai", regress(truth["lai"], image["ndvi"], pair="index")).axes[0]
+    (density,) = axis.images
+    counts = 10.0 ** density.get_array()
+    ndvi = image["ndvi"].values[np.isfinite(image["ndvi"].values)]
+    assert counts.sum() == pytest.approx(ndvi.size)
+    assert density.get_extent()[:2] == pytest.approx([ndvi.min(), ndvi.max()])
+    centres = np.linspace(*density.get_extent()[:2], 2 * counts.shape[1] + 1)[1::2]
+    step = centres[1] - centres[0]
+    assert (counts.filled(0).sum(axis=0) @ centres) / ndvi.size == pytest.approx(float(ndvi.mean()), abs=step / 2)
+
+
+def test_frequencies_are_of_all_pixels(level):
+    image, truth, detail = level
+    axis = histogram_figures(image, truth, detail)[2].axes[0]
+    shares = {line.get_label(): line.get_ydata().sum() for line in axis.lines}
+    assert shares == pytest.approx(dict.fromkeys(map(str, image["band"].values), 1.0))
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == list(shares)
+
+
+@pytest.fixture
+def template(tmp_path):
+    def write(content):
+        path = tmp_path / "own.html.j2"
+        path.write_text(f'{{% extends "page.html.j2" %}}{{% block content %}}{content}{{% endblock %}}')
+        return path
+
+    return write
+
+
+def drawn():
+    figure = Figure(figsize=(2, 1))
+    figure.subplots().plot([0, 1])
+    return report.png(figure, 50)
+
+
+def test_a_picture_is_in_the_page_as_it_is(template):
+    page = report.page_html(template('<img src="{{ picture | embedded }}">{{ text }}'), picture=drawn(), text="a < b")
+    (content,) = re.findall(r'src="data:image/png;base64,([^"]*)"', page)
+    assert base64.b64decode(content) == drawn()
+    # Width and height are at bytes 16 to 24 of a PNG.
+    assert [int.from_bytes(drawn()[start : start + 4]) for start in (16, 20)] == [100, 50]
+    assert "a &lt; b" in page and f"matplotlib {matplotlib.__version__}" in page
+
+
+def test_a_name_without_a_value_is_an_error(template):
+    with pytest.raises(jinja2.UndefinedError, match="forgotten"):
+        report.page_html(template("{{ forgotten }}"))
+
+
+def test_zero_has_no_sign():
+    assert [report.fixed(value, 3, sign=True) for value in (-4e-4, 4e-4, -6e-4, 6e-4)] == [
+        "0.000", "0.000", "−0.001", "+0.001",
+    ]  # fmt: skip
+    assert report.fixed(-0.0, 3) == "0.000"

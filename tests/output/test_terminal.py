@@ -3,11 +3,22 @@
 import atexit
 import gc
 import logging
+import os
+import signal
 
 import pytest
 
 from fifesim.base.messages import LOG, quiet
-from fifesim.output.terminal import Exit, importing, in_time, listening, print_lines, print_warning, report, stop
+from fifesim.output.terminal import (
+    Exit,
+    importing,
+    in_time,
+    interrupts_blocked,
+    listening,
+    print_lines,
+    report,
+    stop,
+)
 
 
 def test_the_last_line_says_how_long_it_took_and_what_to_open(capsys):
@@ -44,11 +55,6 @@ def test_names_from_elsewhere_cannot_steer_a_terminal(capsys):
     assert capsys.readouterr().out == "one\\x1b[31m\ntwo\nthree\n"
 
 
-def test_a_warning_is_a_line(capsys):
-    print_warning(UserWarning("a\nb"))
-    assert capsys.readouterr().err == "fifesim: warning: a\\nb\n"
-
-
 @pytest.mark.parametrize("code", Exit)
 def test_a_mistake_ends_with_its_code_and_at_most_500_characters(code, capsys):
     with pytest.raises(SystemExit) as caught:
@@ -68,3 +74,15 @@ def test_what_imports_make_is_not_searched_for_garbage(monkeypatch):
         assert gc.isenabled() and gc.get_freeze_count() > 0 and last == [gc.freeze]
     finally:
         gc.unfreeze()
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals cannot be blocked on Windows")
+def test_ctrl_c_waits_for_the_end_of_the_context():
+    done, before = [], signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt), interrupts_blocked():
+            os.kill(os.getpid(), signal.SIGINT)
+            done.append("rest")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert done == ["rest"] and signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())

@@ -8,7 +8,9 @@ import pytest
 import xarray as xr
 
 from fifesim.output.chips import datasheet
+from fifesim.output.chips.datasheet import contact_sheet
 from fifesim.output.chips.store import Shards
+from fifesim.output.colours import dark_and_bright
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.studies import Study
@@ -90,3 +92,52 @@ def test_page_says_why_a_part_has_no_chips(count, said, dataset):
 def test_page_is_self_contained_and_has_the_study(page, chips):
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
     assert chips.study.to_toml() in html.unescape(page)
+
+
+def dataset_of(bands, wavelengths, names=("lai", "fpar"), chips=7):
+    generator = np.random.default_rng(0)
+    rasters = {name: (("chip", "y", "x"), generator.random((chips, 5, 4))) for name in (*names, "ndvi")}
+    reflectance = ("chip", "band", "y", "x"), generator.random((chips, len(bands), 5, 4))
+    split = ["test", "train", "train", "train", "train", "train", "test"][:chips]
+    coordinates = {"band": list(bands), "wavelength": ("band", list(wavelengths)), "split": ("chip", split)}
+    return xr.Dataset(rasters | {"toa_reflectance": reflectance}, coords=coordinates)
+
+
+def test_a_few_chips_of_each_part_in_its_order():
+    figure = contact_sheet(dataset_of(["TM3", "TM4"], [0.66, 0.84]), ["train", "validation", "test"])
+    titles = [axis.get_title() for axis in figure.axes if axis.get_title()]
+    assert titles == ["train\nchip 1", "\nchip 2", "\nchip 3", "\nchip 4", "test\nchip 0", "\nchip 6"]
+    labels = [axis.get_ylabel() for axis in figure.axes if axis.get_ylabel()]
+    assert labels == ["NDVI\nof the image", "LAI", "FPAR"]
+
+
+def test_one_band_is_grey():
+    figure = contact_sheet(dataset_of(["TM5"], [1.65]).drop_vars("ndvi"), ["train"])
+    assert figure.axes[0].get_ylabel() == "image: TM5"
+    picture = figure.axes[0].images[0].get_array()
+    np.testing.assert_array_equal(picture[..., 0], picture[..., 2])
+
+
+def test_pixels_without_data_are_clear():
+    dataset = dataset_of(["TM2", "TM3", "TM4"], [0.56, 0.66, 0.84])
+    dataset["toa_reflectance"][1, 0, 2, 3] = np.nan
+    picture = contact_sheet(dataset, ["train"]).axes[0].images[0].get_array()
+    assert picture[2, 3, 3] == 0 and (np.delete(picture[..., 3].ravel(), 11) == 1).all()
+
+
+def test_near_infrared_is_red_and_stretched_as_in_a_report_over_all_chips():
+    dataset = dataset_of(["B03", "B04", "B08"], [0.56, 0.66, 0.84])
+    near = dataset["toa_reflectance"].sel(band="B08").isel(chip=[0, 6])
+    dark, bright = dark_and_bright(near.values.ravel())
+    axis = contact_sheet(dataset, ["test"]).axes[0]
+    assert axis.get_ylabel() == "image: B08,\nB04,\nB03"
+    expected = ((near[0] - dark) / (bright - dark)).clip(0, 1)
+    np.testing.assert_allclose(axis.images[0].get_array()[..., 0], expected, rtol=0, atol=1e-12)
+
+
+def test_without_a_green_band_the_image_is_its_ndvi_and_a_row_shares_its_colours():
+    dataset = dataset_of(["TM3", "TM4"], [0.66, 0.84])
+    figure = contact_sheet(dataset, ["train", "test"])
+    pictures = [axis.images[0] for axis in figure.axes[:6]]
+    np.testing.assert_array_equal(pictures[4].get_array(), dataset["ndvi"][0])
+    assert pictures[0].get_cmap().name == "viridis" and len({picture.get_clim() for picture in pictures}) == 1

@@ -19,10 +19,10 @@ from matplotlib.figure import Figure
 import fifesim
 from fifesim.output.chips import datasheet, store
 from fifesim.output.chips import folder as chips_folder
-from fifesim.output.chips.folder import CONTACT_SHEET, DATASHEET, STUDY, dataset_to_folder, study_to_resume
+from fifesim.output.chips.folder import dataset_to_folder, study_to_resume
 from fifesim.output.folders import UNFINISHED
 from fifesim.scenario.scenario import parse_scenario
-from fifesim.scenario.studies import Study, read_study
+from fifesim.scenario.studies import Study
 
 SMALL = {"grid": {"width": 180.0, "height": 180.0}, "terrain": {"dem": "flat"}}
 DRAWS = {"visibility": {"uniform": [10, 60]}, "ground.brown": {"choice": [0.0, 0.3]}}
@@ -83,11 +83,6 @@ def test_a_chip_is_its_scenario_simulated(study, whole):
     chip = xr.open_zarr(whole, mask_and_scale=False).isel(chip=4)
     np.testing.assert_array_equal(chip.dn, run["image"]["dn"])
     assert float(chip["atmosphere.visibility"]) == fifesim.chips_of(study, 40).scenario(4).atmosphere.visibility
-
-
-def test_the_study_is_in_the_folder(study, whole):
-    assert read_study(whole / STUDY) == study
-    assert xr.open_zarr(whole).attrs["study"] == (whole / STUDY).read_text()
 
 
 # Chips come in shards of two.
@@ -235,22 +230,12 @@ def test_a_part_that_gets_no_chip_is_told(count, none, study):
         chips_folder._warn_of_empty_parts(chips)
 
 
-def test_parts_that_have_chips_are_not_told_of(study, recwarn):
-    chips_folder._warn_of_empty_parts(fifesim.chips_of(study, 3))
-    assert not recwarn.list
-
-
 def test_a_file_that_is_chosen_is_an_input(tmp_path, study):
     samples = tmp_path / "mine.csv"
     samples.write_text("lai\n0.5\n0.7\n0.9\n1.1\n1.4\n")
     draws = {"distribution": {"choice": ["burned-grazed", str(samples)]}}
     chips = fifesim.chips_of(Study(study.scenario, draws, landscapes=3), 2)
     assert list(chips_folder._inputs(chips)) == [str(samples)]
-
-
-def test_the_folder_has_what_people_read(whole):
-    assert all((whole / name).stat().st_size > 100 for name in (DATASHEET, CONTACT_SHEET))
-    assert not (whole / UNFINISHED).exists()
 
 
 def test_the_loader_of_the_page_reads_each_chip_of_a_part_once(whole, monkeypatch):

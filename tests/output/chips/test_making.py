@@ -105,12 +105,6 @@ def test_shards_are_those_of_the_chips_one_after_the_other(seed, chips, layout, 
     check_all(made_shards(chips, layout, shards, [0, 1, 2], told.append, makers), told, chips, layout, shards)
 
 
-def test_only_shards_that_are_wanted_are_made(chips, layout, shards):
-    told = []
-    found = dict(made_shards(chips, layout, shards, [2], told.append))
-    assert set(found) == {2} and told and len(found[2]["dn"]) == 1
-
-
 def test_processes_make_the_same_bits_and_end(chips, layout, shards):
     told = []
     with processes(2) as makers:
@@ -128,15 +122,6 @@ def test_processes_end_at_once_where_nobody_waits_for_them(chips, layout, shards
         (process,) = multiprocessing.active_children()
         raise KeyboardInterrupt
     assert not process.is_alive()
-
-
-def test_a_process_says_what_it_could_not_make(chips, layout, shards):
-    other = layout._replace(truth=())
-    with (
-        pytest.raises(ValueError, match=r"chip \d: has a true property that others lack, fpar, lai"),
-        processes(1) as makers,
-    ):
-        list(made_shards(chips, other, shards, [0, 1, 2], [].append, makers))
 
 
 def test_a_process_that_is_killed_is_told(chips, layout, shards):

@@ -9,7 +9,8 @@ import pytest
 import xarray as xr
 import zarr
 
-from fifesim.output.chips.store import Shards, checksums, chip_arrays, layout_of, make_store, stored_names, write_shard
+import fifesim
+from fifesim.output.chips.store import Shards, checksums, chip_arrays, layout_of, make_store, write_shard
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.studies import Study
@@ -58,12 +59,6 @@ def test_what_it_holds_says_its_units(made):
     assert np.diff(dataset.y.values).tolist() == [-30.0] * 5 and dataset.x.values[0] == 15
 
 
-def test_chips_lie_in_the_shards_of_their_ranges():
-    shards = Shards(50, 30_000, 12)
-    for shard in range(len(shards)):
-        assert set(shards.shard_of(np.arange(*shards.range_of(shard)))) == {shard}
-
-
 def test_a_shard_is_a_file(made):
     folder = made[0]
     files = sorted(path.relative_to(folder / "dn").as_posix() for path in (folder / "dn").rglob("0") if path.is_file())
@@ -80,11 +75,6 @@ def test_making_it_again_leaves_the_shards(made):
     (folder / "dn" / "zarr.json").write_text("half")
     make_store(folder, chips, layout, shards)
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
-
-
-def test_names_are_those_of_its_folders(made):
-    folder, chips, layout, _, _ = made
-    assert {path.name for path in folder.iterdir()} == {*stored_names(chips, layout), "zarr.json"}
 
 
 def test_checksums_find_a_changed_byte_and_a_missing_file(made, tmp_path):
@@ -112,3 +102,103 @@ def test_shards_are_large_enough_to_share_tiles_and_small_enough_for_memory(coun
     ranges = [shards.range_of(shard) for shard in range(len(shards))]
     assert ranges[0][0] == 0 and ranges[-1][1] == count
     assert all(before[1] == after[0] for before, after in pairwise(ranges))
+
+
+SUNNY = {"visibility": {"uniform": [10, 60]}, "brown": {"choice": [0.0, 0.3]}, "sza": {"uniform": [20, 50]}}
+
+
+@pytest.fixture(scope="module")
+def chips():
+    sun = {"geometry": {"sza": 30.0, "saa": 120.0}}
+    return chips_of(Study(parse_scenario(SMALL | sun), SUNNY, landscapes=3), 7)
+
+
+@pytest.fixture(scope="module")
+def layout(chips):
+    return layout_of(chips)
+
+
+@pytest.fixture(scope="module")
+def arrays(chips, layout):
+    return chip_arrays(chips, range(2, 7), layout)
+
+
+def test_a_chip_has_the_bits_of_its_scenario(chips, arrays):
+    run = fifesim.simulate(chips.scenario(5), complete=True)
+    expected = (
+        run["truth"]
+        .to_dataset()[["lai", "fpar"]]
+        .assign(ndvi=run["image"]["ndvi"], toa_reflectance=fifesim.sensor.labels.to_reflectance(run["image"]["dn"]))
+    )
+    for name, values in expected.data_vars.items():
+        np.testing.assert_array_equal(arrays[name][3], values.values.astype(np.float32))
+    np.testing.assert_array_equal(arrays["dn"][3], run["image"]["dn"])
+    assert arrays["sza"][3] == float(run["image"]["sza"])
+
+
+def test_green_leaves_are_all_leaves_where_none_is_dead(chips, arrays):
+    brown = np.array([chips.scenario(chip).ground.brown for chip in range(2, 7)])
+    assert {0.0, 0.3} == set(brown.tolist())
+    alike = (arrays["green_fpar"] == arrays["fpar"]).all(axis=(1, 2))
+    np.testing.assert_array_equal(alike, brown == 0)
+
+
+def test_layout_says_shapes_and_types(layout, arrays):
+    for name, (dims, dtype) in layout.variables.items():
+        assert arrays[name].shape == (5, *layout.shape(dims)) and arrays[name].dtype == dtype
+    assert layout.size == sum(each.nbytes for each in arrays.values()) / 5
+    assert layout.pixels == (6, 6) and layout.pixel == 30
+    assert layout.bands["band"].values.tolist() == ["TM3", "TM4"]
+
+
+def test_a_truth_that_others_have_not_names_its_chip(chips, layout):
+    without = layout._replace(truth=("lai", "fpar"))
+    with pytest.raises(ValueError, match=r"chip \d: has a true property that others lack, green_fpar"):
+        chip_arrays(chips, range(0, 7), without)
+
+
+GRASS = {"landscape": {"cover": "voronoi"}, "classes": {"grass": {}, "burned": {"distribution": "burned-grazed"}}}
+
+
+@pytest.mark.parametrize(
+    "sections",
+    [
+        {"sensor": {"instrument": "MSI"}},
+        {"sensor": {"instrument": "L4TM", "offset": [0.5, -1.2], "noise": ["all"]}},
+        {"sensor": {"instrument": "L4TM", "interval": 30.0}, **GRASS},
+        {"sensor": {"instrument": "MSI"}, "terrain": {"dem": "flint-hills"}},
+        {"sensor": {"instrument": "MSI"}, "atmosphere": {"adjacency": True}},
+    ],
+    ids=["blur", "offset", "cover", "hills", "adjacency"],
+)
+def test_chips_have_no_missing_pixels(sections):
+    """Their edges see the ground around; each chip has the bits of its scenario, simulated with that ground."""
+    study = Study(parse_scenario(SMALL | sections), {"visibility": {"uniform": [10, 60]}}, landscapes=3)
+    chips = chips_of(study, 3)
+    found = chip_arrays(chips, range(3), layout_of(chips))
+    for name in ("toa_reflectance", "ndvi", "lai", "fpar"):
+        assert np.isfinite(found[name]).all(), name
+    assert (found["dn"] > 0).all()
+    run = fifesim.simulate(chips.scenario(2), complete=True)
+    np.testing.assert_array_equal(found["dn"][2], run["image"]["dn"])
+    np.testing.assert_array_equal(found["lai"][2], run["truth"]["lai"].values.astype(np.float32))
+    bare = fifesim.simulate(chips.scenario(2))
+    assert run["scene"].sizes == bare["scene"].sizes
+    np.testing.assert_array_equal(run["truth"]["lai"], bare["truth"]["lai"])
+    if "atmosphere" not in sections:
+        # Nearer to the edge, a pixel of the bare scene sees between 98 % and all of its footprint.
+        middle = (..., slice(size := bare["image"].sizes["y"] // 2 - 1, -size), slice(size, -size))
+        assert (run["image"]["dn"].values[middle] > 0).all()
+        np.testing.assert_array_equal(run["image"]["dn"].values[middle], bare["image"]["dn"].values[middle])
+
+
+def test_pixels_at_the_edge_are_those_of_a_larger_scene():
+    scenario = parse_scenario(SMALL | {"sensor": {"instrument": "L4TM"}})
+    image = fifesim.simulate(scenario, complete=True)["image"]["dn"]
+    grid = scenario.geobox().pad(90)
+    larger = {"west": grid.affine.c, "north": grid.affine.f, "width": 780.0, "height": 780.0}
+    whole = fifesim.simulate(parse_scenario({**SMALL, "grid": larger, "sensor": {"instrument": "L4TM"}}))["image"]["dn"]
+    np.testing.assert_array_equal(image, whole.sel(y=image.y, x=image.x, method="nearest", tolerance=0.01))
+    periodic = parse_scenario(SMALL | {"ground": {"method": "periodic"}})
+    with pytest.raises(ValueError, match=r"no ground beyond the scene: use method = \"streaming\""):
+        fifesim.simulate(periodic, complete=True)

@@ -11,7 +11,7 @@ import fifesim
 from fifesim.output import report
 from fifesim.output.run.again import Rerun, outcome_in_words, read_origin, rerun
 from fifesim.output.run.folder import simulate_to_folder
-from fifesim.output.run.identity import PRODUCT, SCENARIO_TAG, VERSIONS
+from fifesim.output.run.identity import VERSIONS
 from fifesim.scenario.scenario import parse_scenario
 
 
@@ -58,24 +58,6 @@ def test_inputs_move_with_the_file(tmp_path):
     (moved / "lai.tif").unlink()
     with pytest.raises(ValueError, match=r"ground\.lai_file = .*lai\.tif.*does not exist"):
         rerun(moved / "out" / "image.tif")
-
-
-def test_an_image_that_left_its_inputs_behind_says_where_they_would_lie(tmp_path):
-    """A path is told as it is seen from the image, and where that leads, without steps up and down."""
-    scenario = '[ground]\nlai_file = "../../maps/lai.tif"\n'
-    tags = {SCENARIO_TAG: scenario, PRODUCT: "image.tif", VERSIONS: "{}"}
-    (tmp_path / "away" / "further").mkdir(parents=True)
-    sent = tmp_path / "away" / "further" / "sent.tif"
-    place = rasterio.transform.from_origin(704970, 4334220, 30, 30)
-    with rasterio.open(sent, "w", driver="GTiff", width=2, height=2, count=1, dtype="uint8", transform=place) as sink:
-        sink.update_tags(**tags)
-    with pytest.raises(ValueError) as caught:
-        rerun(sent)
-    said = str(caught.value)
-    assert "ground.lai_file = '../../maps/lai.tif', relative to its folder" in said
-    assert (
-        f"{tmp_path / 'maps' / 'lai.tif'} does not exist: rerun it in its original folder" in said and len(said) <= 500
-    )
 
 
 def test_a_file_without_the_tags_is_refused_with_what_to_do(travelled, tmp_path):

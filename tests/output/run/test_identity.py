@@ -2,6 +2,7 @@
 
 import json
 import os
+import tomllib
 import zipfile
 
 import numpy as np
@@ -10,20 +11,24 @@ import rasterio
 import rasterio.shutil
 
 from fifesim.base import files
-from fifesim.output.folders import BEGUN
+from fifesim.output.folders import BEGUN, versions
 from fifesim.output.run import identity as run_identity
 from fifesim.output.run.identity import (
+    PRODUCT,
+    SCENARIO_TAG,
+    VERSIONS,
     NotThisRun,
     begin,
     changed_inputs,
     check_finished,
     check_inputs,
     inputs_of,
+    origin_tags,
     scenario_to_resume,
     state_of,
     with_checksums,
 )
-from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.scenario import parse_scenario, read_scenario
 from fifesim.scenario.toml import write_scenario
 
 SMALL = {"grid": {"width": 90, "height": 90}, "terrain": {"dem": "flat"}}
@@ -199,15 +204,30 @@ def test_a_run_is_gone_on_with_whatever_the_comments_say(tmp_path):
         begin(tmp_path, identity_of(turned, False))
 
 
-def test_a_time_of_another_run_is_named_without_the_heading(tmp_path):
-    begin(tmp_path, identity_of(parse_scenario(SMALL | {"geometry": {"time": "1987-08-15T16:40Z"}}).complete(), False))
-    with pytest.raises(NotThisRun, match=r'has another scenario, with time = "1987-08-15T16:40Z": leave out'):
-        begin(tmp_path, identity_of(parse_scenario(SMALL).complete(), False))
-
-
 def test_another_scenario_is_not_gone_on_with(tmp_path):
     begin(tmp_path, identity_of(parse_scenario(SMALL).complete(), False))
     other = identity_of(parse_scenario(SMALL | {"ground": {"seed": 8}}).complete(), False)
     with pytest.raises(NotThisRun, match=r"seed = 7.*--overwrite"):
         begin(tmp_path, other)
     assert (tmp_path / BEGUN).is_file()
+
+
+def test_tags_hold_the_scenario_and_what_computed_it(travelled):
+    with rasterio.open(travelled / "truth.tif") as source:
+        tags = source.tags()
+    assert tags[SCENARIO_TAG] == write_scenario(read_scenario(travelled / "scenario.toml"))
+    assert (tags[PRODUCT], json.loads(tags[VERSIONS])) == ("truth.tif", versions())
+
+
+def test_files_are_named_from_where_the_file_lies(tmp_path):
+    """So that nobody reads in an image where its maker's files are, and all can be moved together."""
+    data = tmp_path / "data" / "hills.tif"
+    data.parent.mkdir()
+    data.touch()
+    scenario = parse_scenario({"terrain": {"dem": str(data)}})
+    for folder, expected in ((tmp_path / "out", "../data/hills.tif"), (data.parent, "hills.tif")):
+        text = origin_tags(scenario, "image.tif", folder)[SCENARIO_TAG]
+        assert tomllib.loads(text)["terrain"]["dem"] == expected
+        assert str(tmp_path) not in text
+    virtual = parse_scenario({"terrain": {"dem": "/vsizip/hills.zip/hills.tif"}})
+    assert "/vsizip/hills.zip/hills.tif" in origin_tags(virtual, "image.tif", tmp_path)[SCENARIO_TAG]

@@ -1,11 +1,13 @@
 """Workers of a cluster are other processes: what goes to them must pickle, and what they write must be whole."""
 
+import re
 import socket
 import subprocess
 import sys
+import weakref
+from collections import namedtuple
 from types import SimpleNamespace
 
-import dask
 import dask.array as da
 import distributed
 import numpy as np
@@ -16,9 +18,25 @@ import xarray as xr
 from distributed import Client, KilledWorker, LocalCluster
 
 import fifesim
+from fifesim import fife_site
+from fifesim.base.footprints import axis_operator
+from fifesim.base.line_spread import Boxcar
+from fifesim.grids import grid as grids
+from fifesim.grids.chunks import neighbourhood
+from fifesim.grids.reductions import resample
+from fifesim.grids.windows import array_from_windows, tiles
 from fifesim.output import report
+from fifesim.output.run import workers
 from fifesim.output.run.folder import simulate_to_folder
-from fifesim.output.run.workers import cluster, run_on_client, tasks_of
+from fifesim.output.run.workers import (
+    check_memory_of_cells,
+    check_size,
+    cluster,
+    disk_of,
+    run_on_client,
+    run_on_threads,
+    tasks_of,
+)
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
@@ -56,10 +74,6 @@ def image_of(lai):
     return rho.fifesim.to_toa().fifesim.sense("TM")
 
 
-def test_a_scale_of_the_file_is_applied(lai_file):
-    assert 4 < float(scene(lai_file, None).max()) <= 4.9
-
-
 def test_workers_give_the_bits_of_one_process(client, lai_file):
     xr.testing.assert_identical(image_of(scene(lai_file, CHUNKS)).compute(), image_of(scene(lai_file, None)))
 
@@ -75,16 +89,6 @@ def test_a_run_on_workers_gives_the_same_files(client, tmp_path, monkeypatch):
     simulate_to_folder(scenario, tmp_path / "workers")
     expected = simulate(scenario)["image"]["dn"].compute(scheduler="threads")
     np.testing.assert_array_equal(fifesim.open_image(tmp_path / "workers" / "image.tif").values, expected.values)
-
-
-def test_processes_without_a_cluster_give_the_same_bits():
-    grid = fifesim.fife_site(30 / 9, window=((0, 180), (0, 270)))
-    lai = fifesim.lai_scene(grid, arp=0.15, seed=7, chunks=CHUNKS)
-    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], dem=fifesim.flint_hills(grid, 3, chunks=CHUNKS))
-    image = rho.fifesim.to_toa().fifesim.sense("TM")
-    with dask.config.set(scheduler="processes", num_workers=1):
-        there = image.compute()
-    np.testing.assert_array_equal(there, image.compute(scheduler="synchronous"))
 
 
 def listening():
@@ -178,3 +182,180 @@ def test_a_failed_delivery_cancels_the_other_tasks_at_once(monkeypatch):
         run_on_client(tasks, outputs, deliver, stub)
     # The frames are alive, so that the collection of garbage has cancelled nothing.
     assert caught.traceback and stub.cancelled == stub.futures[1:]
+
+
+FLAT = {"terrain": {"dem": "flat"}}
+
+
+def complete(**sections):
+    return parse_scenario(FLAT | sections).complete()
+
+
+@pytest.mark.parametrize(
+    "sections", [{"grid": {"cell": 0.01}}, {"grid": {"cell": 0.3}, "ground": {"method": "periodic"}}]
+)
+def test_what_cannot_fit_is_refused_at_once_with_what_fits(tmp_path, sections):
+    """The edge that the message names is accepted, and a fifth more is not."""
+    with pytest.raises(ValueError, match=r"memory.*grid\.width = grid\.height") as caught:
+        check_size(complete(**sections), tmp_path / "a" / "b")
+    edge = float(re.search(r"grid\.height = (\S+) fits", str(caught.value))[1])
+
+    def square(edge):
+        return complete(**sections | {"grid": sections["grid"] | {"width": edge, "height": edge}})
+
+    check_size(square(0.9 * edge), tmp_path)
+    with pytest.raises(ValueError, match="fits"):
+        check_size(square(1.2 * edge), tmp_path)
+
+
+def test_a_disk_that_is_too_small_is_named(tmp_path, monkeypatch):
+    """Without any space no scene fits, however small."""
+    scenario = complete()
+    least, most = disk_of(scenario)
+    assert least == pytest.approx(500**2 * (2 + 16), rel=0.01) and most == 3.4 * least
+    free = {"now": 10**9}
+    monkeypatch.setattr(workers.shutil, "disk_usage", lambda path: namedtuple("Usage", "free")(free["now"]))
+    check_size(scenario, tmp_path)
+    for free["now"], said in (
+        (10**6, r"space.*fits"),
+        (0, f"No space left on device in {tmp_path}: name another output folder with -o"),
+    ):
+        with pytest.raises(OSError, match=said):
+            check_size(scenario, tmp_path)
+
+
+def test_scenes_in_memory_are_judged_by_their_edge():
+    check_memory_of_cells(333)
+    with pytest.raises(ValueError, match=r"cells = 1000000: .* cells = \S+ fits"):
+        check_memory_of_cells(1_000_000)
+
+
+def places(row, column, shape):
+    return np.arange(row, row + shape[0])[:, None] * 1000.0 + np.arange(column, column + shape[1])
+
+
+def means(side, chunk):
+    """Smoothed places, averaged over pixels of 3.1 cells."""
+    grid = fife_site(30 / 9, window=((0, side), (0, side)))
+    array = neighbourhood(lambda block: block[1:-1, 1:-1] + block[:-2, 2:], tiles(places, grid, chunk, tile=8), 1)
+    array = grids.place(array, grid)
+    cell = 30 / 9
+    axis = axis_operator(
+        Boxcar(3.3 * cell), cell_origin=0, cell_size=cell, n_cells=side, pixel_origin=0, pixel_size=3.1 * cell,
+        n_pixels=side // 4,
+    )  # fmt: skip
+    return resample(axis, axis, array, grids.aligned_grid(grid, 4 * cell)).data
+
+
+def wanted(array, name="means"):
+    return [(name, index) for index in np.ndindex(array.numblocks)]
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_blocks_are_those_of_dask(threads):
+    array, found = means(96, 17), {}
+    run_on_threads(
+        *tasks_of({"means": array}, wanted(array)),
+        lambda name, index, block: found.update({index: block}),
+        threads,
+    )
+    for index, block in found.items():
+        np.testing.assert_array_equal(block, array.blocks[index].compute(scheduler="sync"))
+    assert len(found) == array.npartitions
+
+
+@pytest.mark.parametrize("piece", [1, 5])
+def test_what_waits_for_later_pieces_is_made_once(monkeypatch, piece):
+    monkeypatch.setattr(workers, "_PIECE", piece)
+    made, found = [], {}
+
+    def source(row, column, shape):
+        made.append((row, column))
+        return places(row, column, shape)
+
+    grid = fife_site(30 / 9, window=((0, 60), (0, 40)))
+    cells = tiles(source, grid, 10, tile=10)
+    around = neighbourhood(lambda block: block[1:-1, 1:-1] + block[:-2, 2:], cells * 2, 1)
+    arrays = {"cells": cells.data, "around": around.data}
+    run_on_threads(
+        *tasks_of(arrays, [(name, index) for index in np.ndindex(6, 4) for name in arrays]),
+        lambda name, index, block: found.update({(name, *index): block}),
+        2,
+    )
+    assert len(made) == len(set(made)) == 24
+    for (name, *index), block in found.items():
+        np.testing.assert_array_equal(block, arrays[name].blocks[tuple(index)].compute(scheduler="sync"))
+    assert len(found) == 48
+
+
+class Watch:
+    """Makes chunks, and sees how many of them are in memory together at most."""
+
+    def __init__(self):
+        self.alive, self.most = set(), 0
+
+    def __call__(self, block):
+        made = block + 1
+        self.alive.add(id(made))
+        weakref.finalize(made, self.alive.discard, id(made))
+        self.most = max(self.most, len(self.alive))
+        return made
+
+
+def chunks_at_once(rows, columns):
+    """Most chunks in memory together when pixels are made of so many of them, by one thread."""
+    watched, shape = Watch(), (rows * 10, columns * 10)
+    options = {"dtype": float, "meta": np.empty((0, 0))}
+    truth = da.ones(shape, chunks=10).map_blocks(watched, **options)
+    image = truth.map_blocks(np.sqrt).map_blocks(watched, **options)
+    grid = fife_site(30 / 9, window=((0, rows * 10), (0, columns * 10)))
+    pixels = grids.aligned_grid(grid, 10.0)
+    axes = [
+        axis_operator(
+            Boxcar(3.5), cell_origin=0, cell_size=1, n_cells=size, pixel_origin=0, pixel_size=3, n_pixels=size // 3
+        )
+        for size in shape
+    ]
+    arrays = {
+        name: resample(*axes, grids.place(xr.DataArray(data, dims=("y", "x")), grid), pixels).data
+        for name, data in (("image", image), ("truth", truth))
+    }
+    places = [(name, index) for index in np.ndindex(arrays["image"].numblocks) for name in arrays]
+    run_on_threads(*tasks_of(arrays, places), lambda *block: None, 1)
+    return watched.most
+
+
+@pytest.mark.parametrize("piece", [7, 600])
+def test_no_chunk_waits_for_those_that_need_its_rims_only(monkeypatch, piece):
+    """Blocks that read a row and a column before them too: the row of blocks above waits as rims."""
+    monkeypatch.setattr(workers, "_PIECE", piece)
+
+    def ask(*place):
+        return (), [tuple(slice(part.start - 1, part.stop) for part in place)]
+
+    watched, sizes = Watch(), ((10,) * 4, (10,) * 20)
+    cells = da.ones((40, 200), chunks=10).map_blocks(watched, dtype=float, meta=np.empty((0, 0)))
+    blocks = array_from_windows(lambda window: window[1:, 1:] + window[:-1, :-1], [cells], sizes, ask, token="before")
+    run_on_threads(*tasks_of({"blocks": blocks}, wanted(blocks, "blocks")), lambda *block: None, 1)
+    assert watched.most <= 3
+
+
+def test_what_waits_grows_neither_with_rows_nor_with_columns():
+    """A few of the chunk that is being used and of its neighbours, never a row of them."""
+    assert chunks_at_once(40, 20) == chunks_at_once(10, 20) == chunks_at_once(10, 5) <= 3
+
+
+def test_blocks_are_delivered_as_they_are_wanted():
+    array, found = means(96, 17), []
+    backwards = wanted(array)[::-1]
+    run_on_threads(*tasks_of({"means": array}, backwards), lambda name, index, block: found.append((name, index)), 2)
+    assert found == backwards
+
+
+def test_an_error_of_a_task_is_raised_as_it_is():
+    def broken(block):
+        raise OSError("no such cells")
+
+    array = da.ones((4, 4), chunks=2).map_blocks(broken, dtype=float, meta=np.empty((0, 0)))
+    with pytest.raises(OSError, match="no such cells"):
+        run_on_threads(*tasks_of({"a": array}, wanted(array, "a")), lambda *block: None, 2)
