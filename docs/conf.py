@@ -66,6 +66,7 @@ html_theme_options = {
 }
 html_static_path = ["_static"]
 html_css_files = ["gallery.css"]
+html_js_files = ["pictures.js"]
 html_copy_source = False
 html_domain_indices = False
 

@@ -99,7 +99,7 @@ shares = {"wood": 0.3, "meadow": 0.4, "field": 0.25, "pond": 0.05}
 small = fifesim.fife_site(cell=10, window=((0, 400), (0, 400)))
 
 # sphinx_gallery_start_ignore
-figure, axes = plt.subplots(1, 3, figsize=(10, 3.8), layout="constrained", sharey=True)
+figure, axes = plt.subplots(1, 3, figsize=(10, 4.4), layout="constrained", sharey=True)
 for axis, pattern in zip(axes, ("voronoi", "levels", "pastures"), strict=True):
     land = fifesim.landscape(
         small, cover=fifesim.Patches(pattern, 400, shares), classes=table, seed=3

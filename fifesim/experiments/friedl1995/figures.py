@@ -142,14 +142,14 @@ def _figure4(found, reading):
     high, size = float(found["cell_lai"].max()), found.attrs["cell"]
     for axis, arp in zip(axes, found["arp"].values, strict=True):
         shown = found["cell_lai"].sel(arp=arp).values[:120, :120]
-        extent = np.array([0, shown.shape[1], shown.shape[0], 0]) * size
+        extent = np.array([0, shown.shape[1], 0, shown.shape[0]]) * size
         drawn = axis.imshow(shown, cmap="YlGn", vmin=0, vmax=high, extent=extent, interpolation="nearest")
-        axis.set(xlabel="east [m]", title=f"arp {arp:g}")
+        axis.set(xlabel="easting [m]", title=f"arp {arp:g}")
         axis.title.set_fontsize(9)
         axis.xaxis.set_major_locator(MaxNLocator(4))
         axis.yaxis.set_major_locator(MaxNLocator(4))
         axis.tick_params(labelsize=8)
-    axes[0].set_ylabel("south [m]")
+    axes[0].set_ylabel("northing [m]")
     figure.colorbar(drawn, ax=axes, label=_LABELS["lai"], shrink=0.9)
     return figure
 
