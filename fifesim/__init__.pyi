@@ -35,7 +35,8 @@ from .ground.canopy.prospect import Leaf as Leaf
 from .ground.canopy.spectra import Background as Background
 from .chain.steps import surface_reflectance as surface_reflectance  # method, of a Dataset too
 from .chain.spectra import canopy_spectra as canopy_spectra
-from .chain.landscapes import fpar as fpar  # method, of a Dataset too
+from .chain.absorbed_light import fpar as fpar  # method, of a Dataset too
+from .chain.absorbed_light import light as light  # method, of a Dataset too
 
 # Terrain
 from .ground.terrain.elevation_labels import fine_dem as fine_dem

@@ -10,7 +10,9 @@ from fifesim.atmosphere import aerosols, six_s
 from fifesim.atmosphere.column import matrix_moments
 from fifesim.atmosphere.coupling import BandTerms, Scattering, band_mean_terms, nodes_of
 from fifesim.atmosphere.five_s import five_s_scattering
+from fifesim.atmosphere.gases import gas_transmittance, table_wavelengths
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
+from fifesim.base.bands import solar_irradiance_steps
 from fifesim.base.caches import cached
 from fifesim.base.geometry import scattering_angle_cosine
 
@@ -176,6 +178,54 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
     if atmosphere.engine == "6S":
         return six_s.sixs_band_terms(atmosphere, bands, sza, vza, raa, each=each)
     return _band_terms(atmosphere, tuple(bands), float(sza), float(vza), float(raa))
+
+
+def photons_at_ground(atmosphere, bands, sza):
+    r"""
+    Share of each band in the solar photons that reach black ground, and the diffuse fraction of their flux.
+
+    .. math:: w_i \propto T_i(\theta_s) \int_i E(\lambda) \, \lambda \, T_g(\lambda) \, d\lambda
+
+    Parameters
+    ----------
+    atmosphere : models.Atmosphere
+    bands : sequence of Band, length (band,)
+        Within 0.4 to 2.5 um.
+    sza : float
+        [degree]
+
+    Returns
+    -------
+    shares, diffuse_fraction : array, shape (band,)
+        The shares sum to 1. [1]
+
+    Raises
+    ------
+    ValueError
+        As `band_terms`.
+
+    Notes
+    -----
+    Light that the ground reflects and the atmosphere sends back is left out: it has nearly the same spectrum.
+
+    Examples
+    --------
+    Red sunlight has more photons per watt than blue:
+
+    >>> from fifesim.atmosphere.models import Atmosphere
+    >>> from fifesim.base.bands import Band
+    >>> bands = Band("blue", (0.45, 0.47), (1, 1)), Band("red", (0.65, 0.67), (1, 1))
+    >>> shares, _ = photons_at_ground(Atmosphere(), bands, 30.0)
+    >>> bool(shares[1] > shares[0])
+    True
+    """
+    terms = band_terms(atmosphere, tuple(bands), sza, 0.0, 0.0)
+    wavelength = table_wavelengths()
+    gas = gas_transmittance(wavelength, atmosphere, 1 / np.cos(np.radians(sza)))
+    spectrum = solar_irradiance_steps(wavelength) * wavelength * gas
+    means = [band.mean(spectrum, wavelength) * np.trapezoid(band.response, band.wavelength) for band in bands]
+    photons = np.array(means) * terms.transmittance_down
+    return photons / photons.sum(), terms.diffuse_fraction
 
 
 def check_zenith(name, angle):

@@ -82,7 +82,7 @@ class Driver:
         return slope_reflectance(level, *light, *air, self.setup.upwelling)
 
     def fpar(self, lai, fpar_inf, leaves="all"):
-        """Fraction of absorbed photosynthetically active radiation, as `landscapes.fpar`."""
+        """Fraction of absorbed photosynthetically active radiation, as `absorbed_light.fpar` by Beer's law."""
         _check_uniform(self.setup)
         return fpar_kernel(None, self.setup.canopy, self.setup.geometry, fpar_inf, leaves)[0](lai)
 

@@ -1,4 +1,4 @@
-"""Landscapes: canopies of all classes and cells, apparent reflectance in one pass, FPAR, and block means."""
+"""Landscapes: canopies of all classes and cells, apparent reflectance in one pass, and block means."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import partial
 from numbers import Number
 from types import MappingProxyType
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -14,21 +14,18 @@ from numba import njit
 
 from fifesim.analysis import scaling_labels
 from fifesim.atmosphere.coupling import apparent_reflectance, apparent_reflectance_of_cell
-from fifesim.base.annotations import Metres, Time
+from fifesim.base.annotations import Metres
 from fifesim.base.line_spread import Spread
 from fifesim.base.messages import warn
 from fifesim.grids import cf
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
-from fifesim.grids.classes import NO_CLASS, by_class
-from fifesim.grids.dates import by_date
-from fifesim.grids.directions import Directions
+from fifesim.grids.classes import NO_CLASS
 from fifesim.grids.grid import north_up
-from fifesim.grids.inputs import MASKS_TOO, Raster, RasterOrDataset
+from fifesim.grids.inputs import MASKS_TOO, Raster
 from fifesim.grids.windows import origin_of
-from fifesim.ground.canopy import labels as ground
-from fifesim.ground.canopy import layers, optics_labels
-from fifesim.ground.canopy.description import TALLGRASS, Canopy, is_raster
+from fifesim.ground.canopy import optics_labels
+from fifesim.ground.canopy.description import is_raster
 from fifesim.ground.canopy.interpolation import RUN, table_places, value_at
 from fifesim.ground.canopy.labels import BandCanopy, EvenCanopy
 from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS, check_map
@@ -147,7 +144,7 @@ def land_of(scene):
 
 def canopies_of(land, responses, canopy, exact=False):
     """Canopies of a scene with their optics for spectral responses, by class code, which is None without classes."""
-    _check_used(land, canopy)
+    check_used(land, canopy)
     known, found, leaf_optics = {}, {}, partial(optics_labels.leaf_optics, exact=exact)
 
     def once(name, make, given):
@@ -173,7 +170,7 @@ def canopies_of(land, responses, canopy, exact=False):
     return found
 
 
-def _check_used(land, canopy):
+def check_used(land, canopy):
     """Raise ValueError if a given property would have no effect."""
     for name in canopy.given:
         value, default = getattr(canopy, name), PROPERTIES[name].default
@@ -183,86 +180,6 @@ def _check_used(land, canopy):
             raise ValueError(f"{name} is given and also a variable of the landscape: remove one of them")
         if land.classes and all(name in each.canopy.given for each in land.classes):
             raise ValueError(f"{name} is given and also defined by all classes of the landscape: remove one of them")
-
-
-@by_date
-def fpar(
-    lai: RasterOrDataset,
-    *,
-    canopy: Canopy | None = None,
-    geometry: Directions | None = None,
-    time: Time | None = None,
-    fpar_inf: float = layers.FPAR_INF,
-    leaves: Literal["all", "green"] = "all",
-) -> xr.DataArray:
-    """
-    Fraction of photosynthetically active radiation absorbed by a canopy, or by its green leaves.
-
-    Parameters
-    ----------
-    lai : xarray.DataArray, dims (y, x), or xarray.Dataset
-        Leaf area index, or a landscape with a variable ``lai``. [m2 m-2]
-    canopy : Canopy, optional
-        Leaf angles, crown cover and dead leaves. Leave out properties that are variables of the landscape.
-    geometry : fifesim.base.geometry.Geometry, optional
-        Direction of the sun; by default from the coordinates of the array, else from its time and place.
-    time : str or datetime, optional
-        Time for the position of the sun, instead of ``geometry``.
-    fpar_inf : float, optional
-        FPAR of an infinitely thick canopy. [1]
-    leaves : {"all", "green"}, optional
-        Include dead leaves ("all") or only photosynthetic ones ("green").
-
-    Returns
-    -------
-    fpar : xarray.DataArray, dims (y, x)
-        [1]
-
-    Raises
-    ------
-    ValueError
-        If LAI is negative, or a fraction is outside 0 to 1.
-
-    Notes
-    -----
-    Green and dead leaves absorb equally here, as in Eq. 6. Spectral absorption by SAIL is in `ground.canopy.layers`.
-
-    References
-    ----------
-    [Friedl1995]_, Eq. 6
-
-    See Also
-    --------
-    fifesim.ground.canopy.layers.beer_fpar, fifesim.ground.canopy.layers.green_fpar
-
-    Examples
-    --------
-    >>> import fifesim
-    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
-    >>> lai = fifesim.lai_scene(grid, seed=7)
-    >>> round(float(lai.fifesim.fpar().mean()), 2)
-    0.3
-    """
-    land, canopy = land_of(lai), canopy or TALLGRASS
-    _check_used(land, canopy)
-
-    def absorbed(stand):
-        return ground.canopy_fpar(land.lai, stand, geometry=geometry, time=time, fpar_inf=fpar_inf, leaves=leaves)
-
-    stands = stands_of(land.classes, canopy, land.cells)
-    if land.cover is None:
-        return absorbed(stands[None])
-    # Classes with equal absorption are computed once.
-    kernels: dict = {}
-    known: list = []
-    for code, stand in stands.items():
-        alike = [kernel for other, kernel in known if ground.same_properties(stand, other, ground.ABSORBING)]
-        kernels[code] = alike[0] if alike else (np.positive, [absorbed(stand)])
-        known.append((stand, kernels[code]))
-    distinct = list({id(kernel): kernel for kernel in kernels.values()}.values())
-    out = grids.place(by_class(kernels, land.cover), grids.geobox(land.lai))
-    history = distinct[0][1][0].attrs["history"].splitlines()[-1] if len(distinct) == 1 else "fpar: by class"
-    return cf.label(out, "green_fpar" if leaves == "green" else "fpar", source=land.lai, history=history)
 
 
 def aggregate(

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from fifesim.chain.landscapes import fpar, warn_of_tallgrass
+from fifesim.chain.absorbed_light import fpar
+from fifesim.chain.landscapes import warn_of_tallgrass
 from fifesim.grids import grid as grids
 from fifesim.grids.sites import on_fife_site
 from fifesim.ground.landscape.classes import CoverClass, Field, class_table

@@ -8,11 +8,10 @@ from lazy import ODD_CHUNKS, in_chunks, no_compute
 import fifesim
 from fifesim.atmosphere import engines
 from fifesim.base.geometry import Geometry
-from fifesim.chain import landscapes
 from fifesim.grids import directions
 from fifesim.grids import grid as grids
 from fifesim.ground.canopy import optics
-from fifesim.ground.canopy.labels import BandCanopy, Light
+from fifesim.ground.canopy.labels import BandCanopy, Light, level_reflectance
 from fifesim.sensor.description.instruments import instrument
 
 TM34 = ["TM3", "TM4"]
@@ -76,7 +75,7 @@ def test_skylight_of_the_atmosphere_reaches_the_ground(lai):
     sun = fifesim.fife_geometry()
     terms = engines.band_terms(haze, tuple(band.response for band in bands), sun.sza, sun.vza, sun.raa)
     stand = BandCanopy(fifesim.Canopy(), optics.band_leaf_optics(TM34), None, optics.band_background(TM34))
-    expected = landscapes.ground.level_reflectance(lai, bands, stand, Light(sun, terms.diffuse_fraction))
+    expected = level_reflectance(lai, bands, stand, Light(sun, terms.diffuse_fraction))
     np.testing.assert_array_equal(rho, expected)
     assert not np.array_equal(rho, lai.fifesim.surface_reflectance("TM", bands=TM34))
     assert rho.fifesim.to_toa().attrs["atmosphere"] == haze.text

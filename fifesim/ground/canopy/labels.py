@@ -16,6 +16,7 @@ from fifesim.grids.grid import north_up, with_crs_of
 from fifesim.grids.inputs import unpacked
 from fifesim.grids.windows import made_of
 from fifesim.ground.canopy import layers
+from fifesim.ground.canopy.absorption import scene_light
 from fifesim.ground.canopy.crowns import SHAPE, check_crowns, crown_shares, lai_in_crowns
 from fifesim.ground.canopy.description import Canopy, is_raster
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
@@ -74,18 +75,40 @@ def even_canopy(lai, stand, light, exact):
 
 def canopy_kernel(lai, bands, stand, light, exact=False):
     """Kernel of canopy reflectance, ``kernel(lai, *blocks)`` of shape (band, ...) [1], and its raster arguments."""
-    varying, numbers = shares_of(stand.canopy, CELL_SHARES, lai)
-    background = _per_band(_background_bands(stand.background, bands))
     leaves = stand.leaf + (stand.dead or ())
-    if directions.varying(light.geometry) or any(map(is_raster, leaves)):
-        by_band = [_per_band(each) for each in (light.diffuse_fraction, *leaves)]
-        rasters = [background, by_band[0], *directions.angles(light.geometry), *by_band[1:]]
-        own = stand.canopy
-        kernel = partial(_by_cell, own.leaf_angles, own.hotspot, own.crown_shape, tuple(varying), numbers)
-    else:
-        rasters = [background]
-        kernel = partial(_uniform, _uniform_scene(stand, light), tuple(varying), numbers, exact)
-    rasters += varying.values()
+    if not (directions.varying(light.geometry) or any(map(is_raster, leaves))):
+        return _uniform_kernel(partial(scene_reflectance, exact=exact), lai, bands, stand, light)
+    varying, numbers = shares_of(stand.canopy, CELL_SHARES, lai)
+    by_band = [_per_band(each) for each in (light.diffuse_fraction, *leaves)]
+    rasters = [_background_rasters(stand, bands), by_band[0], *directions.angles(light.geometry), *by_band[1:]]
+    own = stand.canopy
+    kernel = partial(_by_cell, own.leaf_angles, own.hotspot, own.crown_shape, tuple(varying), numbers)
+    return _with_soil(kernel, [*rasters, *varying.values()], stand)
+
+
+def light_kernel(lai, bands, stand, light, weights, part):
+    """Kernel of the light absorbed in bands, ``kernel(lai, *blocks)`` of shape (k, ...) [1], and its rasters."""
+    if any(map(is_raster, stand.leaf + (stand.dead or ()))):
+        raise ValueError(
+            "leaf optics vary by cell, absorbed light needs the same leaves in all cells of a class: use "
+            "method='beer', or give leaf_optics of numbers"
+        )
+    return _uniform_kernel(partial(scene_light, weights=weights, part=part), lai, bands, stand, light)
+
+
+def _uniform_kernel(evaluate, lai, bands, stand, light):
+    """Kernel and rasters of a function of leaf area, background and Scene with the same leaves and directions."""
+    varying, numbers = shares_of(stand.canopy, CELL_SHARES, lai)
+    kernel = partial(_uniform, evaluate, _uniform_scene(stand, light), tuple(varying), numbers)
+    return _with_soil(kernel, [_background_rasters(stand, bands), *varying.values()], stand)
+
+
+def _background_rasters(stand, bands):
+    return _per_band(_background_bands(stand.background, bands))
+
+
+def _with_soil(kernel, rasters, stand):
+    """Kernel and rasters, with the background of each cell changed first."""
     if stand.soil_changes is None:
         return kernel, rasters
     changed, changes = stand.soil_changes
@@ -120,13 +143,13 @@ def _on_soil(kernel, changed, count, lai, *blocks):
     return kernel(lai, changed(background, *changes), *others)
 
 
-def _uniform(scene, varying, numbers, exact, lai, background, *shares):
-    """Reflectance for one direction of sun and view, and the same leaf optics in all cells."""
+def _uniform(evaluate, scene, varying, numbers, lai, background, *shares):
+    """Result for one direction of sun and view, and the same leaf optics in all cells."""
     # apply_ufunc hands the bands over as the last axis.
     bands_first = background.transpose(-1, *range(background.ndim - 1))
     lai = check_map(lai)
     scene = with_shares(scene, lai.shape, *_in_order(varying, numbers, shares))
-    return scene_reflectance(lai, bands_first, scene, exact)
+    return evaluate(lai, bands_first, scene)
 
 
 def _by_cell(

@@ -388,8 +388,43 @@ def light_budget(
     >>> round(float(sum(budget)), 12)
     1.0
     """
-    green, dead = (leaf_reflectance, leaf_transmittance), (brown_reflectance, brown_transmittance)
-    cover = np.asarray(crown_cover, float)
+    optics = (leaf_reflectance, leaf_transmittance), (brown_reflectance, brown_transmittance)
+    terms, canopy = light_terms(
+        lai, *optics, brown=brown, dissociation=dissociation, sza=sza, leaf_angles=leaf_angles,
+        diffuse_fraction=diffuse_fraction, crown_cover=crown_cover,
+    )  # fmt: skip
+    r, sky = np.asarray(background, float), np.asarray(diffuse_fraction, float)
+    down = terms.down / (1 - r * terms.rdd_below)
+    surface = with_background(canopy, r)
+    reflected = (1 - sky) * surface.rsd + sky * surface.rdd
+    return LightBudget(
+        terms.green + r * down * terms.green_below,
+        terms.brown + r * down * terms.brown_below,
+        (1 - r) * down,
+        reflected,
+    )
+
+
+class LightTerms(NamedTuple):
+    """Light of a canopy over black ground, and of a canopy lit from below. [1]"""
+
+    green: np.ndarray
+    """Absorbed by green leaves over black ground."""
+    brown: np.ndarray
+    """And by dead leaves."""
+    down: np.ndarray
+    """Reaches black ground."""
+    green_below: np.ndarray
+    """Absorbed by green leaves from diffuse light of 1 from below."""
+    brown_below: np.ndarray
+    """And by dead leaves."""
+    rdd_below: np.ndarray
+    """Reflected back to the ground from diffuse light of 1."""
+
+
+def light_terms(lai, green, dead, *, brown, dissociation, sza, leaf_angles, diffuse_fraction, crown_cover):
+    """LightTerms of a canopy from optics of green and dead leaves, pairs; and the canopy without the ground."""
+    cover, sky = np.asarray(crown_cover, float), np.asarray(diffuse_fraction, float)
     layers = leaf_layers(lai_in_crowns(lai, cover), brown, dissociation)
     angles = sza, 0.0, 0.0, leaf_angle_classes(leaf_angles)
     top, bottom = (
@@ -398,18 +433,18 @@ def light_budget(
     )
     crowns = crown_shares(cover, SHAPE, sza, 0.0, 0.0)
     canopy = clumped(added(top, bottom), crowns)
-    r, sky = np.asarray(background, float), np.asarray(diffuse_fraction, float)
-    down = ((1 - sky) * (canopy.tss + canopy.tsd) + sky * canopy.tdd) / (1 - r * canopy.rdd_below)
     sunlit, skylit, lit_from_below = _absorbed(top, bottom)
-    absorbed = [
-        (1 - sky) * crowns.sun * of_sun + cover * (sky * of_sky + r * down * of_ground)
-        for of_sun, of_sky, of_ground in zip(sunlit, skylit, lit_from_below, strict=True)
+    above = [
+        (1 - sky) * crowns.sun * of_sun + cover * sky * of_sky for of_sun, of_sky in zip(sunlit, skylit, strict=True)
     ]
+    below = [cover * each for each in lit_from_below]
     shares = [_dead_share(share, green, dead) for share in (layers.brown, layers.brown_below)]
-    by_dead = sum(taken * share for taken, share in zip(absorbed, shares, strict=True))
-    surface = with_background(canopy, r)
-    reflected = (1 - sky) * surface.rsd + sky * surface.rdd
-    return LightBudget(sum(absorbed) - by_dead, by_dead, (1 - r) * down, reflected)
+    of_dead, of_dead_below = (
+        sum(taken * share for taken, share in zip(each, shares, strict=True)) for each in (above, below)
+    )
+    down = (1 - sky) * (canopy.tss + canopy.tsd) + sky * canopy.tdd
+    terms = LightTerms(sum(above) - of_dead, of_dead, down, sum(below) - of_dead_below, of_dead_below, canopy.rdd_below)
+    return terms, canopy
 
 
 def _absorbed(top, bottom):

@@ -259,7 +259,7 @@ def _layer_table(scene):
     """Table of the terms of `interpolate_over`, accurate for every background."""
     sky = sky_of(scene)
     rate = decay(scene) / (scene.crown_cover or 1.0)
-    return interpolation.tabulate(lambda lai: _layer_terms(cell_canopy(lai, scene), sky), rate, _over_grounds)
+    return interpolation.tabulate(lambda lai: _layer_terms(cell_canopy(lai, scene), sky), rate, over_grounds)
 
 
 def _layer_terms(canopy, sky):
@@ -272,7 +272,7 @@ def _layer_terms(canopy, sky):
     return np.stack(columns, axis=1).reshape(-1, columns[0].shape[-1])
 
 
-def _over_grounds(values):
+def over_grounds(values):
     """Reflectances over the backgrounds for which a table of `_layer_terms` is tested."""
     terms = values.reshape(-1, 4, values.shape[1]).swapaxes(0, 1)
     return np.stack([over_background(*terms, r) for r in _GROUNDS])
@@ -407,7 +407,7 @@ def _joined_table(scene):
             c = clumped(c, crown_shares(scene.crown_cover, scene.crown_shape, scene.sza, scene.vza, scene.raa))
         return _layer_terms(c, sky)
 
-    return interpolation.tabulate_foliage(terms, decay(scene), combine=_over_grounds)
+    return interpolation.tabulate_foliage(terms, decay(scene), combine=over_grounds)
 
 
 @cached(32, "reflectance tables of crowns over any background")

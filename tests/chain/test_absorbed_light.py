@@ -1,0 +1,133 @@
+"""FPAR and light budget from SAIL's energy balance, compared with the model at each cell and with Eq. 6."""
+
+import numpy as np
+import pvlib
+import pytest
+import xarray as xr
+from lazy import check_raster_function
+
+import fifesim
+from fifesim.atmosphere.engines import photons_at_ground
+from fifesim.chain.absorbed_light import PAR_BANDS
+from fifesim.ground.canopy import layers, optics
+from fifesim.ground.canopy.soil import brightened, soil_line
+
+SZA = float(fifesim.fife_geometry().sza)
+MIXED = fifesim.Canopy(brown=0.3, dissociation=0.4, crown_cover=0.8, leaf_angles="erectophile")
+
+
+def by_cell(lai, brown=0.0, soil=0.0, crown_cover=1.0, dissociation=0.0, leaf_angles="spherical", leaf=None):
+    """Light budget of each cell in each band, shape (4, band, n), and the share of each band."""
+    shares, sky = photons_at_ground(fifesim.Atmosphere(), PAR_BANDS, SZA)
+    green, dead = (optics.band_leaf_optics(PAR_BANDS, each) for each in (leaf, optics.DEAD_LEAF))
+    ground = brightened(optics.band_background(PAR_BANDS), np.broadcast_to(soil, lai.shape), soil_line(PAR_BANDS))
+    columns = [each[:, None] for each in (*green, *dead)]
+    budget = layers.light_budget(
+        lai, *columns, ground.T, brown=brown, dissociation=dissociation, sza=SZA, leaf_angles=leaf_angles,
+        diffuse_fraction=sky[:, None], crown_cover=crown_cover,
+    )  # fmt: skip
+    return np.stack(np.broadcast_arrays(*budget)), shares
+
+
+def varied(lai):
+    random = np.random.default_rng(5)
+    fields = {"brown": (0, 0.6), "soil": (-0.05, 0.05)}
+    return lai.to_dataset(name="lai").assign(
+        {name: lai.copy(data=random.uniform(*ends, lai.shape)).drop_attrs() for name, ends in fields.items()}
+    )
+
+
+@pytest.mark.parametrize("leaf_angles", ["planophile", "uniform", "30: 0.5, 75: 0.5"])
+def test_black_leaves_absorb_as_in_equation_6(leaf_angles):
+    lai = np.array([0, 0.25, 1, 3, 8])
+    budget = layers.light_budget(lai, 0, 0, 0, 0, 0, brown=0, sza=SZA, leaf_angles=leaf_angles)
+    expected = layers.beer_fpar(lai, layers.extinction_coefficient(SZA, leaf_angles), fpar_inf=1)
+    np.testing.assert_allclose(budget.green, expected, rtol=0, atol=1e-9)
+
+
+def test_shares_of_photons_are_those_of_the_standard_spectrum():
+    # ASTM G173 is for an air mass of 1.5, a tilted plane and less aerosol. Weights of energy instead of photons would
+    # differ by 25 %.
+    spectrum = pvlib.spectrum.get_reference_spectra(standard="ASTM G173-03")["global"]
+    photons = spectrum * spectrum.index
+    expected = np.array([photons.loc[1000 * band.limits[0] : 1000 * band.limits[1]].mean() for band in PAR_BANDS])
+    shares, _ = photons_at_ground(fifesim.Atmosphere(), PAR_BANDS, 48.2)
+    np.testing.assert_allclose(shares, expected / expected.sum(), rtol=0.1)
+
+
+def test_light_sums_to_one_and_agrees_with_the_model(lai):
+    parts = lai.fifesim.light(canopy=MIXED)
+    assert list(parts) == ["green", "dead", "ground", "reflected"]
+    np.testing.assert_allclose(sum(parts.values()), 1, rtol=0, atol=1e-9)
+    by_band, shares = by_cell(lai.values.ravel(), 0.3, 0.0, 0.8, 0.4, "erectophile")
+    np.testing.assert_allclose(by_band.sum(axis=0), 1, rtol=0, atol=1e-12)
+    expected = np.einsum("pbn,b->pn", by_band, shares)
+    np.testing.assert_allclose(parts.to_array().values.reshape(4, -1), expected, rtol=0, atol=1e-6)
+    absorbed = lai.fifesim.fpar(method="energy", canopy=MIXED)
+    np.testing.assert_allclose(absorbed, parts.green + parts.dead, rtol=0, atol=1e-9)
+    green = lai.fifesim.fpar(method="energy", canopy=MIXED, leaves="green")
+    np.testing.assert_allclose(green, parts.green, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("leaves", ["all", "green"])
+def test_fpar_of_varying_leaves_and_soil_agrees_with_the_model(lai, leaves):
+    land = varied(lai)
+    land["lai"][0, 0] = np.nan
+    made = land.fifesim.fpar(method="energy", leaves=leaves).values.ravel()
+    parts = land.fifesim.light().to_array().values.reshape(4, -1)
+    by_band, shares = by_cell(*(land[name].values.ravel() for name in ("lai", "brown", "soil")))
+    expected = np.einsum("pbn,b->pn", by_band, shares)
+    np.testing.assert_allclose(parts, expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(made, expected[0] + expected[1] * (leaves == "all"), rtol=0, atol=1e-6)
+
+
+def test_each_class_absorbs_with_its_own_leaves(site):
+    pale = fifesim.Canopy(leaf_optics=fifesim.Leaf(chlorophyll=10))
+    classes = {"green": fifesim.CoverClass(lai=2.0), "pale": fifesim.CoverClass(lai=2.0, canopy=pale)}
+    land = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=classes, seed=7)
+    made = land.fifesim.fpar(method="energy")
+    for code, leaf in ((1, None), (2, pale.leaf_optics)):
+        by_band, shares = by_cell(np.array([2.0]), leaf=leaf)
+        np.testing.assert_allclose(made.values[land.cover == code], shares @ by_band[0, :, 0], atol=1e-6)
+
+
+def test_energy_is_lazy_by_date_and_labelled(lai):
+    check_raster_function(lambda each: each.fifesim.fpar(method="energy"), lai, quantity="fpar")
+    check_raster_function(lambda each: each.fifesim.light().dead.rename("dead_fpar"), lai, quantity="dead_fpar")
+    times = np.array(["2022-06-03T17:10", "2022-07-03T17:10"], "M8[ns]")
+    dates = xr.concat([lai, 2 * lai], dim="time").assign_coords(time=times)
+    made, first = dates.fifesim.light(), lai.fifesim.light(time="2022-06-03T17:10Z")
+    np.testing.assert_array_equal(made.green.isel(time=0), first.green)
+    assert "energy balance" in first.green.attrs["history"]
+
+
+def test_more_leaves_and_diffuse_light_absorb_as_published():
+    """Diffuse light enters at more slant angles, so that it is absorbed more than direct light of a high sun."""
+    given = {"brown": 0, "sza": 28.5}
+    lai = np.array([0.25, 0.5, 1, 2, 3])
+    budget = layers.light_budget(lai, 0.09, 0.06, 0.09, 0.06, 0.13, diffuse_fraction=0.2, **given)
+    np.testing.assert_allclose(budget.green, [0.15, 0.28, 0.47, 0.70, 0.82], atol=0.005)
+    overcast, clear = (
+        layers.light_budget(lai, 0.09, 0.06, 0.09, 0.06, 0.13, diffuse_fraction=sky, **given).green for sky in (1, 0)
+    )
+    assert (overcast > clear).all()
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"fpar_inf": 0.9}, "fpar_inf = 0.9 has no effect"),
+        ({"canopy": fifesim.Canopy(leaf_optics={"TM3": (0.1, 0.1)})}, "leaf_optics is given by band.*fifesim.Leaf"),
+        ({"canopy": fifesim.Canopy(background={"TM3": 0.1})}, "background is given by band"),
+        ({"method": "sail"}, "method"),
+    ],
+)
+def test_impossible_requests_are_refused(lai, options, message):
+    with pytest.raises((ValueError, TypeError), match=message):
+        lai.fifesim.fpar(**{"method": "energy"} | options)
+
+
+def test_leaves_that_vary_by_cell_are_refused(lai):
+    leaf = fifesim.Leaf(chlorophyll=(20 + 10 * lai).drop_attrs())
+    with pytest.raises(ValueError, match=r"leaf optics vary by cell.*method='beer'"):
+        lai.fifesim.fpar(method="energy", canopy=fifesim.Canopy(leaf_optics=leaf))
