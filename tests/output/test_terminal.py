@@ -9,16 +9,7 @@ import signal
 import pytest
 
 from fifesim.base.messages import LOG, quiet
-from fifesim.output.terminal import (
-    Exit,
-    importing,
-    in_time,
-    interrupts_blocked,
-    listening,
-    print_lines,
-    report,
-    stop,
-)
+from fifesim.output.terminal import Exit, importing, in_time, interrupts_blocked, listening, print_lines, report, stop
 
 
 def test_the_last_line_says_how_long_it_took_and_what_to_open(capsys):

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from mistakes import check_message, mistakes
 from scipy import stats
 
-from fifesim.scenario.distributions import distribution_of
+from fifesim.scenario.distributions import SEQUENCES, distribution_of, points
 
 SHARES = np.linspace(0, 1, 1001)[:-1]
 
@@ -44,34 +45,6 @@ def test_ends_are_never_passed():
     assert distribution_of({"integers": [3, 7]}).quantile(almost) == [3, 7]
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        (5, "a distribution is a table"),
-        ({"unifrom": [1, 2]}, "got unifrom: did you mean 'uniform'"),
-        ({"uniform": [1, 2], "choice": [1]}, "needs one of"),
-        ({}, "got nothing"),
-        ({"uniform": [2, 1]}, "must be below the second, got 2 and 1"),
-        ({"uniform": [1]}, r"uniform = \[1\] must be \[low, high\]"),
-        ({"uniform": [1, "two"]}, r"must be \[low, high\]"),
-        ({"uniform": [0, True]}, r"must be \[low, high\]"),
-        ({"uniform": [0, float("inf")]}, r"must be \[low, high\]"),
-        ({"log-uniform": [0, 1]}, "both numbers must be above 0, got 0"),
-        ({"normal": [0, 1]}, r"add within = \[low, high\]"),
-        ({"normal": [0, 0], "within": [0, 1]}, "the standard deviation, must be above 0"),
-        ({"integers": [1, 2.5]}, "both integers, got 1 and 2.5"),
-        ({"choice": []}, "must be a list of values"),
-        ({"choice": "abc"}, "must be a list of values"),
-        ({"choice": ["a", "b"], "weights": [1]}, "2 numbers, one per choice"),
-        ({"choice": ["a", "b"], "weights": [0, 0]}, "2 numbers, one per choice"),
-        ({"uniform": [1, 2], "within": [0, 3]}, "is not a parameter of uniform"),
-    ],
-)
-def test_what_is_no_distribution_is_refused(table, message):
-    with pytest.raises(ValueError, match=message):
-        distribution_of(table)
-
-
 def test_a_table_is_read_back():
     for table in ({"normal": [0.2, 0.1], "within": [0.0, 1.0]}, {"choice": ["a", "b"], "weights": [1.0, 2.0]}):
         assert distribution_of(table).table == table
@@ -80,3 +53,29 @@ def test_a_table_is_read_back():
 def test_words_name_the_numbers():
     assert distribution_of({"log-uniform": [5, 45]}).in_words == "log-uniform, 5 to 45"
     assert distribution_of({"choice": ["a", "b"], "weights": [1, 2]}).in_words == "one of a, b, weights 1, 2"
+
+
+@pytest.mark.parametrize("sequence", SEQUENCES)
+def test_points_are_a_function_of_seed_and_stream(sequence):
+    found = points(sequence, 7, 3, 16, 2)
+    assert found.shape == (16, 2) and (found >= 0).all() and (found < 1).all()
+    np.testing.assert_array_equal(found, points(sequence, 7, 3, 16, 2))
+    assert (found != points(sequence, 8, 3, 16, 2)).any() and (found != points(sequence, 7, 4, 16, 2)).any()
+
+
+@pytest.mark.parametrize("sequence", ["sobol", "random"])
+def test_more_points_leave_the_first_as_they_are(sequence):
+    np.testing.assert_array_equal(points(sequence, 7, 3, 5, 3), points(sequence, 7, 3, 500, 3)[:5])
+
+
+def test_every_slice_of_a_dimension_has_one_point():
+    """2**k points of a Sobol sequence are a net."""
+    slices = np.sort(np.floor(points("sobol", 7, 3, 64, 4) * 64), axis=0)
+    np.testing.assert_array_equal(slices, np.arange(64)[:, None] * np.ones(4))
+
+
+@pytest.mark.parametrize(("stage", "table", "said"), mistakes("distribution"), ids=str)
+def test_what_is_no_distribution_is_refused(stage, table, said):
+    with pytest.raises(ValueError) as caught:
+        distribution_of(table)
+    check_message(str(caught.value), said)

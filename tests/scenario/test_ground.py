@@ -13,8 +13,18 @@ from oracles_canopy import fpar_of_green_leaves
 import fifesim
 from fifesim.grids import grid as grids
 from fifesim.ground.canopy.layers import extinction_coefficient
-from fifesim.scenario.ground import canopy_of, drawn_properties, ground_scene, truth_of, warn_of_canopy
-from fifesim.scenario.scenario import parse_scenario
+from fifesim.ground.terrain import labels as slopes_light
+from fifesim.scenario.ground import (
+    canopy_of,
+    drawn_properties,
+    elevation,
+    ground_scene,
+    in_memory,
+    scenario_light_on_hills,
+    truth_of,
+    warn_of_canopy,
+)
+from fifesim.scenario.scenario import Scenario, parse_scenario
 from fifesim.scenario.simulation import setup_of
 
 SMALL = {"grid": {"width": 300.0, "height": 240.0}, "terrain": {"dem": "flat"}}
@@ -145,13 +155,6 @@ def test_leaf_area_goes_with_the_hills_of_a_scenario():
     assert heights > 0.1
 
 
-def test_one_stand_is_leaf_area_alone():
-    found = scene_of(ground={"seed": 3, "arp": 0.2})
-    grid = parse_scenario(SMALL).geobox()
-    assert list(found) == ["lai"]
-    xr.testing.assert_identical(found["lai"], fifesim.lai_scene(grid, "burned-grazed", arp=0.2, seed=3))
-
-
 def test_one_stand_with_what_varies_has_its_own_leaf_area():
     plain, land = scene_of(), scene_of(landscape={"deviations": {"soil": 0.02}})
     np.testing.assert_array_equal(land["lai"], plain["lai"])
@@ -164,21 +167,6 @@ def test_map_of_leaf_area_keeps_it_and_has_what_varies(tmp_path):
     land = scene_of(ground=ground, landscape={"deviations": {"soil": 0.02}})
     np.testing.assert_array_equal(land["lai"], lai)
     np.testing.assert_array_equal(land["soil"], scene_of(landscape={"deviations": {"soil": 0.02}})["soil"])
-
-
-def test_scene_is_lazy_in_its_chunks(scenario):
-    whole = ground_scene(scenario, scenario.geobox())
-    with no_compute():
-        lazy = ground_scene(scenario, scenario.geobox(), {"y": 31, "x": 47})
-    assert all(each.chunks is not None for each in lazy.data_vars.values() if each.ndim)
-    xr.testing.assert_identical(lazy.compute(), whole)
-
-
-def test_moisture_without_deviation_is_a_number_of_one_stand():
-    assert list(scene_of(ground={"moisture": 0.3})) == ["lai"]
-    assert canopy_of(parse_scenario(SMALL | {"ground": {"moisture": 0.3}})).moisture == 0.3
-    drawn = scene_of(ground={"moisture": 0.3}, landscape={"deviations": {"moisture": 0.1}})["moisture"]
-    assert drawn.ndim == 2 and float(drawn.mean()) == pytest.approx(0.3, abs=0.02)
 
 
 def test_drawn_properties_are_about_their_means_with_the_arp_of_the_ground():
@@ -262,28 +250,6 @@ def test_limits_of_what_varies_are_the_plain_ground(plain, sections):
         np.testing.assert_array_equal(found[node][name], plain[node][name], err_msg=name)
 
 
-@pytest.mark.parametrize(
-    "properties",
-    [
-        {"soil": fifesim.Field(sd=0.0, arp=0.24)},
-        {"soil": 0.0, "brown": 0.0, "crown_cover": 1.0, "moisture": 0.0},
-        {"crown_cover": 1.0, "dissociation": 0.7},
-    ],
-    ids=["field", "numbers", "crowns"],
-)
-def test_landscape_of_soil_without_variance_is_leaf_area_alone(properties):
-    """Along the soil line by 0, cell by cell."""
-    case = parse_scenario(SMALL)
-    lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
-    given = {name: each for name, each in properties.items() if name != "dissociation"}
-    land = fifesim.landscape(case.geobox(), lai=lai, **given)
-    options = {"bands": ["TM3", "TM4"], "geometry": case.sun_and_view(), "exact": True}
-    found = fifesim.surface_reflectance(
-        land, canopy=fifesim.Canopy(dissociation=properties.get("dissociation", 0.0)), **options
-    )
-    np.testing.assert_array_equal(found, fifesim.surface_reflectance(lai, **options))
-
-
 def test_number_of_a_property_that_is_not_drawn_stays_beside_what_is():
     """A deviation of 0 says nothing: the number of [ground] is still that of its leaves."""
     ground = {"brown": 0.15, "crown_cover": 0.8, "moisture": 0.3}
@@ -293,53 +259,6 @@ def test_number_of_a_property_that_is_not_drawn_stays_beside_what_is():
         for land in (asked, {"deviations": {"soil": 0.02}})
     )
     np.testing.assert_array_equal(*both)
-
-
-@pytest.mark.parametrize(
-    ("sections", "said"),
-    [
-        (
-            {"landscape": {"covary": {"elevation": 0.3}}},
-            "landscape.covary: elevation needs an elevation, but terrain.dem",
-        ),
-        ({"landscape": {"covary": {"wetness": 0.3, "illumination": 0.1}}}, "wetness, illumination needs an elevation"),
-        (
-            {"ground": {"lai_file": "lai.tif"}, "landscape": {"covary": {"soil": 0.1}, "deviations": {"soil": 0.1}}},
-            "cannot be used with a lai_file: remove covary",
-        ),
-        ({"ground": {"method": "periodic"}, "landscape": {"deviations": {"moisture": 0.1}}}, "needs a single stand"),
-        ({"ground": {"method": "periodic"}, "landscape": {"deviations": {"soil": 0.1}}}, "needs a single stand"),
-    ],
-)
-def test_ground_that_cannot_be_is_refused(sections, said):
-    with pytest.raises(ValueError, match=said):
-        parse_scenario(SMALL | sections)
-
-
-@pytest.mark.parametrize(
-    ("ground", "deviation", "said"),
-    [
-        ({}, "brown", "landscape.deviations: brown lies between 0 and 1"),
-        ({}, "crown_cover", "landscape.deviations: crown_cover lies between 0 and 1"),
-        ({"brown": 0.01}, "brown", "with a mean of 0.01 its sd must be above 0 and below 0.0995, got 0.2"),
-    ],
-)
-def test_share_that_cannot_vary_so_much_is_told_before_a_run(ground, deviation, said):
-    case = parse_scenario(SMALL | {"ground": ground, "landscape": {"deviations": {deviation: 0.2}}})
-    with pytest.raises(ValueError, match=said):
-        case.complete()
-
-
-@pytest.mark.parametrize("cover", [0.01, 5e-324])
-@pytest.mark.parametrize("place", ["ground", "classes.thin"])
-def test_crowns_that_cannot_hold_the_leaves_are_refused_before_a_run(place, cover):
-    """Also where leaf area divided by crown cover overflows."""
-    keys = {"ground": {"crown_cover": cover}}
-    if place == "classes.thin":
-        keys = {"landscape": {"cover": "voronoi"}, "classes": {"thin": {"crown_cover": cover}, "dense": {}}}
-    with pytest.raises(ValueError, match=rf"{place}\.crown_cover = {cover:g}: .* at most 100, got up to "):
-        parse_scenario(SMALL | keys).complete()
-    assert parse_scenario(SMALL | {"ground": {"crown_cover": 0.05}}).complete().ground.crown_cover == 0.05
 
 
 ELSEWHERE = {
@@ -375,3 +294,49 @@ def test_tallgrass_in_a_scenario_from_elsewhere_is_a_warning(keys, taken):
     with warnings.catch_warnings(record=True, action="always", category=UserWarning) as said:
         warn_of_canopy(scenario)
     assert len(said) == bool(taken) and all(re.search(taken, str(each.message)) for each in said)
+
+
+GRID = {"west": 707970.0, "north": 4331220.0, "width": 300.0, "height": 240.0}
+
+
+def test_hills_reach_a_cell_past_the_grid_and_their_horizon_as_far_as_asked():
+    hills = parse_scenario({"grid": GRID, "terrain": {"seed": 3, "horizon_reach": 600}})
+    grid = hills.geobox()
+    dem, horizon, reach = elevation(hills, grid)
+    assert grids.same_grid(grids.geobox(dem), grid.pad(1))
+    np.testing.assert_array_equal(dem, fifesim.flint_hills(grid.pad(1), seed=3))
+    assert reach == dict.fromkeys(("north", "east", "south", "west"), 600.0)
+    around, box = grids.geobox(horizon).boundingbox, grid.boundingbox
+    assert around.left <= box.left - 600 + 30 and around.right >= box.right + 600 - 30
+    assert around.bottom <= box.bottom - 600 + 30 and around.top >= box.top + 600 - 30
+
+
+def test_horizon_is_found_on_multiples_of_its_cells_from_the_origin_of_the_crs():
+    """So that windows of a scene share its places."""
+    hills = parse_scenario({"grid": GRID, "terrain": {"horizon_reach": 300}})
+    affine = grids.geobox(elevation(hills, hills.geobox())[1]).affine
+    for origin, cell in ((affine.c, affine.a), (affine.f, affine.e)):
+        # Places are middles of cells of the land around, which lie on whole multiples.
+        assert abs(((origin + cell / 2) / (cell / 2)) - round((origin + cell / 2) / (cell / 2))) < 1e-6
+
+
+def test_in_memory_is_the_horizon_that_lies_above_the_elevation():
+    one = Scenario(grid={"west": 708000.0, "north": 4331000.0, "width": 300.0, "height": 300.0})
+    dem, horizon, _ = elevation(one, one.geobox())
+    whole, (dem, above) = horizon.compute(), in_memory(dem, horizon)
+    assert dem.chunks is None and above.chunks is None and above.size < whole.size / 100
+    xr.testing.assert_equal(above, whole.sel(y=above.y, x=above.x))
+    light = [slopes_light.illumination(dem, one.sun_and_view(), each) for each in (above, whole)]
+    np.testing.assert_array_equal(*light)
+    assert in_memory(None, None) == (None, None)
+    flat = one.replace(dem="flat")
+    assert elevation(flat, flat.geobox()) == (None, None, {})
+    assert scenario_light_on_hills(flat, flat.geobox(), flat.sun_and_view()) is None
+
+
+@pytest.mark.parametrize(("sza", "alone"), [(70.0, True), (73.0, False)])
+def test_where_slopes_may_hide_the_sun_all_of_the_land_is_asked(sza, alone):
+    """The steepest of these hills has 18.8 degrees."""
+    hills = parse_scenario({"grid": GRID, "terrain": {"seed": 7}, "geometry": {"sza": sza, "saa": 95.0}})
+    light = scenario_light_on_hills(hills, hills.geobox(), hills.sun_and_view())
+    assert (light is not None) is alone

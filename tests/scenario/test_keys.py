@@ -1,34 +1,27 @@
 """Keys: what is spelled, and what is left to physics."""
 
-import math
 import subprocess
 import sys
 from datetime import date, datetime, timedelta, timezone
 
 import pytest
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
-from fifesim.atmosphere import ENGINES, engines
 from fifesim.scenario.keys import (
-    AirKeys,
+    VARYING,
     ClassKeys,
-    GridKeys,
     GroundKeys,
     Keys,
     LandscapeKeys,
-    SensorKeys,
+    Section,
     StandKeys,
     SunAndViewKeys,
-    TerrainKeys,
+    file,
+    number,
+    seed,
+    text,
 )
 from fifesim.scenario.scenario import Scenario
-
-
-def test_engines_are_those_of_the_atmosphere():
-    """The keys name the engines that the atmosphere has."""
-    described = AirKeys.model_fields["engine"].description
-    assert described == f"radiative transfer model: {', '.join([*engines.SCATTERING, '6S'])}"
-    assert (*engines.SCATTERING, "6S") == ENGINES
 
 
 def test_spelling_needs_no_physics():
@@ -45,36 +38,6 @@ def test_sections_of_a_scenario_are_the_keys_in_their_order():
         meant, spelled = Scenario.section(place), Keys.section(place)
         assert issubclass(meant, spelled) and list(meant.model_fields) == list(spelled.model_fields)
     assert Keys.section(("classes",)) is Keys.section(("ground", "leaf")) is Keys.section(("grund",)) is None
-
-
-def test_a_class_has_the_keys_of_a_stand():
-    assert set(StandKeys.model_fields) == set(ClassKeys.model_fields) & set(GroundKeys.model_fields)
-
-
-@pytest.mark.parametrize(
-    ("section", "values", "said"),
-    [
-        (TerrainKeys, {"dem": "flt"}, "did you mean 'flat'"),
-        (TerrainKeys, {"fill": 30.0}, "fill needs an elevation file"),
-        (SensorKeys, {"interval": 0.0}, "a positive distance between pixels in metres"),
-        (SensorKeys, {"offset": [float("inf"), 0.0]}, "two finite numbers"),
-        (AirKeys, {"aot": 2.5}, "less than or equal to 2"),
-        (LandscapeKeys, {"cover": "pasture"}, "did you mean 'pastures'"),
-        (LandscapeKeys, {"deviations": {"soils": 0.1}}, "did you mean 'soil'"),
-        (LandscapeKeys, {"deviations": {"soil": -0.1}}, r"must be in \[0, 1\]"),
-        (LandscapeKeys, {"covary": {"elevation": 1.1}}, r"elevation = 1.1: must be in \[-1, 1\]"),
-        (LandscapeKeys, {"covary": {"soil": 0.1}}, "give deviations.soil too"),
-        (Keys, {"classes": {"tall grass": {}}}, "one word"),
-    ],
-)
-def test_impossible_values_are_refused(section, values, said):
-    with pytest.raises(ValidationError, match=said):
-        section(**values)
-
-
-def test_optical_thickness_stands_in_the_place_of_visibility():
-    assert AirKeys(aot=0.1).visibility is None
-    assert AirKeys().visibility == 45.0
 
 
 @pytest.mark.parametrize(
@@ -104,19 +67,96 @@ def test_time_is_utc_unless_it_names_an_offset(time):
     assert sun == Scenario().sun_and_view()
 
 
+class Shelf(Section):
+    """Keys of every kind."""
+
+    length: float = number(2.0, "m", "of it")
+    step: float | str = Field(1.0, description="or a word", json_schema_extra={"unit": "m"})
+    colour: str = text("red", "of it")
+    grain: int = seed(3, "of its noise")
+    picture: str | None = file(None, "always a file")
+    list_of: str = file("oak", "a name, or a .csv", suffix=".csv")
+    map_of: str = file("flat", "flat, or a file of any suffix", names=("flat", "v1.2"), suffix="*")
+
+
+@pytest.mark.parametrize(("written", "value"), [("3 m", 3.0), ("3", 3.0), (" 3e0m ", 3.0), (3, 3.0)])
+def test_number_may_carry_its_unit(written, value):
+    assert Shelf(length=written).length == value
+
+
+def test_another_unit_is_a_mistake_and_words_pass_where_they_may():
+    with pytest.raises(ValidationError, match="length is in m; write a number, or a number and 'km' or 'm' or 'cm'"):
+        Shelf(length="3 ft")
+    assert (Shelf(length="3 km").length, Shelf(length="3 cm").length) == (3000.0, 0.03)
+    assert Shelf(step="native").step == "native"
+    with pytest.raises(ValidationError, match="step is in m"):
+        Shelf(step="3 ft")
+
+
 @pytest.mark.parametrize(
-    ("section", "values"),
+    ("key", "value", "answer"),
     [
-        (SunAndViewKeys, {"vaa": 1e20}),
-        (GridKeys, {"cell": 1e-9}),
-        (GridKeys, {"cell": True}),
-        (GroundKeys, {"hotspot": 1e300}),
-        (GroundKeys, {"background": {"TM3": math.nan}}),
-        (GroundKeys, {"background": {"TM3": True}}),
-        (GroundKeys, {"background": {"TM\x1b3": 0.1}}),
-        (GroundKeys, {"background": {"TM3" * 100: 0.1}}),
+        ("picture", "anything", True),
+        ("picture", None, False),
+        ("list_of", "oak", False),
+        ("list_of", "mine.CSV", True),
+        ("list_of", "mine.tif", False),
+        ("map_of", "flat", False),
+        ("map_of", "hills", False),
+        ("map_of", "hills.tif", True),
+        ("map_of", "v1.2", False),
+        ("colour", "red.csv", False),
+        ("unknown", "a.csv", False),
     ],
 )
-def test_nonsense_is_refused(section, values):
-    with pytest.raises(ValidationError):
-        section(**values)
+def test_a_key_says_whether_its_value_is_a_file(key, value, answer):
+    assert Shelf.names_a_file(key, value) == answer
+
+
+@pytest.mark.parametrize("value", [-1, 2**63, 1.0, "1", True])
+def test_seed_is_a_whole_number_that_toml_holds(value):
+    with pytest.raises(ValidationError, match="grain"):
+        Shelf(grain=value)
+    assert Shelf(grain=2**63 - 1).grain == 2**63 - 1
+
+
+def test_unknown_keys_and_tables_that_are_none_are_refused():
+    with pytest.raises(ValidationError, match="Extra inputs"):
+        Shelf(width=1.0)
+    with pytest.raises(ValidationError, match="expected a table of keys, got 3"):
+        Shelf.model_validate(3)
+
+
+def test_a_class_says_what_it_was_given_and_no_default():
+    stand = ClassKeys(hotspot=0.0, distribution="burned-grazed", code=None)
+    assert list(stand.written) == ["distribution", "hotspot", "code"]
+    assert list(ClassKeys().written) == []
+    assert stand.written["hotspot"] is ClassKeys.model_fields["hotspot"]
+    ground = GroundKeys(hotspot=0.2)
+    assert list(ground.written) == list(GroundKeys.model_fields)
+
+
+def test_numbers_come_with_their_unit_and_limits_are_allowed():
+    assert LandscapeKeys(size="1.2 km").size == 1200.0
+    LandscapeKeys(deviations=dict.fromkeys(VARYING, 1), arps={"soil": 0.2498, "brown": 0})
+    LandscapeKeys(covary={"wetness": 1, "illumination": -1}, deviations={})
+    StandKeys(hotspot=1e-6, brown=1, dissociation=1, crown_cover=0, crown_shape=10, soil=-1, moisture=1)
+    ClassKeys(share=1)
+
+
+@pytest.mark.parametrize(
+    ("values", "is_one"),
+    [
+        ({"cover": "none", "size": 50.0}, True),
+        ({"deviations": {"soil": 0.0, "brown": 0}, "arps": {"soil": 0.24}}, True),
+        ({"deviations": {"soil": 0.0}, "covary": {"elevation": 0.0, "soil": 0}}, True),
+        ({"cover": "pastures"}, False),
+        ({"cover": "cover.tif"}, False),
+        ({"deviations": {"soil": 0.0, "brown": 0.1}}, False),
+        ({"covary": {"elevation": -0.3}}, False),
+    ],
+)
+def test_one_stand_is_where_nothing_varies_but_leaf_area(values, is_one):
+    assert LandscapeKeys(**values).is_one() is is_one
+    is_file = values.get("cover", "none").endswith(".tif")
+    assert LandscapeKeys(**values).files == ({"cover": "cover.tif"} if is_file else {})

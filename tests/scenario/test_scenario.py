@@ -3,19 +3,33 @@
 import re
 import tomllib
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pyproj
 import pytest
 import rasterio
 from affine import Affine
+from mistakes import check_message, mistakes
 
 import fifesim
 from fifesim.atmosphere import six_s
-from fifesim.base import times
+from fifesim.base import files, times
 from fifesim.base.geometry import earth_sun_distance, sun_geometry
 from fifesim.grids import grid as grids
-from fifesim.scenario.scenario import Scenario, parse_scenario
+from fifesim.scenario.scenario import (
+    Scenario,
+    default_scenario,
+    find_key,
+    in_text,
+    parse_scenario,
+    put,
+    read_scenario,
+    statement,
+    summary,
+    values_of,
+    with_false_colour,
+)
 from fifesim.scenario.sections import Ground
 from fifesim.scenario.toml import write_scenario
 
@@ -101,14 +115,6 @@ def test_every_key_has_a_meaning_and_every_number_a_unit():
                 assert re.search(r"# (m|km|degree|1); |seed", line), line
 
 
-@pytest.mark.parametrize(
-    "written, value",
-    [("'23 km'", 23.0), ("'23km'", 23.0), ("'23'", 23.0), ("23", 23.0), ("'2.3e1 km'", 23.0), ("' 23  km '", 23.0)],
-)
-def test_number_may_carry_its_unit(tmp_path, written, value):
-    assert read_text(tmp_path, f"[atmosphere]\nvisibility = {written}").atmosphere.visibility == value
-
-
 def test_lengths_are_taken_in_any_of_their_units():
     """In decimals as they are written."""
     lengths = {"width": "3 km", "height": "1.1km", "cell": "333 cm", "west": "709.0 km"}
@@ -116,101 +122,6 @@ def test_lengths_are_taken_in_any_of_their_units():
     assert (grid.width, grid.height, grid.cell, grid.west) == (3000.0, 1100.0, 3.33, 709000.0)
     air = parse_scenario({"atmosphere": {"altitude": "412 m", "visibility": "23000m"}}).atmosphere
     assert (air.altitude, air.visibility) == (0.412, 23.0)
-
-
-@pytest.mark.parametrize(
-    "text, message",
-    [
-        ("[atmosphere]\nvisibilty = 45", "atmosphere.visibilty = 45: did you mean 'visibility'? allowed are profile, "),
-        ("[ground]\nARP = 0.1", "unknown key ground.ARP = 0.1"),
-        ("[atmosfere]\nvisibility = 45", "did you mean 'atmosphere'? allowed are grid, ground"),
-        (
-            "[atmosphere]\nvisibility = '45 mi'",
-            "visibility = '45 mi': visibility is in km; write a number, or a number",
-        ),
-        ("[grid]\nwidth = '3 degree'", "width is in m; write a number, or a number and 'km' or 'm' or 'cm'"),
-        ("[geometry]\nsza = '30 m'", "sza is in degree; write a number, or a number and 'degree'"),
-        ("[grid]\ncell = '3 px'", "cell = '3 px': cell is in m"),
-        ("[atmosphere]\nvisibility = 2", "atmosphere.visibility = 2"),
-        ("[atmosphere]\nvisibility = nan", "atmosphere.visibility = nan"),
-        ("[ground]\narp = 0.25", "ground.arp = 0.25"),
-        ("[ground]\narp = 0.2499", "arp = 0.2499: at most 0.2498 when streaming; or method"),
-        ("[ground]\nseed = -1", "ground.seed = -1"),
-        ("[ground]\nseed = 1.5", "ground.seed = 1.5"),
-        ("[ground]\ndistribution = 'burnt'", "did you mean 'burned-"),
-        (
-            "[ground.leaf]\nchlorofyll = 40",
-            "unknown key 'chlorofyll': did you mean 'chlorophyll'? allowed are structure",
-        ),
-        ("[ground.leaf]\nwater = 12", "water must be in [0, 0.2] cm, got 12"),
-        (
-            "[ground.leaf]\nwater = 0.01\n[ground.leaf_reflectance]\nTM3 = 0.1",
-            "ground: leaf and leaf_reflectance are both given: remove one",
-        ),
-        ("[ground.background_spectra]\nsoil = 1.0", "unknown spectrum 'soil': allowed are soil_dry, "),
-        ("[ground.background_spectra]\nsoil_dry = 0.9", "must add up to 1, got 0.9"),
-        ("[ground]\nleaf_angles = 'sphere'", "ground.leaf_angles = 'sphere'"),
-        ("[geometry]\nsza = 95", "geometry.sza = 95"),
-        ("[atmosphere]\naerosol = 'maritim'", "aerosol = 'maritim': aerosol must be one of"),
-        ("[sensor]\ninstrument = 'TN'", "TM"),
-        ("[sensor]\nbands = ['TM9']", "TM9"),
-        ("[sensor]\nbands = []", "name at least one band"),
-        ("[sensor]\ninterval = 'natve'", "interval = 'natve': must be product or native, or a positive distance"),
-        ("[sensor]\ninterval = '30 degree'", "interval is in m"),
-        ("[sensor]\ninterval = -3", "sensor.interval = -3"),
-        ("[sensor]\noffset = [1.0]", "sensor.offset"),
-        ("[sensor]\noffset = [nan, 0.0]", "two finite numbers"),
-        ("[sensor]\nnoise = ['shto']", "sensor.noise"),
-        ("[sensor]\ninstrument = 'HRV'\nnoise = ['fixed-pattern']", "HRV has no fixed-pattern noise for XS1"),
-        ("[sensor]\ninstrument = 'SuperDove'\nnoise = ['shot']", "description of SuperDove has no noise for PS6"),
-        ("atmosphere = 3", "atmosphere"),
-        ("[atmosphere", "scenario.toml is not valid TOML"),
-    ],
-)
-def test_mistake_is_one_line_that_names_it(tmp_path, text, message):
-    with pytest.raises(ValueError) as caught:
-        read_text(tmp_path, text)
-    assert message in str(caught.value)
-    assert len(str(caught.value).splitlines()) == 1
-
-
-def test_every_mistake_is_told_at_once(tmp_path):
-    with pytest.raises(ValueError) as caught:
-        read_text(tmp_path, "[atmosphere]\nvisibility = 2\naltitude = -1\n[ground]\narp = 0.3")
-    lines = str(caught.value).splitlines()
-    assert [line.split(" = ")[0] for line in lines] == ["ground.arp", "atmosphere.visibility", "atmosphere.altitude"]
-
-
-@pytest.mark.parametrize(
-    ("sections", "said"),
-    [
-        ({"ground": {"ARP": 0.1}}, "unknown key ground.ARP = 0.1: did you mean 'arp'? allowed are distribution, "),
-        ({"atmosphere": {"visibility": 2}}, "atmosphere.visibility = 2: "),
-        ({"atmosfere": {}}, "unknown key atmosfere = {}: did you mean 'atmosphere'?"),
-        ({"sensor": {"instrument": "TN"}}, "unknown instrument 'TN'"),
-        ({"grid": 3}, "grid = 3: expected a table of keys, got 3"),
-    ],
-)
-def test_mistake_in_python_is_the_line_of_a_file(sections, said):
-    with pytest.raises(ValueError) as caught:
-        Scenario(**sections)
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value) and "http" not in str(caught.value)
-    with pytest.raises(ValueError) as parsed:
-        parse_scenario(sections)
-    assert str(parsed.value) == str(caught.value)
-
-
-def test_missing_scenario_is_named(tmp_path):
-    with pytest.raises(ValueError, match=r"cannot read the scenario .*none\.toml: No such file"):
-        fifesim.read_scenario(tmp_path / "none.toml")
-
-
-def test_files_lie_beside_the_scenario(tmp_path):
-    (tmp_path / "samples.csv").write_text("lai\n1\n1.5\n2\n2.5\n3\n")
-    scenario = read_text(tmp_path, "[ground]\ndistribution = 'samples.csv'\nlai_file = 'maps/lai.tif'")
-    assert scenario.ground.distribution == str((tmp_path / "samples.csv").resolve())
-    assert scenario.ground.lai_file == str((tmp_path / "maps" / "lai.tif").resolve())
 
 
 def test_sun_may_be_given_instead_of_time_and_place():
@@ -272,51 +183,12 @@ def test_crs_alone_has_no_corner():
         parse_scenario({"grid": {"crs": "EPSG:32614"}}).geobox()
 
 
-def test_scenario_is_frozen():
-    with pytest.raises(ValueError, match="frozen"):
-        Scenario().atmosphere.visibility = 10.0
-
-
 def test_a_map_of_real_ground_lies_on_no_invented_hills():
     assert parse_scenario({}).terrain.dem == "flint-hills"
     assert parse_scenario({"ground": {"lai_file": "lai.tif"}}).terrain.dem == "flat"
     given = {"ground": {"lai_file": "lai.tif"}, "terrain": {"dem": "flint-hills"}}
     assert parse_scenario(given).terrain.dem == "flint-hills"
     assert Scenario(ground=Ground(lai_file="lai.tif")).terrain.dem == "flat"
-
-
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        ({"grid": {"north": 1e300}}, "north = 1e+300: the grid is outside the area of EPSG:26914"),
-        ({"grid": {"north": 2**64}}, "north = 1.844674407e+19: the grid is outside"),
-        ({"grid": {"west": 1e12}}, "west = 1e+12, north = 4334220: the grid is outside"),
-        ({"grid": {"cell": 1000}}, "holds no cell of 1000 x 1000 m: use a larger width and height"),
-        ({"grid": {"width": 1}}, "width = 1, height = 150 m holds no cell of 3.33333 x 3.33333 m"),
-        ({"grid": {"width": 1e12}}, "holds over 2147483647 cells of 3.33333 x 3.33333 m along a side"),
-        ({"grid": {"width": 10}}, "the image must have 2 x 2 pixels or more, sensor.pixel of 30 x 30 m fits 5 x 0"),
-        ({"grid": {"width": 30}}, "fits 5 x 1 times"),
-        ({"grid": {"width": 56}, "sensor": {"interval": "native"}}, "sensor.pixel of 30 x 30 m fits 5 x 1 times"),
-        ({"sensor": {"interval": 100.0}}, "sensor.interval of 100 x 100 m fits 1 x 3 times"),
-        ({"sensor": {"pixel": 0.1}}, "sensor.pixel = 0.1 m is smaller than a ground cell: use 3.33333 m or"),
-        ({"sensor": {"interval": 0.1}}, "sensor.interval = 0.1 m is smaller than a ground cell"),
-        (
-            {"sensor": {"offset": [0.0, 1000.0]}},
-            "sensor.offset = [0.0, 1000.0] pixels moves the image out of the scene",
-        ),
-        ({"grid": {"crs": "nonsense\x1b"}}, r"crs = 'nonsense\x1b': PROJ knows no such coordinate reference system"),
-        ({"grid": {"crs": "EPSG:3857", "west": -1.075e7, "north": 4.7e6}}, "use another CRS, such as EPSG:32614"),
-        ({"geometry": {"time": "1987-06-06T06:00Z"}}, "the sun is below the horizon"),
-        ({"geometry": {"sza": 80, "saa": 0}}, "sza must be from 0 to 75 degrees, got 80"),
-        ({"ground": {"lai_file": "none.tif"}}, "ground.lai_file = 'none.tif': the file does not exist"),
-    ],
-)
-def test_what_no_run_can_be_is_one_line_before_it_begins(values, said):
-    whole = {name: SMALL.get(name, {}) | values.get(name, {}) for name in {*SMALL, *values}}
-    with pytest.raises(ValueError) as caught:
-        parse_scenario(whole).complete()
-    assert said in str(caught.value)
-    assert str(caught.value).isprintable() and len(str(caught.value)) <= 500
 
 
 def test_heights_beside_a_crs_are_left_out():
@@ -329,24 +201,6 @@ def test_engine_that_is_not_installed_is_told_at_once(monkeypatch):
     engine = parse_scenario(SMALL | {"atmosphere": {"engine": "6S"}})
     with pytest.raises(ImportError, match="engine='6S' needs the 6S engine: type pip install"):
         engine.complete()
-
-
-@pytest.mark.parametrize(
-    ("sections", "said"),
-    [
-        ({"classes": {"grass": {}}}, "landscape.cover is none: choose a layout"),
-        ({"classes": {"a": {"share": 0.5}, "b": {}}, "landscape": {"cover": "voronoi"}}, "b has no share"),
-        ({"classes": {"a": {"share": 0.5}, "b": {"share": 0.6}}, "landscape": {"cover": "levels"}}, "sum to 1.1"),
-        ({"ground": {"method": "periodic"}, "landscape": {"cover": "levels"}}, "needs a single stand"),
-        (
-            {"classes": {"a": {"arp": 0.2499}}, "landscape": {"cover": "levels"}},
-            "classes.a.arp = 0.2499: must be at most",
-        ),
-    ],
-)
-def test_landscapes_that_cannot_be(sections, said):
-    with pytest.raises(ValueError, match=said):
-        Scenario(**sections)
 
 
 def test_a_class_without_leaf_area_has_that_of_the_ground():
@@ -375,3 +229,261 @@ def test_a_misspelt_key_does_not_hide_another_mistake(text, second, tmp_path):
         fifesim.read_scenario(tmp_path / "mine.toml")
     first, *others = str(caught.value).splitlines()
     assert first.startswith("unknown key") and len(others) == 1 and second in others[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "whole"),
+    [
+        ("visibility", "atmosphere.visibility"),
+        ("ground.seed", "ground.seed"),
+        ("classes.grass.brown", "classes.grass.brown"),
+        ("ground.leaf.chlorophyll", "ground.leaf.chlorophyll"),
+        ("leaf.chlorophyll", "ground.leaf.chlorophyll"),
+        ("classes.grass.leaf.chlorophyll", "classes.grass.leaf.chlorophyll"),
+        ("deviations.soil", "landscape.deviations.soil"),
+    ],
+)
+def test_a_key_is_found_by_its_name(name, whole):
+    assert find_key(name).name == whole
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("visibilty", "the axis 'visibilty' is not a key of a scenario: did you mean 'visibility'"),
+        ("seed", r"in several sections: use ground\.seed or terrain\.seed"),
+        ("sensor.sed", r"not a key of a scenario: did you mean 'sensor\.seed'"),
+        ("senser.seed", r"not a key of a scenario: did you mean 'sensor\.seed'"),
+        ("classes.grass.brwn", r"not a key of a scenario: did you mean 'classes\.grass\.brown'"),
+        ("ground.arp.tall", "not a key of a scenario"),
+        ("ground.leaf.", "not a key of a scenario"),
+        ("ground", "not a key of a scenario"),
+        ("classes", "not a key of a scenario"),
+        ("classes.grass", "not a key of a scenario"),
+    ],
+)
+def test_what_is_no_key_is_refused(name, message):
+    with pytest.raises(ValueError, match=message):
+        find_key(name)
+
+
+def test_attributes_say_what_a_plot_writes_beside_it():
+    assert find_key("visibility").attributes == {"long_name": "meteorological range", "units": "km"}
+    assert find_key("leaf.chlorophyll").attributes == {"long_name": "leaf: chlorophyll"}
+
+
+def test_replaced_keys_are_those_of_a_new_scenario():
+    """Keys of several sections, of a class and of a table, and two that must be given together."""
+    values = {
+        "ground": {"arp": 0.1, "seed": 5},
+        "landscape": {"cover": "voronoi"},
+        "classes": {"grass": {"brown": 0.1}},
+    }
+    changes = {"visibility": "20 km", "sensor.seed": 3, "classes.grass.brown": 0.4, "sza": 30, "saa": np.float64(140)}
+    expected = values | {
+        "atmosphere": {"visibility": 20}, "sensor": {"seed": 3}, "classes": {"grass": {"brown": 0.4}},
+        "geometry": {"sza": 30, "saa": 140},
+    }  # fmt: skip
+    first = Scenario(**values)
+    assert first.replace(**changes) == Scenario(**expected)
+    assert first == Scenario(**values) and first.replace() == first
+    assert values_of(Scenario()) == {}
+    offset = {}
+    put(offset, ("sensor", "offset"), np.array([0.5, 0.0]))
+    assert offset == {"sensor": {"offset": [0.5, 0.0]}}
+    assert [in_text(value) for value in (["shot"], [], True, "TM")] == ["shot", "none", True, "TM"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"sensor.sed": 3}, r"replace: 'sensor\.sed' is not a key of a scenario: did you mean 'sensor\.seed'"),
+        ({"visibilty": 3}, "replace: 'visibilty' is not a key of a scenario: did you mean 'visibility'"),
+        ({"seed": 3}, r"replace: 'seed' exists in several sections: use .*sensor\.seed"),
+        ({"sensor.seed": -1}, r"sensor\.seed = -1: must be at least 0"),
+        ({"sza": 30}, "sza and saa go together"),
+        ({"leaf.chlorofyll": 30}, "unknown key 'chlorofyll': did you mean 'chlorophyll'"),
+        (
+            {"classes.gras.brown": 0.3},
+            r"classes\.gras\.brown is of a class .*did you mean 'grass'\? its classes are grass",
+        ),
+        ({"arp": 0.1, "ground.arp": 0.2}, r"replace: arp and ground\.arp are one key"),
+        ({"bands": ["OLI4"]}, "OLI4"),
+    ],
+)
+def test_impossible_replacements_are_refused(changes, message):
+    scenario = Scenario(landscape={"cover": "voronoi"}, classes={"grass": {"brown": 0.1}})
+    with pytest.raises(ValueError, match=message):
+        scenario.replace(**changes)
+
+
+ROOT = Path(__file__).parents[2]
+DEFAULT = (
+    "Synthetic landscape: fields and hills are synthetic; only the three grass types and the location are FIFE's. "
+    "Hypothetical overpass, 6 June 1987 16:35 UTC."
+)
+OVERPASS = "Hypothetical overpass, 6 June 1987 16:35 UTC."
+PASTURES = {"landscape": {"cover": "pastures"}}
+GIVEN = {"ground": {"lai_file": "lai.tif"}, "terrain": {"dem": "dem.tif"}}
+# On the site of FIFE; a scene that covers a LAI file has the grid of the file.
+PLACE = {"grid": {"west": 704970.0, "north": 4334220.0, "width": 900.0, "height": 900.0}}
+ELSEWHERE = {"grid": {"west": 600_000.0}, "geometry": {"time": "2022-06-01T10:05:00Z"}}
+
+
+def test_default_landscape_is_called_synthetic():
+    """Also once every default is written out and read again."""
+    found = default_scenario()
+    for scenario in (found, found.complete(), parse_scenario(PASTURES)):
+        assert statement(scenario) == scenario.provenance() == DEFAULT
+        assert summary(scenario) == "synthetic landscape, hypothetical overpass"
+
+
+@pytest.mark.parametrize(
+    ("values", "said", "short"),
+    [
+        (
+            {},
+            "Synthetic landscape: leaf area and hills are synthetic; only the grass type and the location are FIFE's.",
+            "synthetic landscape, hypothetical overpass",
+        ),
+        (
+            {"terrain": {"dem": "flat"}, "ground": {"distribution": "mine.csv"}},
+            "Synthetic landscape: leaf area is synthetic; the ground is level; only the location is FIFE's.",
+            "synthetic landscape, hypothetical overpass",
+        ),
+        (
+            {"landscape": {"cover": "levels"}, "classes": {"a": {"distribution": "mine.csv"}, "b": {}}},
+            "Synthetic landscape: patches and hills are synthetic; only the location is FIFE's.",
+            "synthetic landscape, hypothetical overpass",
+        ),
+        (
+            {"landscape": {"deviations": {"soil": 0.03, "brown": 0.0, "moisture": 0.1}}},
+            "Synthetic landscape: leaf area, soil brightness, soil moisture and hills are synthetic; only the grass "
+            "type and the location are FIFE's.",
+            "synthetic landscape, hypothetical overpass",
+        ),
+        (
+            PASTURES | {"terrain": {"dem": "dem.tif"}},
+            "Partly synthetic landscape: fields are synthetic; elevation is from a file.",
+            "partly synthetic landscape, hypothetical overpass",
+        ),
+        (
+            {"landscape": {"cover": "map.tif"}, "terrain": {"dem": "dem.tif"}},
+            "Partly synthetic landscape: leaf area is synthetic; land cover and elevation are from files.",
+            "partly synthetic landscape, hypothetical overpass",
+        ),
+        (
+            PLACE | {"ground": {"lai_file": "lai.tif"}, "terrain": {"dem": "flint-hills"}},
+            "Partly synthetic landscape: hills are synthetic; leaf area is from a file.",
+            "partly synthetic landscape, hypothetical overpass",
+        ),
+        (
+            PLACE | {"ground": {"lai_file": "lai.tif"}, "landscape": {"deviations": {"brown": 0.1}}},
+            "Partly synthetic landscape: dead leaves are synthetic; leaf area is from a file; the ground is level.",
+            "partly synthetic landscape, hypothetical overpass",
+        ),
+        (PLACE | GIVEN, "Leaf area and elevation are from files.", "hypothetical overpass"),
+    ],
+)
+def test_parts_are_told_apart_by_where_they_come_from(values, said, short):
+    scenario = parse_scenario(values)
+    assert statement(scenario) == f"{said} {OVERPASS}"
+    assert summary(scenario) == short
+
+
+@pytest.mark.parametrize("time", ["1987-06-06T16:35Z", "1987-06-06T11:35:00-05:00"])
+def test_time_of_the_hypothetical_overpass_is_known_in_any_spelling(time):
+    assert statement(parse_scenario(PASTURES | {"geometry": {"time": time}})) == DEFAULT
+
+
+@pytest.mark.parametrize(
+    ("geometry", "said"),
+    [
+        ({"time": "1987-08-15T16:40:30Z"}, "Time as given, 15 August 1987 16:40 UTC."),
+        ({"time": "1987-08-15T23:40:00-05:00"}, "Time as given, 16 August 1987 04:40 UTC."),
+        ({"sza": 30.0, "saa": 120.0}, "Sun angles as given."),
+    ],
+)
+def test_a_time_of_ones_own_is_not_called_hypothetical(geometry, said):
+    scenario = parse_scenario(GIVEN | {"geometry": geometry})
+    assert statement(scenario) == f"Leaf area and elevation are from files. {said}"
+    assert summary(scenario) == ""
+
+
+def test_another_place_has_no_location_and_no_overpass_of_fife():
+    """There even the same time may be that of a real image."""
+    said = "Synthetic landscape: fields and hills are synthetic; only the three grass types are FIFE's."
+    scenario = parse_scenario(PASTURES | ELSEWHERE)
+    assert statement(scenario) == f"{said} Time as given, 1 June 2022 10:05 UTC."
+    same = parse_scenario(PASTURES | ELSEWHERE | {"geometry": {"time": "1987-06-06T16:35Z"}})
+    assert statement(same) == f"{said} Time as given, 6 June 1987 16:35 UTC." and "overpass" not in summary(same)
+
+
+def test_a_grid_that_only_a_file_or_nobody_knows_is_nowhere():
+    """A scenario that is not complete is written without its files being opened."""
+    assert statement(parse_scenario(GIVEN)) == "Leaf area and elevation are from files."
+    assert "location" not in statement(parse_scenario({"grid": {"crs": "EPSG:1"}}))
+
+
+def test_scenario_file_states_it_in_its_first_line_and_is_read_back(tmp_path):
+    scenario = default_scenario().complete()
+    text = write_scenario(scenario)
+    assert text.splitlines()[0] == f"# {DEFAULT}"
+    (tmp_path / "scenario.toml").write_text(text, encoding="utf-8")
+    again = read_scenario(tmp_path / "scenario.toml")
+    assert again == scenario and write_scenario(again.complete()) == text
+    other = write_scenario(Scenario(**GIVEN))
+    assert other.splitlines()[0] == "# Leaf area and elevation are from files."
+
+
+def test_readme_and_the_default_scenario_begin_with_it():
+    assert files.path("fife.toml").read_text(encoding="utf-8").splitlines()[0] == f"# {DEFAULT}"
+    _, first, *_ = (ROOT / "README.md").read_text(encoding="utf-8").split("\n\n")
+    assert re.sub(r"\s+", " ", first).endswith(f"shows no real scene. *{DEFAULT}*")
+
+
+@pytest.mark.parametrize(
+    ("text", "bands"),
+    [
+        ("", ["TM2", "TM3", "TM4"]),
+        ("[sensor]\ninstrument = 'MSI'\n", ["MSI3", "MSI4", "MSI8"]),
+        ("[sensor]\ninstrument = 'MODIS'\n", ["MODIS1", "MODIS2"]),
+        ("[sensor]\ninstrument = 'AVHRR9'\npixel = 1100\n", ["AVHRR1", "AVHRR2"]),
+        ("[sensor]\nbands = ['TM4']\n", ["TM4"]),
+        ("[ground]\nbackground = { TM3 = 0.1, TM4 = 0.2 }\n", ["TM3", "TM4"]),
+        ("[ground]\nbackground = { TM2 = 0.1, TM3 = 0.1, TM4 = 0.2 }\n", ["TM2", "TM3", "TM4"]),
+    ],
+)
+def test_bands_that_a_file_leaves_out(tmp_path, text, bands):
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    found = read_scenario(path).sensor.bands
+    assert found == bands
+
+
+@pytest.mark.parametrize("sensor", [{"instrument": "TN"}, {"instrument": 3}, {"instrument": "missing.toml"}, "TM"])
+def test_what_is_wrong_is_left_to_be_told(sensor):
+    values = {"sensor": sensor}
+    assert with_false_colour(values) == values
+
+
+def test_noise_that_green_lacks_is_not_asked_of_it():
+    """The noise of SuperDove is not known of any band: two are left, which is told of them."""
+    values = {"sensor": {"instrument": "SuperDove", "noise": ["shot"]}}
+    assert with_false_colour(values) == values
+    noisy = {"sensor": {"instrument": "OLI", "noise": ["shot"]}}
+    assert with_false_colour(noisy)["sensor"]["bands"] == ["OLI3", "OLI4", "OLI5"]
+
+
+@pytest.mark.parametrize(("stage", "values", "said"), mistakes("read", "complete"), ids=str)
+def test_a_mistake_is_named_before_a_run_begins(stage, values, said):
+    with pytest.raises(ValueError) as caught:
+        scenario = parse_scenario(values)
+        assert stage == "complete"
+        scenario.complete()
+    check_message(str(caught.value), said)
+
+
+def test_text_that_is_no_toml_is_named(tmp_path):
+    with pytest.raises(ValueError, match=r"scenario\.toml is not valid TOML"):
+        read_text(tmp_path, "[atmosphere")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fifesim
-from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
+from fifesim.scenario.sections import Ground, Sensor
 from fifesim.sensor.description.instruments import instrument
 
 
@@ -22,34 +22,6 @@ def test_complete_optics_are_those_that_the_chain_takes():
     rho = fifesim.ground.canopy.optics.band_leaf_optics(bands)[0]
     np.testing.assert_array_equal(list(keys["leaf_reflectance"].values()), rho)
     assert Ground(**keys).complete_optics(bands) == keys
-
-
-def test_air_is_an_atmosphere():
-    assert Air().model() == fifesim.Atmosphere()
-    assert Air(aot=0.2, h2o=1.0).model() == fifesim.Atmosphere(aot=0.2, h2o=1.0)
-
-
-def test_size_of_a_pixel_is_the_products_unless_given():
-    assert Sensor().size == 30.0 and Sensor(pixel=50.0).size == 50.0
-    assert Sensor(instrument="MSI", bands=["MSI4"]).size == instrument("MSI").gsd
-
-
-@pytest.mark.parametrize(
-    ("section", "values", "said"),
-    [
-        (Ground, {"arp": 0.2499}, "at most 0.2498 when streaming"),
-        (Ground, {"distribution": "burnt"}, "unknown LAI distribution"),
-        (Ground, {"hotspot": 5e-324}, "hotspot must be 0, for no hot spot, or at least 1e-06, got 4.94066e-324"),
-        (CoverStand, {"hotspot": 9e-7}, "hotspot must be 0, for no hot spot, or at least 1e-06, got 9e-07"),
-        (CoverStand, {"leaf_angles": "spheric"}, "did you mean 'spherical'"),
-        (Terrain, {"dem": "a.tif", "vertical_units": "furlong"}, "vertical units must be one of"),
-        (Air, {"engine": "7S"}, "must be one of 5S"),
-        (Sensor, {"instrument": "SuperDove", "noise": ["shot"]}, "no noise for PS6"),
-    ],
-)
-def test_what_physics_refuses(section, values, said):
-    with pytest.raises(ValueError, match=said):
-        section(**values)
 
 
 def test_file_of_an_aerosol_lies_beside_the_scenario(tmp_path, monkeypatch):
@@ -72,17 +44,16 @@ def test_file_of_an_aerosol_lies_beside_the_scenario(tmp_path, monkeypatch):
             fifesim.Scenario(atmosphere=wrong)
 
 
-@pytest.mark.parametrize(
-    ("name", "bands", "size"),
-    [("TM", ["TM3", "TM4"], 30), ("MSI", ["MSI4", "MSI8"], 10), ("MODIS", ["MODIS1", "MODIS2"], 250)],
-)
-def test_an_instrument_alone_sees_in_its_red_and_near_infrared(name, bands, size):
-    sensor = Sensor(instrument=name)
-    assert (sensor.bands, sensor.size) == (bands, size)
-
-
 def test_pixels_are_those_of_the_bands_as_in_python():
     """A scene sensed without onto= has them too."""
+    for name, bands, size in (
+        ("TM", ["TM3", "TM4"], 30),
+        ("MSI", ["MSI4", "MSI8"], 10),
+        ("MODIS", ["MODIS1", "MODIS2"], 250),
+    ):
+        sensor = Sensor(instrument=name)
+        assert (sensor.bands, sensor.size) == (bands, size)
+    assert Sensor(pixel=50.0).size == 50.0
     assert Sensor(instrument="MSI", bands=["MSI11"]).size == 20
     assert Sensor(instrument="MSI", bands=["MSI4", "MSI11"], pixel=20).size == 20
     with pytest.raises(
@@ -116,8 +87,3 @@ def test_noise_of_a_scenario_is_that_of_python():
     ):
         with pytest.raises(ValueError, match=said):
             Sensor(noise_model=values)
-
-
-def test_noise_that_an_instrument_lacks_is_told_with_those_that_have_it():
-    with pytest.raises(ValueError, match=r"SuperDove has no noise for PS6: .*\[sensor.noise_model\].* L4TM, MODIS"):
-        Sensor(instrument="SuperDove", noise=["shot"])

@@ -9,7 +9,6 @@ from lazy import no_compute
 import fifesim
 from fifesim.base import files, times
 from fifesim.base.geometry import Geometry, earth_sun_distance
-from fifesim.grids import directions
 from fifesim.grids import grid as grids
 from fifesim.scenario.ground import elevation
 from fifesim.scenario.scenario import parse_scenario
@@ -49,10 +48,6 @@ def hill(tmp_path):
         return str(path)
 
     return write
-
-
-def test_hills_are_the_default():
-    assert parse_scenario({}).terrain.dem == "flint-hills"
 
 
 def test_terrain_goes_through_the_chain_written_out(hill):
@@ -141,27 +136,6 @@ def test_the_scene_with_terrain_is_lazy_and_on_its_grid(hill):
     assert grids.same_grid(grids.geobox(tree["terrain"]["slope"]), grids.geobox(tree["image"]["dn"]))
 
 
-def test_a_mark_for_no_data_that_is_not_declared_is_no_elevation(hill, tmp_path):
-    with rasterio.open(hill()) as source:
-        values, profile = source.read(1), source.profile | {"nodata": None}
-    values[17, 20] = -9999
-    with rasterio.open(tmp_path / "marked.tif", "w", **profile) as sink:
-        sink.write(values, 1)
-    with pytest.raises(ValueError, match="-a_nodata"):
-        fifesim.simulate(scenario(dem=str(tmp_path / "marked.tif")))["terrain"]["dem"].compute()
-
-
-def test_elevation_of_a_file_goes_to_other_processes(hill):
-    lazy = fifesim.fine_dem(hill(), scenario().geobox(), chunks={"y": 50, "x": 70})
-    np.testing.assert_array_equal(lazy.compute(scheduler="processes", num_workers=1), lazy.compute(scheduler="threads"))
-
-
-@pytest.mark.parametrize("options", [{"fill": 60}, {"vertical_units": "ft"}])
-def test_what_is_for_a_file_is_refused_without_one(options):
-    with pytest.raises(ValueError, match="elevation file"):
-        scenario(**options)
-
-
 def test_keys_of_the_sensor_are_those_of_sense():
     keys = {"instrument": "L4TM", "interval": 31.0, "offset": [0.25, -0.5], "noise": ["thermal"], "seed": 3}
     case = parse_scenario({"grid": GRID, "terrain": {"dem": "flat"}, "sensor": keys})
@@ -189,40 +163,6 @@ def test_scenario_runs_the_chain(whole, site):
     np.testing.assert_array_equal(tree["image"]["ndvi"], whole["ndvi"])
     np.testing.assert_array_equal(tree["truth"]["lai"], whole["truth"])
     np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fifesim.fpar(whole["lai"]), 30.0))
-
-
-def test_scenario_options_reach_their_stages():
-    options = LEVEL | {
-        "atmosphere": {"visibility": 23},
-        "geometry": {"sza": 40.0, "saa": 100.0, "vza": 5.0, "vaa": 10.0},
-        "sensor": {"bands": ["TM5"], "pixel": 50.0},
-    }
-    tree = fifesim.simulate(fifesim.Scenario.model_validate(options))
-    image = tree["image"]["dn"]
-    assert "ndvi" not in tree["image"]
-    assert image["band"].values.tolist() == ["TM5"]
-    assert grids.cell_size(grids.geobox(image)) == (50.0, 50.0)
-    assert directions.geometry_of(image) == Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(times.TIME))
-    assert fifesim.Atmosphere.parse(image.attrs["atmosphere"]).visibility == 23
-
-
-def test_leaf_and_spectra_of_a_scenario_reach_the_canopy():
-    options = LEVEL | {
-        "ground": {"leaf": {"chlorophyll": 55.0}, "background_spectra": {"soil_wet": 0.5, "golden_grass": 0.5}},
-        "sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]},
-    }
-    scenario = fifesim.Scenario.model_validate(options)
-    tree = fifesim.simulate(scenario)
-    rho = fifesim.surface_reflectance(
-        tree["scene"]["lai"],
-        "OLI",
-        bands=["OLI4", "OLI5"],
-        geometry=scenario.sun_and_view(),
-        canopy=fifesim.Canopy(
-            leaf_optics=fifesim.Leaf(chlorophyll=55.0), background={"soil_wet": 0.5, "golden_grass": 0.5}
-        ),
-    )
-    np.testing.assert_array_equal(tree["image"]["dn"], fifesim.to_toa(rho).fifesim.sense("OLI"))
 
 
 def test_every_key_of_a_scenario_reaches_its_stage():

@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 import pytest
+from mistakes import check_message, mistakes
 
-import fifesim
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.studies import Study, read_study
 
@@ -81,73 +81,9 @@ def test_chips_have_the_sun_and_the_air_of_the_study_wherever_they_lie():
     here = dates.scenario_with(drawn)
     far = dates.scenario_with(drawn | {("grid", "west"): 600_000.0})
     assert here.sun_and_view() == far.sun_and_view() != study.scenario.sun_and_view()
-
-
-def test_one_band_may_be_drawn_beside_the_others():
-    study = Study(parse_scenario(SMALL), {"ground.background.TM3": {"uniform": [0.05, 0.2]}})
-    found = study.scenario_with({("ground", "background", "TM3"): 0.07}).ground.background
-    assert found["TM3"] == 0.07 and found["TM4"] == study.scenario.complete().ground.background["TM4"]
-
-
-@pytest.mark.parametrize(
-    ("draws", "message"),
-    [
-        ({}, r"a study needs a table \[draw\]"),
-        ({"visibilty": {"uniform": [10, 60]}}, "draw: 'visibilty' is not a key of a scenario: did you mean 'visib"),
-        ({"visibility": {"unifrom": [10, 60]}}, r"draw\.atmosphere\.visibility: needs .* did you mean 'uniform'"),
-        ({"visibility": {"uniform": [1, 60]}}, r"draw\.atmosphere\.visibility = .* at 1\.0: .*must be at least 5"),
-        ({"visibility": {"uniform": ["10 m", "60 miles"]}}, r"visibility is in km"),
-        ({"visibility": 5}, r"draw\.atmosphere\.visibility: a distribution is a table"),
-        ({"ground.seed": {"integers": [1, 9]}}, r"draw\.ground\.seed: seeds are assigned automatically"),
-        ({"pixel": {"choice": [30.0, 60.0]}}, r"draw\.sensor\.pixel must be equal for all chips"),
-        ({"width": {"uniform": [200, 300]}}, r"draw\.grid\.width must be equal for all chips"),
-        ({"visibility": {"uniform": [9, 60]}, "atmosphere": {"visibility": {"uniform": [9, 60]}}}, "is given twice"),
-        ({"classes.grass.brown": {"uniform": [0, 1]}}, r"there is no section \[classes\.grass\]; the classes are none"),
-        ({"sza": {"uniform": [20, 50]}}, "draw, all keys at their median or first choice: .*sza and saa go together"),
-        ({"sza": {"uniform": [20, 89.9]}, "saa": {"uniform": [0, 90]}}, r"draw\.geometry\.sza = .* at 89\.9"),
-        ({"distribution": {"choice": ["burned-grazed", "burnt"]}}, r"draw\.ground\.distribution .* 'burnt'"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_drawn_is_refused(draws, message):
-    with pytest.raises(ValueError, match=message) as caught:
-        Study(parse_scenario(SMALL), draws)
-    assert len(str(caught.value)) <= 500
-
-
-@pytest.mark.parametrize(
-    ("plan", "message"),
-    [
-        ({"sequence": "sobel"}, "did you mean 'sobol'"),
-        ({"landscapes": 0}, "must be an integer of at least 1"),
-        ({"landscapes": 2}, "are too few for the parts train, validation, test"),
-        ({"split": {"train": 0.8}}, "must be fractions that sum to 1"),
-        ({"split": {"train": 1.5, "test": -0.5}}, "must be fractions that sum to 1"),
-        ({"seed": -1}, "seed must be a whole number"),
-    ],
-)
-def test_impossible_plans_are_refused(plan, message):
-    with pytest.raises(ValueError, match=message):
-        Study(parse_scenario(SMALL), DRAWS, **plan)
-
-
-@pytest.mark.parametrize(
-    ("section", "keys", "message"),
-    [
-        ("terrain", {"dem": "dem.tif"}, "terrain.dem = 'dem.tif': chips of one map would share ground"),
-        ("landscape", {"cover": "cover.tif"}, "landscape.cover = .* a study needs none or pastures"),
-        ("ground", {"lai_file": "lai.tif"}, "ground.lai_file = 'lai.tif': chips of one map"),
-        ("ground", {"method": "periodic"}, "has no windows for chips"),
-        ("grid", {"cell": 5.0}, "grid.width is missing: give the size of a chip"),
-    ],
-)
-def test_ground_that_is_not_drawn_is_refused(section, keys, message):
-    with pytest.raises(ValueError, match=message):
-        Study(parse_scenario(SMALL | {section: keys}), DRAWS)
-
-
-def test_a_study_takes_a_scenario():
-    with pytest.raises(TypeError, match="a study needs a Scenario, got dict"):
-        fifesim.Study({}, DRAWS)
+    band = Study(parse_scenario(SMALL), {"ground.background.TM3": {"uniform": [0.05, 0.2]}})
+    found = band.scenario_with({("ground", "background", "TM3"): 0.07}).ground.background
+    assert found["TM3"] == 0.07 and found["TM4"] == band.scenario.complete().ground.background["TM4"]
 
 
 def test_unknown_keys_of_the_plan_are_refused(path):
@@ -177,3 +113,11 @@ def test_the_study_of_the_page_is_valid(tmp_path):
     (tmp_path / "study.toml").write_text(block)
     study = read_study(tmp_path / "study.toml")
     assert len(study.drawn) == 7 and study.landscapes == 50
+
+
+@pytest.mark.parametrize(("stage", "values", "said"), mistakes("study"), ids=str)
+def test_impossible_studies_are_refused(stage, values, said):
+    with pytest.raises(ValueError) as caught:
+        scenario = parse_scenario(SMALL | values.get("sections", {}))
+        Study(scenario, values.get("draws", DRAWS), **values.get("plan", {}))
+    check_message(str(caught.value), said)

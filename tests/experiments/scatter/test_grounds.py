@@ -8,13 +8,7 @@ import xarray as xr
 from elevations import write
 
 import fifesim
-from fifesim.experiments.scatter.stages import (
-    IDEAL_PROPERTIES,
-    ground_with,
-    pixels,
-    varying_ground,
-    working_stages,
-)
+from fifesim.experiments.scatter.stages import IDEAL_PROPERTIES, ground_with, pixels, varying_ground, working_stages
 from fifesim.scenario.ground import ground_scene
 from fifesim.scenario.scenario import parse_scenario
 
@@ -93,12 +87,7 @@ def test_with_all_at_work_the_ground_is_as_it_is(ideal, whole):
 
 def test_without_a_property_only_that_is_even(ideal, whole):
     """As `PROPERTIES` says; all else has the same bits, of the same random numbers."""
-    changed = {
-        "soil": {"soil", "moisture"},
-        "dead leaves": {"brown"},
-        "cover": {"cover"},
-        "clumping": {"crown_cover"},
-    }
+    changed = {"soil": {"soil", "moisture"}, "dead leaves": {"brown"}, "cover": {"cover"}, "clumping": {"crown_cover"}}
     for name, variables in changed.items():
         found = ideal(name)
         for other in set(whole) - variables:

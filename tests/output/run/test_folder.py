@@ -117,11 +117,7 @@ def test_a_report_with_terrain_shows_it_and_says_how_far_it_is_known(tmp_path):
     assert "flint-hills" in (tmp_path / "hills" / "scenario.toml").read_text(encoding="utf-8")
 
 
-HILLS = {
-    "grid": {"width": 4500, "height": 3900},
-    "ground": {"seed": 3},
-    "terrain": {"horizon_reach": 600},
-}
+HILLS = {"grid": {"width": 4500, "height": 3900}, "ground": {"seed": 3}, "terrain": {"horizon_reach": 600}}
 
 
 @pytest.fixture(scope="module")

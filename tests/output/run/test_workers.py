@@ -45,10 +45,7 @@ CHUNKS = {"y": 100, "x": 80}
 
 @pytest.fixture(scope="module")
 def client():
-    with (
-        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
-        Client(cluster) as client,
-    ):
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
         yield client
 
 
@@ -255,9 +252,7 @@ def wanted(array, name="means"):
 def test_blocks_are_those_of_dask(threads):
     array, found = means(96, 17), {}
     run_on_threads(
-        *tasks_of({"means": array}, wanted(array)),
-        lambda name, index, block: found.update({index: block}),
-        threads,
+        *tasks_of({"means": array}, wanted(array)), lambda name, index, block: found.update({index: block}), threads
     )
     for index, block in found.items():
         np.testing.assert_array_equal(block, array.blocks[index].compute(scheduler="sync"))

@@ -1,0 +1,16 @@
+"""Impossible scenarios, studies, distributions and sweeps of `data/scenario_mistakes.jsonl`."""
+
+import json
+from pathlib import Path
+
+_LINES = (Path(__file__).parent / "data" / "scenario_mistakes.jsonl").read_text(encoding="utf-8").splitlines()
+
+
+def mistakes(*stages):
+    """Stage, values and beginning of the message of each mistake of some stages."""
+    return [each for each in map(json.loads, _LINES[1:]) if each[0] in stages]
+
+
+def check_message(message, start):
+    """Check that a message begins as it should, prints and is short."""
+    assert message.startswith(start) and message.splitlines()[0].isprintable() and len(message) <= 500
