@@ -1,86 +1,61 @@
-"""An instrument: the paper's Table 1, sources, bands, and what it sees on the ground."""
+"""An instrument: the paper's Table 1, sources, bands and gain states, and what it sees on the ground."""
 
 import dataclasses
-import pickle
 
 import numpy as np
 import pytest
 
-from fifesim.sensor.description.instruments import instrument, instrument_names
+from fifesim.sensor.description.instrument_file import Gain, Noise, Scan
+from fifesim.sensor.description.instruments import instrument
+
+SOURCE = ('\n[sources]\nproduct = "Chander2009"', "\n[sources]")
+PRODUCT = "[product]\ngain = 2e-5\noffset = -0.1\nbits = 16\nsun_corrected = false\n\n[lsf]"
 
 
 def test_tm_is_table_1():
-    tm = instrument("TM")
+    """Footprint by hand: 9 x 4.778 urad x 705 km and 43 urad x 705 km."""
+    tm, paper = instrument("TM"), instrument("TM", "paper")
     red, near_infrared = tm.select(["TM3", "TM4"])
     assert (red.full_scale_radiance, near_infrared.full_scale_radiance) == (204.3, 206.2)
     assert (red.min_radiance, near_infrared.min_radiance) == (-1.2, -1.5)
-    assert tm.bits == 8
-    assert tm.altitude == 705_000.0
-    assert tm.interval == 0.000043
-    for lsf in (tm.paper_lsf, instrument("TM", "paper").lsf):
+    assert (tm.bits, tm.altitude, tm.interval, tm.gsd) == (8, 705_000.0, 0.000043, 30.0)
+    for lsf in (tm.paper_lsf, paper.lsf):
         assert (lsf.count, lsf.step, lsf.kind) == (9, 0.000004778, "cosine")
+    np.testing.assert_allclose(paper.line_spread.width, 30.31641, rtol=1e-12)
+    np.testing.assert_allclose(paper.line_spread.half_width, 15.158205, rtol=1e-12)
+    np.testing.assert_allclose(paper.ground_interval, 30.315, rtol=1e-12)
+    # The cosine at half a cycle per interval, by hand.
+    np.testing.assert_allclose(paper.line_spread.mtf(0.5 / 30.315), 0.6928, atol=1e-3)
+    assert repr(tm) == (
+        "Instrument TM: Landsat-5 Thematic Mapper, 30 m pixels from 705 km, 8 bits\n"
+        "  bands TM1, TM2, TM3, TM4, TM5, TM7"
+    )
+    said = repr(red)
+    assert said.startswith("InstrumentBand(name='TM3', srf=") and "None" not in said and len(said) < 240
 
 
-def test_footprint_of_tm_on_the_ground():
-    """By hand: 9 x 4.778 urad x 705 km and 43 urad x 705 km."""
-    tm = instrument("TM", "paper")
-    np.testing.assert_allclose(tm.line_spread.width, 30.31641, rtol=1e-12)
-    np.testing.assert_allclose(tm.line_spread.half_width, 15.158205, rtol=1e-12)
-    np.testing.assert_allclose(tm.ground_interval, 30.315, rtol=1e-12)
-    assert tm.gsd == 30.0
-
-
-@pytest.mark.parametrize("name", instrument_names())
-def test_every_number_of_every_band_is_present_and_has_a_source(name):
-    item = instrument(name)
-    for number in ("altitude", "gsd", "interval", "bits", "lsf"):
-        assert item.source(number)
-    for band in item.bands:
-        # The products of OLI reach down to a reflectance of -0.1, those of others less far; MSS begins above the dark.
-        above = 0.04 * band.full_scale_radiance if name.startswith("MSS") else 0.0
-        assert -above <= -band.min_radiance < 0.09 * band.full_scale_radiance
-        assert band.solar_irradiance > band.full_scale_radiance
-        for number in ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance"):
-            assert len(item.source(number, band)) > 20
-
-
-def test_bands_of_tm():
-    assert [band.name for band in instrument("TM").bands] == ["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]
-
-
-def test_a_band_names_its_own_source_first():
-    tm = instrument("TM")
-    green, red = tm.select(["TM2", "TM3"])
-    assert "Friedl" in tm.source("min_radiance", red)
-    assert "Markham" in tm.source("min_radiance", green)
-
-
-def test_bands_come_in_the_order_asked_for():
+def test_bands_come_in_the_order_asked_for_and_once():
     tm = instrument("TM")
     assert [band.name for band in tm.select(["TM4", "tm3"])] == ["TM4", "TM3"]
     assert [band.name for band in tm.select(["red", "nir", "B5"])] == ["TM3", "TM4", "TM5"]
-    assert tm.select("TM3") == (tm.bands[2],)
-    assert tm.select() == tm.bands
-
-
-def test_instruments_are_frozen_hashable_and_picklable():
-    tm = instrument("TM")
+    assert tm.select("TM3") == (tm.bands[2],) and tm.select() == tm.bands
+    with pytest.raises(ValueError, match="bands of TM must be at least one, each once, got TM3, tm3"):
+        tm.select(["TM3", "tm3"])
+    with pytest.raises(ValueError, match="at least one, each once, got none"):
+        tm.select([])
+    with pytest.raises(ValueError, match=r"unknown band of TM 'TM6': did you mean .* TM1, TM2, TM3, TM4, TM5"):
+        tm.select(["TM3", "TM6"])
+    with pytest.raises(TypeError, match="band of TM: the name must be text, got 3"):
+        tm.select([3])
     with pytest.raises(dataclasses.FrozenInstanceError):
         tm.altitude = 1.0
-    assert pickle.loads(pickle.dumps(tm)) == tm
-    assert {tm: 1}[tm] == 1
-
-
-def test_unknown_gain_states_are_named():
-    with pytest.raises(ValueError, match="no band of TM has a gain state 'high'"):
-        instrument("TM").with_gain("high")
-    with pytest.raises(ValueError, match="TM3 has no gain state 'high': it has nominal"):
-        instrument("TM").with_gain({"TM3": "high"})
 
 
 def test_what_a_band_gives_stands_before_what_its_instrument_gives():
     """By hand: 86 urad and 60 urad from 705 km are 60.63 m and 42.3 m."""
     tm = instrument("TM")
+    green, red = tm.select(["TM2", "TM3"])
+    assert "Friedl" in tm.source("min_radiance", red) and "Markham" in tm.source("min_radiance", green)
     sources = tm.sources | {"ifov": "Friedl1995", "detectors": "Friedl1995"}
     own = dataclasses.replace(tm.bands[5], gsd=120.0, interval=86e-6, ifov=60e-6, detectors=4)
     mixed = dataclasses.replace(tm, bands=(*tm.bands[:5], own), sources=sources)
@@ -90,24 +65,19 @@ def test_what_a_band_gives_stands_before_what_its_instrument_gives():
     assert tuple(mixed.ground_fields(tm.bands[0])) == (None, None)
 
 
+def test_angles_of_a_file_reach_the_ground_on_their_axes(changed):
+    mine = changed("interval = 43.0e-6", "interval = { along = 40.0e-6, across = 44.0e-6 }")
+    along, across = mine.ground_intervals(mine.bands[0])
+    assert (along, across) == pytest.approx((28.2, 31.02), rel=1e-12)
+    assert mine.ground_interval == across
+
+
 def test_largest_angle_is_that_of_the_scan_or_none():
     tm = instrument("TM")
     assert tm.max_angle == tm.scan.max_angle == 7.47
     assert dataclasses.replace(tm, scan=None).max_angle == np.inf
-
-
-def test_bands_are_asked_for_once():
-    with pytest.raises(ValueError, match="bands of TM must be at least one, each once, got TM3, tm3"):
-        instrument("TM").select(["TM3", "tm3"])
-    with pytest.raises(ValueError, match="at least one, each once, got none"):
-        instrument("TM").select([])
-
-
-def test_instrument_is_told_in_two_lines():
-    assert repr(instrument("TM")) == (
-        "Instrument TM: Landsat-5 Thematic Mapper, 30 m pixels from 705 km, 8 bits\n"
-        "  bands TM1, TM2, TM3, TM4, TM5, TM7"
-    )
+    scan = Scan("pushbroom", max_angle=7.5)
+    assert (scan.samples, scan.lines, scan.period, scan.swath) == (None, None, None, None)
 
 
 def test_red_and_near_infrared_are_found_by_wavelength():
@@ -115,3 +85,82 @@ def test_red_and_near_infrared_are_found_by_wavelength():
     blue = dataclasses.replace(instrument("TM"), bands=instrument("TM").select(["TM1", "TM3"]))
     with pytest.raises(ValueError, match=r"TM has no near infrared band, 0.75 to 1 um: say which .* meant: TM1, TM3"):
         blue.red_and_near_infrared()
+
+
+def test_gain_states_change_places():
+    (own,) = instrument("ETM+").select("ETM3")
+    low = own.with_gain("low")
+    assert own.with_gain("high") is own
+    assert (low.gain, set(low.gains)) == ("low", {"high"})
+    assert low.full_scale_radiance == own.gains["low"].full_scale_radiance > own.full_scale_radiance
+    assert low.with_gain("high") == own
+    with pytest.raises(ValueError, match="ETM3 has no gain state 'medium': it has low, high"):
+        low.with_gain("medium")
+    with pytest.raises(ValueError, match="no band of TM has a gain state 'high'"):
+        instrument("TM").with_gain("high")
+    with pytest.raises(ValueError, match="TM3 has no gain state 'high': it has nominal"):
+        instrument("TM").with_gain({"TM3": "high"})
+    with pytest.raises(ValueError, match="must be above min_radiance, got 1 and 1 W"):
+        Gain(1.0, 1.0)
+    with pytest.raises(ValueError, match="limits: the first must be below the second"):
+        dataclasses.replace(own, limits=(0.69, 0.63))
+
+
+FIRST = 'name = "TM1"'
+MISTAKES = [
+    (("interval = 43.0e-6", "interval = { along = 43.0e-6 }"), "the key interval.across is missing"),
+    (("interval = 43.0e-6", "interval = '43 urad'"), "interval = '43 urad': .*number"),
+    ((FIRST, FIRST + "\ngains.nominal = { full_scale_radiance = 1.0, min_radiance = 0.0 }"), "own gain"),
+    ((FIRST, FIRST + "\nnoise = { radiance = 50.0 }"), "bands.1.noise: give either snr or nedl"),
+    ((FIRST, FIRST + "\nnoise = { radiance = 50.0, snr = 100.0 }"), "sources.noise: must be one of"),
+    (("max_angle = 7.47", "max_angle = 90.0"), "scan.max_angle = 90.0: must be below 75"),
+    (('kind = "whiskbroom"', 'kind = "frame"'), "scan.kind = 'frame': .*'whiskbroom' or 'pushbroom'"),
+    (("[lsf]", PRODUCT), r"sources\.product: must be one of"),
+]
+MISTAKES += [
+    (("[lsf]", PRODUCT.replace(old, new), *SOURCE[::-1]), said)
+    for old, new, said in (
+        ("2e-5", "-2e-5", r"product\.gain = -2e-05: must be above 0"),
+        ("bits = 16\nsun", "bits = 32\nsun", r"product\.bits = 32: must be at most 16"),
+        ("false", '"no"', r"product\.sun_corrected = 'no'"),
+        ("\noffset = -0.1", "", r"the key product\.offset is missing"),
+    )
+]
+
+
+@pytest.mark.parametrize(("replacements", "message"), MISTAKES, ids=lambda each: each if isinstance(each, str) else "")
+def test_mistakes_in_parts_of_a_file_name_key_and_remedy(changed, replacements, message):
+    with pytest.raises(ValueError, match=f"mine.toml: .*{message}"):
+        changed(*replacements)
+
+
+def test_the_scale_of_a_product_is_read(changed):
+    product = changed("[lsf]", PRODUCT, *SOURCE[::-1]).product
+    assert (product.gain, product.offset, product.bits, product.sun_corrected) == (2e-5, -0.1, 16, False)
+
+
+def test_noise_by_its_ratio_and_by_its_radiance_is_the_same():
+    """Half of the variance is shot noise: at a fourth of the light, an eighth and a half of it are left."""
+    by_ratio, by_radiance = Noise(radiance=80.0, snr=160.0, shot=0.5), Noise(radiance=80.0, nedl=0.5, shot=0.5)
+    assert by_ratio.equivalent_radiance == by_radiance.equivalent_radiance == 0.5
+    for noise in (by_ratio, by_radiance):
+        model = noise.model(6, "columns")
+        assert (model.detectors, model.along) == (6, "columns")
+        found = model.noise_equivalent_radiance([80.0, 20.0])
+        np.testing.assert_allclose(found, [0.5, 0.5 * np.sqrt(0.625)], rtol=1e-12)
+    constant = Noise(radiance=80.0, snr=160.0, shot=0.0).model(1, "rows")
+    assert (constant.shot, constant.thermal) == (0.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"high_radiance": 150.0}, "belong together"),
+        ({"high_radiance": 20.0, "high_snr": 300.0}, "high_radiance must be above radiance = 22, got 20"),
+        ({"high_radiance": 150.0, "high_snr": 950.0, "shot": 0.5}, "shot_share belongs to one"),
+        ({"high_radiance": 150.0, "high_snr": 2000.0}, "negative variance of shot"),
+    ],
+)
+def test_second_point_of_the_noise_is_complete_and_higher(keys, message):
+    with pytest.raises(ValueError, match=message):
+        Noise(radiance=22.0, snr=230.0, **keys)

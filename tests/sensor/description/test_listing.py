@@ -2,12 +2,9 @@
 
 import dataclasses
 
-import pytest
-
 from fifesim.sensor.description.fields import Angles
 from fifesim.sensor.description.instruments import instrument, instrument_names
 from fifesim.sensor.description.listing import blur_in_words, instrument_in_words, list_instruments, noise_in_words
-from fifesim.sensor.description.spatial_response import knows_blur
 
 
 def test_thematic_mapper_in_words():
@@ -53,21 +50,6 @@ def test_the_scale_of_a_product_is_said():
     assert said in instrument_in_words(instrument("MSI")).splitlines()
     assert "is reflectance x cosine of the solar zenith angle, 16 bits" in instrument_in_words(instrument("OLI2"))
     assert "Level-1 product" not in instrument_in_words(instrument("TM"))
-
-
-@pytest.mark.parametrize("name", instrument_names())
-def test_what_a_file_does_not_know_it_says_with_who_does(name):
-    described = instrument(name)
-    lacking = {
-        "noise": any(band.noise is None for band in described.bands),
-        "blur": not all(knows_blur(described, band) for band in described.bands),
-        "geolocation": described.geolocation is None,
-    }
-    for quantity, lacks in lacking.items():
-        assert not lacks or quantity in described.not_found
-    text = instrument_in_words(described)
-    assert text.count("not known: ") == len(described.not_found)
-    assert all(who in text for who in described.not_found.values())
 
 
 def test_a_line_says_which_bands_lack_noise_or_blur_and_who_published_it():

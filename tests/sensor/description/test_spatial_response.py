@@ -1,8 +1,14 @@
 """Spatial responses of instrument files: the transfer that each says it has."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from paper_file import paper_text
+
+from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.provenance import band_provenance
+from fifesim.sensor.description.spatial_response import knows_blur, with_response
 
 TM_TEXT = paper_text()
 LSF = TM_TEXT[TM_TEXT.index('kind = "cosine"') : TM_TEXT.index("[scan]")]
@@ -74,3 +80,54 @@ def test_blur_and_smear_are_parts_of_the_system(changed):
     mine = changed(LSF, parts, *IFOV)
     expected = np.exp(-((np.pi * 0.4 * 0.5) ** 2) / (4 * np.log(2))) * np.sinc(0.45) * np.sinc(0.25)
     np.testing.assert_allclose(nyquist(mine), expected, atol=2e-3)
+
+
+def test_responses_that_can_be_asked_for():
+    tm, msi, dove = instrument("TM"), instrument("MSI"), instrument("SuperDove")
+    paper = instrument("TM", "paper")
+    assert paper.lsf == tm.paper_lsf and "Friedl" in paper.source("lsf") and "blur" not in paper.origin
+    assert instrument("MSI", "system") == msi and instrument("TM", "system") == tm
+    for description in (tm, msi):
+        sharp = with_response(description, "detector")
+        for band, own in zip(sharp.bands, description.bands, strict=True):
+            fields, intervals = description.ground_fields(own), description.ground_intervals(own)
+            widths = fields if fields.along else intervals
+            assert [spread.width for spread in sharp.line_spreads(band)] == list(widths)
+            assert not knows_blur(sharp, band)
+    assert not any(knows_blur(dove, band) for band in dove.bands) and all(knows_blur(msi, band) for band in msi.bands)
+    # A sharp band has the sources of what it keeps.
+    own = replace(tm.bands[0], sources={"lsf": "Markham1985", "bits": "Chander2009"})
+    sharp = with_response(replace(tm, bands=(own, *tm.bands[1:])), "detector").bands[0]
+    assert sharp.sources == {"bits": "Chander2009", "ifov": tm.sources["interval"]}
+
+
+@pytest.mark.parametrize("name", ["TM", "OLI", "VIIRS", "MSI"])
+def test_ends_of_the_uncertainty_are_that_far_from_the_best_transfer(name):
+    """VIIRS by its elementary samples: the uncertainty is stated before aggregation."""
+    best, ends = instrument(name), [instrument(name, each) for each in ("sharpest", "softest")]
+    for number, band in enumerate(best.bands):
+        error = band_provenance(best, "blur", band).uncertainty
+        steps = best.ground_intervals(band)
+        own, high, low = (
+            np.array(
+                [lsf.mtf(0.5 / step) for lsf, step in zip(each.line_spreads(each.bands[number], 1), steps, strict=True)]
+            )
+            for each in (best, *ends)
+        )
+        axes = slice(1) if best.scan.zones else slice(2)
+        np.testing.assert_allclose([(high - own)[axes], (own - low)[axes]], error, rtol=1e-6)
+        assert high[1] > own[1] > low[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "response", "said"),
+    [
+        ("SuperDove", "system", "SuperDove has no 'system' response: type response='detector'"),
+        ("MSI", "paper", "MSI has no 'paper' response"),
+        ("TM", "sharp", "response must be one of system, detector, paper, sharpest, softest, got 'sharp'"),
+        (instrument("TM", "paper"), "softest", "states no uncertainty of the blur of TM1"),
+    ],
+)
+def test_responses_that_no_file_has(name, response, said):
+    with pytest.raises(ValueError, match=said):
+        instrument(name, response)

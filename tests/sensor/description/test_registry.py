@@ -1,0 +1,354 @@
+"""Each instrument of the package reproduces its published figures from its file."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from fifesim.base import files
+from fifesim.sensor.description.fields import band_called
+from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
+from fifesim.sensor.description.listing import instrument_in_words
+from fifesim.sensor.description.plausibility import check_instrument_units
+from fifesim.sensor.description.provenance import band_provenance
+from fifesim.sensor.response.calibration import gain_offset, radiance_to_reflectance
+from fifesim.sensor.response.scan import swath_width
+
+DATA = Path(__file__).parents[2] / "data"
+FILES = sorted(files.path("instruments").glob("*.toml"))
+FIGURES = pd.read_csv(DATA / "instrument_figures.csv", comment="#")
+NAMES = pd.read_csv(DATA / "instrument_names.csv", comment="#", dtype=str)
+HYPERSPECTRAL = ("EMIT", "EnMAP", "PRISMA")
+EACH = pytest.mark.parametrize("name", instrument_names())
+
+
+def band(name, which):
+    return instrument(name).select(which)[0]
+
+
+# ------------------------------------------------------------------------------------------- published figures
+
+
+def mean_wavenumber(response):
+    wavenumber, weight = 1e4 / np.array(response.wavelength)[::-1], np.array(response.response)[::-1]
+    return np.trapezoid(weight * wavenumber, wavenumber) / np.trapezoid(weight, wavenumber)
+
+
+def equivalent_width(response):
+    return 1000 * np.trapezoid(response.response, response.wavelength) / max(response.response)
+
+
+def transfer(item, each):
+    """Modulation transfer at the Nyquist frequency by brute force: the cosine transform of the response itself."""
+    found = []
+    for spread, step in zip(item.line_spreads(each), item.ground_intervals(each), strict=True):
+        edges = np.linspace(-spread.half_width, spread.half_width, 40001)
+        middle, weight = (edges[1:] + edges[:-1]) / 2, np.diff(spread.cumulative(edges))
+        found.append(weight @ np.cos(np.pi * middle / step))
+    return found
+
+
+MEASURES = {
+    "wavelength": lambda item, each, at: 1000 * each.wavelength,
+    "wavenumber": lambda item, each, at: mean_wavenumber(each.response),
+    "width": lambda item, each, at: equivalent_width(each.response),
+    "interval": lambda item, each, at: item.ground_intervals(each),
+    "transfer": lambda item, each, at: transfer(item, each),
+    "step": lambda item, each, at: gain_offset(each.full_scale_radiance, each.min_radiance, item.bits)[0],
+    "bits": lambda item, each, at: item.bits,
+    "snr": lambda item, each, at: item.noise_model(each).snr(at),
+    "noise": lambda item, each, at: item.noise_model(each).noise_equivalent_radiance(at),
+}
+
+
+@pytest.mark.parametrize("quantity", MEASURES)
+def test_figures_are_the_published_ones(quantity):
+    rows = FIGURES[FIGURES["quantity"] == quantity]
+    assert len(rows) >= 7
+    for row in rows.itertuples():
+        found = MEASURES[quantity](instrument(row.instrument), band(row.instrument, row.band), row.at)
+        known = row.value if np.isnan(row.across) else (row.value, row.across)
+        rtol, atol = np.nan_to_num([row.rtol, row.atol])
+        # The cosine transform by sums is good to 1e-6.
+        atol = max(atol, 1e-6) if quantity == "transfer" else atol
+        np.testing.assert_allclose(
+            found, known, rtol=rtol, atol=atol, err_msg=f"{row.instrument} {row.band} {row.source}"
+        )
+
+
+def test_assumed_blur_says_so_and_detectors_alone_are_boxcars():
+    for row in FIGURES[FIGURES["source"] == "assumed"].itertuples():
+        blur = band_provenance(instrument(row.instrument), "blur", band(row.instrument, row.band))
+        assert blur.origin == "assumed" and blur.uncertainty >= 0.06 and blur.source.startswith("Assumed"), row
+    for name, which in (("OLI", "OLI4"), ("MSI", "MSI10"), ("HRV", "XS1"), ("ETM+", "ETM8")):
+        item = instrument(name, "detector")
+        np.testing.assert_allclose(transfer(item, item.select(which)[0]), 2 / np.pi, rtol=1e-6)
+
+
+@pytest.mark.parametrize("row", list(NAMES.fillna("").itertuples(index=False)), ids=lambda row: row.name)
+def test_names_of_instruments_and_bands_are_those_in_use(row):
+    if row.instrument:
+        assert band_called(row.name, instrument(row.instrument)).name == row.meaning
+    else:
+        assert instrument(row.name) is instrument(row.name.upper()) is instrument(row.meaning)
+
+
+# ------------------------------------------------------------------------------------------- the whole registry
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_file_passes_the_check_that_users_files_get(path):
+    item = read_instrument(path)
+    assert item == instrument(item.name) and item.name in instrument_names()
+    assert "left out" in " ".join(path.read_text(encoding="utf-8").replace("\n#", " ").split())
+
+
+@EACH
+def test_every_number_has_a_source_and_every_reference_is_used(name):
+    item = instrument(name)
+    used = {item.source(number) for number in ("altitude", "gsd", "interval", "bits", "lsf")}
+    used |= {item.references[key] for key in item.sources.values()}
+    text = instrument_in_words(item)
+    for each in item.bands:
+        numbers = ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance", *each.sources)
+        own = {item.source(number, each) for number in numbers}
+        assert all(len(source) > 20 for source in own)
+        used |= own
+        # The products of OLI reach down to a reflectance of -0.1, those of others less far; MSS begins above the dark.
+        above = 0.04 * each.full_scale_radiance if name.startswith("MSS") else 0.0
+        assert -above <= -each.min_radiance < 0.09 * each.full_scale_radiance < 0.09 * each.solar_irradiance
+        assert any(line.split()[:1] == [each.name] for line in text.splitlines())
+    assert used == set(item.references.values()) and all(reference in text for reference in used)
+
+
+@EACH
+def test_blur_noise_and_geolocation_have_an_origin_or_the_search_for_it(name):
+    item = instrument(name)
+    for quantity in ("blur", "noise", "geolocation"):
+        own = [row for row in item.provenance if row.quantity == quantity]
+        assert sorted(each for row in own for each in row.bands) == sorted(each.name for each in item.bands)
+        for row in own:
+            assert len(row.source) > 20, row
+            stated = item.origin | {key: value for each in item.select(row.bands) for key, value in each.origin.items()}
+            assert row.origin == "unknown" or quantity in stated, row
+            assert row.origin == "assumed" or not row.source.startswith(("Recalled", "Assumed")), row
+        assert quantity in item.not_found or all(row.origin != "unknown" for row in own)
+    text = instrument_in_words(item)
+    assert text.count("not known: ") == len(item.not_found) and all(who in text for who in item.not_found.values())
+
+
+@EACH
+def test_instrument_travels_to_workers_and_is_a_key(name):
+    item = instrument(name)
+    again = pickle.loads(pickle.dumps(item))
+    assert again == item and {item: 1}[again] == 1
+
+
+def test_bands_have_names_of_their_own_instrument():
+    """A raster of one instrument's bands is never taken for another's, MODIS1 (red) for MSI1 (aerosol) say."""
+    family = {"L4TM": "TM", "OLI2": "OLI", "MSI-B": "MSI", "MSI-C": "MSI", "MODIS-Aqua": "MODIS"}
+    owner = {}
+    for name in instrument_names():
+        kind = family.get(name, "MSS" if name.startswith("MSS") else "AVHRR" if name.startswith("AVHRR") else name)
+        assert all(owner.setdefault(each.name, kind) == kind for each in instrument(name).bands), name
+
+
+# ------------------------------------------------------------------------------------------- spectral response
+
+
+NOMINAL = {"TM1": (0.45, 0.52), "TM2": (0.52, 0.60), "TM3": (0.63, 0.69), "TM4": (0.76, 0.90)}
+NOMINAL |= {"TM5": (1.55, 1.75), "TM7": (2.08, 2.35)}
+
+
+@pytest.mark.parametrize("name", ["L4TM", "TM", "OLI", "OLI2", "MODIS", "MODIS-Aqua"])
+def test_wavelength_is_near_the_middle_of_the_nominal_band(name):
+    """
+    Filters as built are not centred on the nominal band: by a tenth of the width of TM's, and those of MODIS by up to
+    0.8 % of the wavelength. Half of TM's maximum is within 0.04 um of the nominal limits.
+    """
+    for each in instrument(name).bands:
+        low, high = each.limits or NOMINAL[each.name]
+        assert abs(each.wavelength - (low + high) / 2) < max(0.15 * (high - low), 0.008 * low), each.name
+        if name == "TM":
+            half = [w for w, r in zip(each.response.wavelength, each.response.response, strict=True) if r > 0.5]
+            np.testing.assert_allclose([half[0], half[-1]], [low, high], atol=0.04)
+
+
+def test_responses_of_avhrr_rise_from_nothing_and_fall_to_it():
+    table = pd.read_csv(files.path("avhrr_response.csv"), comment="#")
+    for key, rows in table.groupby(["satellite", "band"]):
+        assert rows["response"].iloc[[0, -1]].max() <= 0.002 and 0.995 < rows["response"].max() <= 1.0, key
+
+
+def test_bands_of_spectrometers_lie_beside_each_other():
+    emit, enmap, prisma = (instrument(name) for name in HYPERSPECTRAL)
+    assert (len(emit.bands), len(enmap.bands), len(prisma.bands)) == (285, 224, 238)
+    np.testing.assert_allclose(np.diff([each.wavelength for each in emit.bands]), 7.43e-3, atol=5e-5)
+    for item, first in ((enmap, 91), (prisma, 66)):
+        for part in (item.bands[:first], item.bands[first:]):
+            assert np.all(np.diff([each.wavelength for each in part]) > 0)
+    assert (emit.bands[0].srf.width, emit.bands[-1].srf.width) == (0.008415, 0.008809)
+
+
+# ------------------------------------------------------------------------------------------- solar irradiance
+
+
+@EACH
+def test_agencys_irradiance_agrees_with_the_integral_of_a_solar_spectrum(name):
+    """
+    The agencies use other spectra than ASTM G173: within 4.5 % up to 2.4 um, but for the coastal and cirrus bands of
+    OLI (5.1 and 4.5 %) and, in the short-wave infrared, MODIS 5 and 7 (5.9 %).
+
+    Tables of many narrow bands name ASTM G173; two more digits of the responses move it by some 0.1 % near lines.
+    """
+    apart = {"OLI1": 0.055, "OLI9": 0.05, "MODIS5": 0.06, "MODIS7": 0.06}
+    for each in instrument(name).bands:
+        narrow = name in HYPERSPECTRAL
+        rtol = 2e-4 if narrow else apart.get(each.name, 0.045)
+        np.testing.assert_allclose(each.solar_irradiance, each.spectrum_irradiance, rtol=rtol, err_msg=each.name)
+        if narrow:
+            np.testing.assert_allclose(each.full_scale_radiance * np.pi, each.solar_irradiance, rtol=2e-4)
+            assert each.min_radiance == 0
+
+
+@pytest.mark.parametrize("name", ["OLI", "OLI2"])
+def test_oli_has_the_scale_of_reflectance_of_its_products(name):
+    """REFLECTANCE_MAXIMUM and REFLECTANCE_MINIMUM of Level 1: 1.2107 and -0.09998 in every band, overhead sun."""
+    for each in instrument(name).bands:
+        ends = radiance_to_reflectance([each.full_scale_radiance, each.min_radiance], each.solar_irradiance, 1.0)
+        np.testing.assert_allclose(ends, [1.2107, -0.09998], rtol=5e-4)
+
+
+def test_oli_reproduces_the_radiance_scale_of_another_product():
+    """RADIANCE_MULT of a scene at another distance of the sun stands to that of 2 May 2024 as the distances squared."""
+    other = [1.2866e-2, 1.3175e-2, 1.2140e-2, 1.0237e-2, 6.2648e-3, 1.5580e-3, 5.2513e-4, 1.1586e-2, 2.4484e-3]
+    steps = [(each.full_scale_radiance - each.min_radiance) / 65534 for each in instrument("OLI").bands]
+    ratio = np.array(other) / steps
+    np.testing.assert_allclose(ratio, ratio.mean(), rtol=2e-4)
+    assert 1 / 1.0168**2 < ratio.mean() < 1 / 0.9832**2
+
+
+def test_avhrr_count_of_the_dark_is_no_albedo_and_full_scale_is_the_slope():
+    """PATMOS-x: albedo [%] = slope (count - dark)."""
+    known = {"AVHRR": [(0.107, 38.0), (0.121, 40.0)], "AVHRR10": [(0.111, 39.44), (0.137, 39.4)]}
+    for name, channels in known.items():
+        item = instrument(name)
+        for each, (slope, dark) in zip(item.bands, channels, strict=True):
+            gain, offset = gain_offset(each.full_scale_radiance, each.min_radiance, item.bits)
+            albedo = 100 * np.pi * (np.array([dark, 1023]) * gain + offset) / each.solar_irradiance
+            np.testing.assert_allclose(albedo, [0, slope * (1023 - dark)], atol=0.01)
+
+
+# ------------------------------------------------------------------------------------------- orbit and sampling
+
+
+def test_avhrr_oversamples_by_the_published_1_362_and_its_field_is_1_09_km():
+    """
+    KLM guide, J.1: 1.362 samples an instantaneous field of view; its 0.95 mrad are rounded (to 0.5 %).
+
+    Its fields are 1.3 mrad, its samples 1.308 and 0.95 mrad apart: it passes 0.40 at half a cycle of its field along
+    and across, within the two digits of the file.
+    """
+    item = instrument("AVHRR")
+    field, interval = item.ground_fields(item.bands[0]), item.ground_intervals(item.bands[0])
+    np.testing.assert_allclose(field.across / interval.across, 1.362, rtol=6e-3)
+    np.testing.assert_allclose(field.across, np.radians(0.07449) * item.altitude, rtol=1e-3)
+    for spread, width in zip(item.line_spreads(item.bands[0]), field, strict=True):
+        assert float(spread.mtf(0.5 / width)) == pytest.approx(0.40, abs=0.005)
+
+
+def test_scan_covers_the_published_swath():
+    """2399 km in NOAA's guide is 2 h tan(55.4 degrees), within 1 %; stations that receive AVHRR say more than 2600."""
+    for item in map(instrument, instrument_names()):
+        width = swath_width(item.altitude, item.scan.max_angle)
+        if item.name.startswith("AVHRR"):
+            np.testing.assert_allclose(2 * 833e3 * np.tan(np.radians(item.scan.max_angle)), 2399e3, rtol=0.01)
+            assert width > 2600e3
+        else:
+            np.testing.assert_allclose(width, item.scan.swath, rtol=3e-3, err_msg=item.name)
+
+
+# Revolutions a day of two-line elements; mean altitude above the equatorial radius by Kepler's third law [km].
+ORBITS = {"AVHRR": (14.1136, 852), "AVHRR10": (14.2248, 814), "AVHRR11": (14.1280, 847)}
+
+
+@pytest.mark.parametrize("name", ORBITS)
+def test_avhrr_flies_as_its_two_line_elements_say(name):
+    """At 39 degrees north the ellipsoid lies 8 km below the equatorial radius; the orbit varies by 10 km."""
+    revolutions, above_equator = ORBITS[name]
+    axis = (398600.4418 * (86400 / revolutions / (2 * np.pi)) ** 2) ** (1 / 3)
+    # The oblateness of the earth lowers the mean orbit by 3 km.
+    assert axis - 6378.137 - 3.0 == pytest.approx(above_equator, abs=1.0)
+    assert instrument(name).altitude / 1000 == pytest.approx(axis - 6370.0, abs=10.0)
+
+
+# ------------------------------------------------------------------------------------------- blur, gain and noise
+
+
+def test_tm_blurs_as_its_twin_was_measured_in_flight():
+    """Schowengerdt et al. 1985: a Gaussian that passes half at 40.8 m keeps 2^-(40.8 / 30.315)^2 at the Nyquist."""
+    lsf = instrument("L4TM").line_spread
+    np.testing.assert_allclose(lsf.mtf(0.5 / 40.8), 0.5, rtol=1e-4)
+    np.testing.assert_allclose(transfer(instrument("TM"), band("TM", "TM4")), 2.0 ** -((40.8 / 30.315) ** 2), rtol=1e-3)
+    row = band_provenance(instrument("TM"), "blur", band("TM", "TM4"))
+    assert row.origin == "in-flight" and row.uncertainty == 0.12 and "San Mateo" in row.source
+
+
+def test_mss_of_landsat_5_passes_half_at_its_effective_field_of_view():
+    """Markham 1985, abstract: 70-75 m along and 79-82 m across the track."""
+    along, across = instrument("MSS5").line_spreads(band("MSS5", "MSS2"))
+    np.testing.assert_allclose([along.mtf(0.5 / 72.5), across.mtf(0.5 / 80.5)], 0.5, rtol=1e-3)
+
+
+def test_gain_states_are_those_of_the_handbooks():
+    """ETM+: radiances of digital numbers 1 and 255 after 1 July 2000. HRV: each gain is 1.3 times the one before."""
+    item = instrument("ETM+")
+    low = item.with_gain("low")
+    for state, full, first in ((item, 157.4, -5.1), (low, 241.1, -5.1)):
+        (each,) = state.select("ETM4")
+        gain, offset = gain_offset(each.full_scale_radiance, each.min_radiance, 8)
+        np.testing.assert_allclose([gain + offset, 255 * gain + offset], [first, full], atol=1e-3)
+    assert [each.gain for each in low.bands] == ["low"] * 7
+    assert low.with_gain({"ETM4": "high"}).select("ETM4") == item.select("ETM4")
+    assert [each.gain for each in item.bands] == ["high"] * 6 + ["low"]
+    check_instrument_units(low)
+    for each in instrument("HRV").bands:
+        full = [each.with_gain(f"m{number}").full_scale_radiance for number in range(3, 9)]
+        np.testing.assert_allclose(np.array(full[:-1]) / full[1:], 1.3, rtol=1e-3)
+    check_instrument_units(instrument("HRV").with_gain("m3"))
+
+
+def test_noise_states_its_origin_and_detectors():
+    origins = {("MSI", "MSI4"): "pre-launch", ("MSI-B", "MSI4"): "pre-launch", ("MSI-C", "MSI4"): "in-flight"}
+    origins |= {("MSI", "MSI11"): "required", ("MODIS", "MODIS1"): "required", ("MODIS-Aqua", "MODIS1"): "in-flight"}
+    for key, origin in origins.items():
+        assert band_provenance(instrument(key[0]), "noise", band(*key)).origin == origin
+    modis, msi = instrument("MODIS"), instrument("MSI")
+    assert [modis.noise_model(each).detectors for each in modis.bands] == [40, 40] + [20] * 5
+    assert {msi.noise_model(each).along for each in msi.bands} == {"columns"}
+    with pytest.raises(ValueError, match="SuperDove has no noise for PS6: leave noise out"):
+        instrument("SuperDove").noise_model(band("SuperDove", "PS6"))
+
+
+def test_tm_has_one_digital_number_of_noise_with_its_rounding():
+    item = instrument("TM")
+    for each in item.bands:
+        step = (each.full_scale_radiance - each.min_radiance) / 255
+        noise = item.noise_model(each).noise_equivalent_radiance((each.full_scale_radiance + each.min_radiance) / 2)
+        assert np.hypot(noise, step / np.sqrt(12)) == pytest.approx(step, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers"), [("MSS", "4567"), ("MSS2", "4567"), ("MSS3", "4567"), ("MSS4", "1234"), ("MSS5", "1234")]
+)
+def test_mss_compresses_its_photomultipliers_and_takes_six_lines_at_once(name, numbers):
+    item = instrument(name)
+    assert [each.compression for each in item.bands] == ["square-root"] * 3 + [None]
+    assert [each.compressed_count(item.bits) for each in item.bands] == [63, 63, 63, 0]
+    assert (item.detectors, item.scan.lines, item.scan.kind) == (6, 6, "whiskbroom")
+    assert instrument_in_words(item).count("square-root scale") == 3
+    assert [each.name for each in item.bands] == [f"MSS{number}" for number in numbers]
+    for each, (low, high) in zip(item.bands, [(0.5, 0.6), (0.6, 0.7), (0.7, 0.8), (0.8, 1.1)], strict=True):
+        assert each.limits == (low, high) and low < each.wavelength < high
