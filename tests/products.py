@@ -176,6 +176,14 @@ def _level1_scales(kind):
     return groups
 
 
+def surface_by_hand(toa, terms):
+    """Surface reflectance of a reflectance at the top of the atmosphere, shape (band, y, x)."""
+    names = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
+    path, down, up, albedo, gas = (np.asarray(getattr(terms, name))[:, None, None] for name in names)
+    below = (toa / gas - path) / (down * up)
+    return below / (1 + albedo * below)
+
+
 def mtl(groups, form="txt", root="LANDSAT_METADATA_FILE"):
     """Metadata in one of USGS's three forms."""
     if form == "json":

@@ -85,16 +85,7 @@ def test_a_scene_goes_through_to_a_file(folders, name, tmp_path):
     surface = scene.fifesim.to_surface(air)
     responses = tuple(band.response for band in fifesim.instrument(name).select(bands))
     sun = 90 - float(KINDS[name]["image"]["SUN_ELEVATION"]), 0.0, float(KINDS[name]["image"]["SUN_AZIMUTH"])
-    terms = engines.band_terms(air, responses, *sun)
-    path, down, up, albedo, gas = (
-        np.asarray(each)[:, None, None]
-        for each in (
-            terms.path_reflectance, terms.transmittance_down, terms.transmittance_up, terms.spherical_albedo,
-            terms.gas_transmittance,
-        )
-    )  # fmt: skip
-    below = (toa / gas - path) / (down * up)
-    expected = below / (1 + albedo * below)
+    expected = products.surface_by_hand(toa, engines.band_terms(air, responses, *sun))
     np.testing.assert_allclose(surface, expected, rtol=0, atol=2e-7)
     red, nir = expected
     ndvi = surface.fifesim.ndvi()
@@ -105,9 +96,8 @@ def test_a_scene_goes_through_to_a_file(folders, name, tmp_path):
         assert (source.transform.c, source.transform.f) == KINDS[name]["corner"]
     again = fifesim.open_image(surface.fifesim.to_geotiff(tmp_path / "surface.tif"))
     np.testing.assert_array_equal(again, surface)
-    assert again["time"].values == np.datetime64(
-        {"TM": "2011-03-12T19:54:32.695056", "OLI": "2020-12-04T19:02:11.194486"}[name]
-    )
+    times = {"TM": "2011-03-12T19:54:32.695056", "OLI": "2020-12-04T19:02:11.194486"}
+    assert again["time"].values == np.datetime64(times[name])
 
 
 def test_a_pixel_that_no_detector_saw_is_nan(copy):
@@ -136,16 +126,6 @@ def test_labels_are_those_of_the_packages_own_images(folders):
     assert float(scene["earth_sun_distance"]) == 0.9936974
     np.testing.assert_array_equal(scene["quality"], files["quality"])
     assert "LT05_L1TP_058014_20110312_20200823_02_T1" in scene.attrs["history"]
-
-
-def test_radiance_is_that_of_the_agencys_own_scale(folders):
-    """RADIANCE_MULT 1.0440 and RADIANCE_ADD -2.21398 of band 3."""
-    folder, files = folders["TM", 1]
-    scene = fifesim.open_landsat(folder, bands="TM3")
-    sun = np.cos(np.radians(scene["sza"])) / (np.pi * scene["earth_sun_distance"] ** 2)
-    radiance = scene * scene["solar_irradiance"] * sun
-    expected = np.where(np.isnan(scene[0]), np.nan, 1.0440 * files["3"] - 2.21398)
-    np.testing.assert_allclose(radiance[0], expected, rtol=5e-5)
 
 
 @pytest.mark.parametrize("form", ["json", "xml"])
@@ -243,12 +223,9 @@ def test_a_missing_band_is_named_with_those_there_are(copy):
     with pytest.raises(ValueError, match=r"B3\.TIF is missing in .*bands=\['TM1', 'TM2', 'TM4'\]"):
         fifesim.open_landsat(copy)
     assert fifesim.open_landsat(copy, bands=["TM1", "TM2", "TM4"]).sizes["band"] == 3
-
-
-def test_missing_angles_are_named(copy):
     (copy / "LT05_L1TP_058014_20110312_20200823_02_T1_VZA.TIF").unlink()
     with pytest.raises(ValueError, match=r"VZA\.TIF is missing in .*angles='centre'"):
-        fifesim.open_landsat(copy, angles="pixel")
+        fifesim.open_landsat(copy, angles="pixel", bands="TM1")
 
 
 def test_an_irradiance_that_is_not_said_is_the_instruments(tmp_path):
@@ -280,23 +257,10 @@ def test_an_off_nadir_view_is_known_by_its_roll_or_by_pixel(tmp_path):
 def test_a_product_whose_irradiance_is_impossible_is_refused(tmp_path):
     """A product's own instrument has nearly the same; another one that is given may have any."""
     altered(tmp_path, "LEVEL1_MIN_MAX_RADIANCE", RADIANCE_MAXIMUM_BAND_4="622768.8")
-    with pytest.raises(
-        ValueError, match=r"LC08_.*: the scale of OLI4 .*RADIANCE_MAXIMUM.* means a solar irradiance of"
-    ):
+    said = r"LC08_.*: the scale of OLI4 .*RADIANCE_MAXIMUM.* means a solar irradiance of"
+    with pytest.raises(ValueError, match=said):
         fifesim.open_landsat(tmp_path)
     assert fifesim.open_landsat(tmp_path, instrument="OLI2").sizes["band"] == 7
-
-
-def test_folders_with_upper_case_names_open(copy):
-    (text,) = copy.glob("*_MTL.txt")
-    text.rename(text.with_suffix(".TXT"))
-    assert fifesim.open_landsat(copy).sizes["band"] == 6
-
-
-def test_a_night_has_no_reflectance(tmp_path):
-    altered(tmp_path, "IMAGE_ATTRIBUTES", SUN_ELEVATION="-41.46228969")
-    with pytest.raises(ValueError, match=r"_MTL.txt: SUN_ELEVATION must .*got -41.4623: the sun is below the horizon"):
-        fifesim.open_landsat(tmp_path)
 
 
 def test_an_image_of_one_s_own_opens_as_the_product_that_it_is_written_as(tmp_path):

@@ -1,14 +1,17 @@
-"""Digital numbers of one's own."""
+"""Digital numbers of one's own as images, and the layers of products."""
 
 import numpy as np
+import products
 import pytest
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
-from lazy import check_raster_function, in_chunks
+from lazy import check_place, check_raster_function, in_chunks
 
 import fifesim
 from fifesim.base.geometry import Geometry
 from fifesim.grids import grid as grids
+from fifesim.sensor.products.labels import layer_chunk_sizes, open_layer, reflectance
+from fifesim.sensor.response.calibration import ProductBand
 
 SUN = Geometry(35.0, 130.0, earth_sun_distance=1.0148)
 GRID = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 240.0, 180.0, 30.0)
@@ -46,12 +49,21 @@ def test_the_sun_is_that_of_the_time_over_the_grid(dn):
 
 
 def test_a_time_zone_counts(dn):
-    one, two = (
-        fifesim.calibrate(dn, "TM", time=time) for time in ("1987-06-06T16:35:00Z", "1987-06-06T11:35:00-05:00")
-    )
-    xr.testing.assert_identical(one, two)
+    one = fifesim.calibrate(dn, "TM", time="1987-06-06T16:35:00Z")
+    xr.testing.assert_identical(fifesim.calibrate(dn, "TM", time="1987-06-06T11:35:00-05:00"), one)
     carried = fifesim.calibrate(dn.assign_coords(time=np.datetime64("1987-06-06T16:35:00", "ns")), "TM")
     np.testing.assert_array_equal(carried["sza"], one["sza"])
+
+
+def test_any_form_of_a_raster_gives_the_same(dn):
+    expected = fifesim.calibrate(dn, "TM", geometry=SUN)
+    south = fifesim.calibrate(dn.isel(y=slice(None, None, -1)), "TM", geometry=SUN)
+    xr.testing.assert_identical(south, expected)
+    one = fifesim.calibrate(dn.isel(band=1), "TM", geometry=SUN)
+    assert one.dims == ("band", "y", "x") and one["band"].values.tolist() == ["TM4"]
+    # A geometry stands before the sun of the time.
+    both = fifesim.calibrate(dn, "TM", geometry=SUN, time="1987-06-06T16:35Z")
+    assert (float(both["sza"]), both["time"].values) == (35.0, np.datetime64("1987-06-06T16:35"))
 
 
 def test_what_the_raster_carries_of_the_sun_is_taken(dn):
@@ -65,10 +77,8 @@ def test_what_the_raster_carries_of_the_sun_is_taken(dn):
 )
 def test_a_calibration_may_be_given(dn, gain, offset):
     image = fifesim.calibrate(dn, "TM", geometry=SUN, gain=gain, offset=offset)
-    expected = (
-        np.where(dn == 0, np.nan, dn) * np.array([0.5, 0.25])[:, None, None] + np.array([1.0, -2.0])[:, None, None]
-    )
-    np.testing.assert_allclose(image.fifesim.to_radiance(), expected, rtol=1e-14)
+    known = np.where(dn == 0, np.nan, dn)
+    np.testing.assert_allclose(image.fifesim.to_radiance(), [0.5 * known[0] + 1, 0.25 * known[1] - 2], rtol=1e-14)
 
 
 def test_numbers_of_a_product_take_its_scale():
@@ -103,9 +113,7 @@ def test_lazy_numbers_are_checked_when_they_compute(dn):
         image.compute()
 
 
-def test_one_band_without_a_dimension(dn):
-    image = fifesim.calibrate(dn.isel(band=1), "TM", geometry=SUN)
-    assert image.dims == ("band", "y", "x") and image["band"].values.tolist() == ["TM4"]
+SATURATED = "saturated must be 'largest', None, or a digital number from 1 to 255, got"
 
 
 @pytest.mark.parametrize(
@@ -121,7 +129,8 @@ def test_one_band_without_a_dimension(dn):
             "gain must be a number, or one for each of 2 bands",
         ),
         ({"geometry": SUN, "gain": {"TM3": 1.0}, "offset": 0.0}, "gain has no number for TM4: it has TM3"),
-    ],
+    ]
+    + [({"geometry": SUN, "saturated": each}, SATURATED) for each in (0, 256, -1, True, "255", "most")],
 )
 def test_what_is_missing_is_asked_for(dn, options, said):
     with pytest.raises(ValueError, match=said):
@@ -136,16 +145,6 @@ def test_each_date_has_its_own_sun(dn):
     for number in range(2):
         xr.testing.assert_equal(image.isel(time=number), fifesim.calibrate(season.isel(time=number), "TM"))
     assert abs(float(image["sza"][0] - image["sza"][1])) > 3
-
-
-def test_rows_from_south_to_north_stay_on_their_ground(dn):
-    image = fifesim.calibrate(dn.isel(y=slice(None, None, -1)), "TM", geometry=SUN)
-    xr.testing.assert_identical(image, fifesim.calibrate(dn, "TM", geometry=SUN))
-
-
-def test_a_geometry_stands_before_the_sun_of_the_time(dn):
-    image = fifesim.calibrate(dn, "TM", geometry=SUN, time="1987-06-06T16:35Z")
-    assert (float(image["sza"]), image["time"].values) == (35.0, np.datetime64("1987-06-06T16:35"))
 
 
 def test_an_image_is_not_calibrated_twice(dn):
@@ -191,7 +190,42 @@ def test_saturation_is_the_largest_number(name, bands, dtype, scale, full):
     assert (image[:, 0, 0] == 0).all() and (image[:, 1:] == full - 1).all()
 
 
-@pytest.mark.parametrize("saturated", [0, 256, -1, True, "255", "most"])
-def test_other_numbers_of_saturation_are_refused(dn, saturated):
-    with pytest.raises(ValueError, match="saturated must be 'largest', None, or a digital number from 1 to 255, got"):
-        fifesim.calibrate(dn, "TM", geometry=SUN, saturated=saturated)
+# ------------------------------------------------------------------------------------------- layers of products
+
+PLACE = {"crs": "EPSG:32609", "corner": (339300.0, 7392900.0), "pixel": 30.0}
+
+
+def written(folder, name="a.tif", shape=(6, 9), dtype=np.uint16, **place):
+    return products.write(folder / name, np.arange(np.prod(shape), dtype=dtype).reshape(shape), **(PLACE | place))
+
+
+@pytest.mark.parametrize("chunks", [None, {"y": 4, "x": 5}, 3])
+def test_a_layer_is_as_it_is_stored(tmp_path, chunks):
+    values = written(tmp_path)
+    layer = open_layer(tmp_path, "a.tif", chunks, "")
+    assert (layer.chunks is None) == (chunks is None) and layer.dtype == np.uint16
+    np.testing.assert_array_equal(layer, values)
+    check_place(layer, "EPSG:32609")
+    # Automatic chunks are whole blocks of the agencies' files.
+    assert layer_chunk_sizes("auto") == {"y": 2048, "x": 2048} and layer_chunk_sizes(chunks) == chunks
+
+
+def test_what_is_no_layer_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"a\.tif is missing in .*: fetch it"):
+        open_layer(tmp_path, "a.tif", None, "fetch it")
+    (tmp_path / "a.tif").write_text("<html>")
+    with pytest.raises(ValueError, match=r"cannot read .*a\.tif as a raster"):
+        open_layer(tmp_path, "a.tif", None, "")
+    written(tmp_path, "b.tif", dtype=np.float32)
+    with pytest.raises(ValueError, match=r"b\.tif has 1 bands of float32, where a product has 1 of whole numbers"):
+        open_layer(tmp_path, "b.tif", None, "")
+
+
+def test_layers_of_different_grids_do_not_stack(tmp_path):
+    written(tmp_path)
+    written(tmp_path, "b.tif", corner=(339315.0, 7392900.0))
+    one, two = (open_layer(tmp_path, name, None, "") for name in ("a.tif", "b.tif"))
+    bands = [ProductBand(name, "a.tif", 1e-3, 0.0, 255, None) for name in ("TM3", "TM4")]
+    assert reflectance([one, one], bands).dims == ("band", "y", "x")
+    with pytest.raises(ValueError, match=r"^b\.tif and a\.tif have different grids, .*bands="):
+        reflectance([one, two], bands)
