@@ -1,11 +1,13 @@
-"""Digital numbers, radiance and planetary reflectance."""
+"""Digital numbers, radiance and planetary reflectance; scales and directions of products."""
 
 import numpy as np
 import pytest
 
+from fifesim.sensor.response import calibration
 from fifesim.sensor.response.calibration import (
     dn_to_radiance,
     gain_offset,
+    product_gain_offset,
     radiance_to_dn,
     radiance_to_reflectance,
     reflectance_to_radiance,
@@ -19,87 +21,65 @@ def test_count_of_tm_is_the_range_over_255():
     gain, offset = gain_offset([204.3, 206.2], [-1.2, -1.5], 8)
     np.testing.assert_allclose(gain, [0.805882, 0.814510], atol=5e-7)
     np.testing.assert_array_equal(offset, [-1.2, -1.5])
+    # Bands broadcast: (50 + 1.2) / 0.805882 = 63.53, (50 + 1.5) / 0.814510 = 63.23.
+    dn = radiance_to_dn(np.full((2, 3, 4), 50.0), gain[:, None, None], offset[:, None, None], 8)
+    assert dn.shape == (2, 3, 4) and dn[:, 0, 0].tolist() == [64, 63]
 
 
-@pytest.mark.parametrize("bits", [4, 8, 10, 12, 16])
-def test_radiance_returns_within_half_a_count(bits):
-    gain, offset = gain_offset(FULL, LOW, bits)
-    radiance = offset + gain * np.linspace(0.5, 2**bits - 0.5, 9973)
-    again = dn_to_radiance(radiance_to_dn(radiance, gain, offset, bits), gain, offset)
-    assert np.max(np.abs(again - radiance) / gain) <= 0.5 + 1e-9
-
-
-@pytest.mark.parametrize(("bits", "dtype"), [(2, np.uint8), (8, np.uint8), (9, np.uint16), (16, np.uint16)])
-def test_every_valid_count_returns_to_itself(bits, dtype):
+@pytest.mark.parametrize(("bits", "dtype"), [(2, np.uint8), (8, np.uint8), (9, np.uint16), (12, "u2"), (16, "u2")])
+def test_counts_return_to_themselves_and_radiance_within_half_a_count(bits, dtype):
     gain, offset = gain_offset(FULL, LOW, bits)
     counts = np.broadcast_to(np.arange(2**bits), (2, 2**bits)).astype(dtype)
     dn = radiance_to_dn(dn_to_radiance(counts, gain, offset), gain, offset, bits)
     assert dn.dtype == dtype
     np.testing.assert_array_equal(dn, counts)
+    radiance = offset + gain * np.linspace(0.5, 2**bits - 0.5, 9973)
+    again = dn_to_radiance(radiance_to_dn(radiance, gain, offset, bits), gain, offset)
+    assert np.max(np.abs(again - radiance) / gain) <= 0.5 + 1e-9
 
 
 @pytest.mark.parametrize("bits", [8, 10, 16])
-def test_out_of_range_is_clipped_and_never_wraps(bits):
+@pytest.mark.parametrize("compression", [0, 1])
+def test_out_of_range_is_clipped_and_missing_is_zero(bits, compression):
     gain, offset = gain_offset(204.3, -1.2, bits)
-    radiance = [-np.inf, -1e9, -1.2, 204.3, 204.3 + 2 * gain, 1e9, np.inf]
     largest = 2**bits - 1
-    expected = [1, 1, 1, largest, largest, largest, largest]
-    assert radiance_to_dn(radiance, gain, offset, bits).tolist() == expected
-
-
-def test_missing_is_zero_and_zero_is_missing():
-    gain, offset = gain_offset(204.3, -1.2, 8)
-    dn = radiance_to_dn([np.nan, 50.0], gain, offset, 8)
-    assert dn[0] == 0
-    assert dn[1] != 0
-    np.testing.assert_array_equal(np.isnan(dn_to_radiance(dn, gain, offset)), [True, False])
+    radiance = [-np.inf, -1e9, -1.2, 204.3, 204.3 + 2 * gain, 1e9, np.inf, np.nan]
+    dn = radiance_to_dn(radiance, gain, offset, bits, compression * largest)
+    assert dn.tolist() == [1, 1, 1, largest, largest, largest, largest, 0]
+    np.testing.assert_array_equal(np.isnan(dn_to_radiance(dn, gain, offset, compression * largest)), dn == 0)
 
 
 def test_halves_go_to_the_even_count():
     assert radiance_to_dn([2.5, 3.5, 4.5], 1.0, 0.0, 8).tolist() == [2, 4, 4]
 
 
-def test_bands_broadcast():
-    gain, offset = gain_offset(FULL[..., None], LOW[..., None], 8)
-    radiance = np.full((2, 3, 4), 50.0)
-    dn = radiance_to_dn(radiance, gain, offset, 8)
-    assert dn.shape == (2, 3, 4)
-    # (50 + 1.2) / 0.805882 = 63.53, (50 + 1.5) / 0.814510 = 63.23
-    assert dn[:, 0, 0].tolist() == [64, 63]
-
-
 def test_planetary_reflectance_of_a_worked_case():
     """pi 50 1.0148^2 / (1536 cos 28.5 degrees) = 161.763 / 1349.86, by hand."""
     mu_s = np.cos(np.radians(28.5))
     np.testing.assert_allclose(radiance_to_reflectance(50.0, 1536.0, mu_s, 1.0148), 0.11984, atol=5e-6)
-
-
-def test_reflectance_and_radiance_are_inverse():
     reflectance = np.random.default_rng(5).random((2, 7, 9))
     irradiance = np.array([1536.0, 1031.0])[:, None, None]
     radiance = reflectance_to_radiance(reflectance, irradiance, 0.88, 1.0148)
     np.testing.assert_allclose(radiance_to_reflectance(radiance, irradiance, 0.88, 1.0148), reflectance, rtol=1e-14)
 
 
-def test_radiance_falls_with_the_square_of_the_distance():
-    near, far = (reflectance_to_radiance(0.3, 1031.0, 0.9, d) for d in (0.983, 1.017))
-    np.testing.assert_allclose(near / far, (1.017 / 0.983) ** 2, rtol=1e-14)
-
-
-def test_mistakes_are_named():
-    with pytest.raises(ValueError, match="above min_radiance"):
-        gain_offset([204.3, -1.5], [-1.2, -1.5], 8)
-    for bits in (1, 17):
-        with pytest.raises(ValueError, match="bits must be in 2 to 16"):
-            gain_offset(204.3, -1.2, bits)
-    with pytest.raises(TypeError, match="bits must be an integer"):
-        radiance_to_dn(50.0, 0.8, -1.2, 8.5)
-    with pytest.raises(ValueError, match="gain must be positive, got 0"):
-        radiance_to_dn(50.0, [0.8, 0.0], -1.2, 8)
-    with pytest.raises(ValueError, match="mu_s must be positive"):
-        reflectance_to_radiance(0.3, 1536.0, -0.1)
-    with pytest.raises(ValueError, match="earth_sun_distance"):
-        radiance_to_reflectance(50.0, 1536.0, 0.9, 0.0)
+@pytest.mark.parametrize(
+    ("call", "error", "said"),
+    [
+        (lambda: gain_offset([204.3, -1.5], [-1.2, -1.5], 8), ValueError, "above min_radiance"),
+        (lambda: gain_offset(204.3, -1.2, 1), ValueError, "bits must be in 2 to 16"),
+        (lambda: gain_offset(204.3, -1.2, 17), ValueError, "bits must be in 2 to 16"),
+        (lambda: radiance_to_dn(50.0, 0.8, -1.2, 8.5), TypeError, "bits must be an integer"),
+        (lambda: radiance_to_dn(50.0, [0.8, 0.0], -1.2, 8), ValueError, "gain must be positive, got 0"),
+        (lambda: reflectance_to_radiance(0.3, 1536.0, -0.1), ValueError, "mu_s must be positive"),
+        (lambda: radiance_to_reflectance(50.0, 1536.0, 0.9, 0.0), ValueError, "earth_sun_distance"),
+        (lambda: product_gain_offset(1e-4, -0.1, 1512.06, 0.0), ValueError, "mu_s must be positive"),
+        (lambda: calibration.filled(np.full((3, 2, 2), np.nan)), ValueError, "no direction of the view: .*'centre'"),
+    ],
+)
+def test_mistakes_are_named(call, error, said):
+    with pytest.raises(error, match=said):
+        call()
 
 
 # ------------------------------------------------------------------------------------------ a scale of square roots
@@ -117,36 +97,79 @@ def test_every_compressed_count_returns_to_itself_and_the_ends_are_the_linear_on
     radiance = dn_to_radiance(counts, gain, offset, 63)
     np.testing.assert_array_equal(radiance_to_dn(radiance, gain, offset, 6, 63), counts)
     np.testing.assert_allclose(radiance[:, -1:], FULL, atol=0.005 * gain.max())
-    assert np.isnan(dn_to_radiance([0], 1.0, 0.0, 63)).all()
 
 
 def test_radiance_of_a_compressed_count_lies_in_the_middle_of_those_it_stands_for():
-    """Edges of count n, found by search: half of their sum is what it decodes to."""
+    """Edges of count n, found by search: half of their sum is what it decodes to, and their distance the step."""
     fine = np.linspace(0.0, 63.0, 2_000_001)
     dn = radiance_to_dn(fine, 1.0, 0.0, 6, 63)
     for count in (2, 10, 31, 62):
         seen = fine[dn == count]
-        np.testing.assert_allclose(dn_to_radiance(count, 1.0, 0.0, 63), (seen[0] + seen[-1]) / 2, atol=1e-4)
-
-
-def test_compression_is_finer_than_the_linear_scale_in_the_dark_and_coarser_in_the_light():
-    radiance = np.linspace(2.0, 63.0, 50_001)
-    off = {c: np.abs(dn_to_radiance(radiance_to_dn(radiance, 1.0, 0.0, 6, c), 1.0, 0.0, c) - radiance) for c in (0, 63)}
-    dark, light = radiance < 63 / 4.5, radiance > 63 / 3.5
-    assert off[63][dark].max() < off[0][dark].max() and off[63][light].max() > off[0][light].max()
+        middle = (seen[0] + seen[-1]) / 2
+        np.testing.assert_allclose(dn_to_radiance(count, 1.0, 0.0, 63), middle, atol=1e-4)
+        step = calibration.digital_step(count**2 / 63, 1.0, 0.0, 63)
+        np.testing.assert_allclose(step, seen[-1] - seen[0], atol=1e-4)
 
 
 def test_scale_is_by_band_and_a_linear_one_keeps_its_bits():
     gain, offset = gain_offset(FULL[..., None], LOW[..., None], 6)
-    radiance = np.random.default_rng(3).uniform(-2, 210, (2, 30, 40))
-    mixed = radiance_to_dn(radiance, gain, offset, 6, np.array([63, 0])[:, None, None])
-    linear = radiance_to_dn(radiance, gain, offset, 6)
+    radiance, scale = np.random.default_rng(3).uniform(-2, 210, (2, 30, 40)), np.array([63, 0])[:, None, None]
+    mixed, linear = radiance_to_dn(radiance, gain, offset, 6, scale), radiance_to_dn(radiance, gain, offset, 6)
     np.testing.assert_array_equal(mixed[1], linear[1])
     np.testing.assert_array_equal(mixed[0], radiance_to_dn(radiance, gain, offset, 6, 63)[0])
-    assert (mixed[0] > linear[0]).mean() > 0.9
-    decoded = dn_to_radiance(mixed, gain, offset, np.array([63, 0])[:, None, None])
+    decoded = dn_to_radiance(mixed, gain, offset, scale)
     np.testing.assert_array_equal(decoded[1], dn_to_radiance(linear, gain, offset)[1])
 
 
-def test_what_is_beyond_a_compressed_range_is_clipped():
-    assert radiance_to_dn([-np.inf, -5.0, 0.0, 1e9, np.inf, np.nan], 1.0, 0.0, 6, 63).tolist() == [1, 1, 1, 63, 63, 0]
+# ------------------------------------------------------------------------------------------ products
+
+
+def test_both_scales_of_a_landsat_8_scene_agree():
+    """
+    RADIANCE_MULT and RADIANCE_ADD of LC08_L1TP_047027_20201204_20210313_02_T1, bands 4 and 5, to the digits given.
+
+    The solar irradiances follow from its largest and smallest radiances and reflectances.
+    """
+    spans = np.array([622.76880 + 51.42845, 381.10345 + 31.47165])
+    sun = np.pi * 0.9854607**2 * spans / (1.210700 + 0.099980)
+    gain, offset = product_gain_offset(2e-5, -0.1, sun, 1.0, 0.9854607)
+    assert (np.abs(gain - [1.0288e-2, 6.2956e-3]) <= [5e-7, 5e-8]).all()
+    # Half of the sixth digit of the reflectances, over their span.
+    np.testing.assert_allclose(offset, [-51.43874, -31.47794], rtol=1e-6)
+    low = product_gain_offset(2e-5, -0.1, sun, 0.25, 0.9854607)
+    np.testing.assert_allclose(low, np.array([gain, offset]) / 4, rtol=1e-15)
+
+
+def test_reflectance_is_a_line_over_the_cosine_of_the_sun():
+    """By hand: (2.1735e-3 * 57 - 0.004609) / 0.35 of Landsat 5's band 3. A sun that is down leaves NaN."""
+    mu_s = np.array([0.35, np.nan, 0.0, -0.1])
+    found = calibration.product_reflectance(np.uint8(57), 2.1735e-3, -0.004609, 255, mu_s=mu_s)
+    np.testing.assert_allclose(found, [0.340801428, np.nan, np.nan, np.nan], atol=1e-7)
+    assert found.dtype == np.float32
+    # No data, the largest number, and a flag of this band are NaN.
+    dn, flags = np.array([0, 1, 254, 255, 57, 57], np.uint8), np.array([0, 0, 0, 0, 4, 8], np.uint16)
+    kept = np.isfinite(calibration.product_reflectance(dn, 1e-3, 0.0, 255, np.uint16(4), flags))
+    assert kept.tolist() == [False, True, True, False, False, True]
+
+
+def test_directions_come_back_from_their_vectors_and_have_means():
+    zenith, azimuth = np.meshgrid([0.5, 30.0, 75.0], [0.0, 95.0, 200.0, 359.0])
+    found = calibration.direction_angles(3.0 * calibration.direction_vectors(zenith, azimuth))
+    np.testing.assert_allclose(found, [zenith, azimuth], rtol=0, atol=1e-10)
+    zenith, azimuth = np.array([[10.0, np.nan], [10.0, np.nan]]), np.array([[350.0, 0.0], [30.0, 0.0]])
+    vectors = calibration.mean_direction(zenith, azimuth)
+    assert np.isnan(vectors[:, 1]).all() and calibration.direction_angles(vectors[:, 0])[1] == pytest.approx(10.0)
+    degrees = calibration.hundredths(np.array([-7500, 10500, 0], np.int16), np.array([False, False, True]), turns=True)
+    np.testing.assert_array_equal(degrees, [285.0, 105.0, np.nan])
+    assert calibration.hundredths(np.int16(-10), False) == -0.1
+
+
+def test_grids_of_directions_are_filled_and_interpolated():
+    """Zenith angles of one azimuth, small enough that a vector's interpolation is the angle's."""
+    vectors = calibration.direction_vectors(np.array([[5.0, np.nan, np.nan, 9.0]]), np.full((1, 4), 100.0))
+    np.testing.assert_allclose(calibration.direction_angles(calibration.filled(vectors))[0], [[5.0, 5.0, 9.0, 9.0]])
+    nodes = calibration.direction_vectors(np.array([[1.0, 2.0, 4.0], [3.0, 4.0, 6.0]]), np.full((2, 3), 40.0))
+    zenith, azimuth = calibration.between_nodes(nodes, [0.0, 0.25, 1.0, 5.0], [0.5, 1.0, 2.0])
+    expected = [[1.5, 2.0, 4.0], [2.0, 2.5, 4.5], [3.5, 4.0, 6.0], [3.5, 4.0, 6.0]]
+    np.testing.assert_allclose(zenith, expected, rtol=0, atol=2e-3)
+    np.testing.assert_allclose(azimuth, 40.0)

@@ -1,4 +1,4 @@
-"""Weights of samples in bands, beside quadrature, by hand and beside another library."""
+"""Weights of samples in bands, and the best linear estimate of bands, beside quadrature and least squares."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from fifesim.base.bands import Band, solar_spectrum
 from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.response.spectral import band_weights, covered_steps
+from fifesim.sensor.response.spectral import GREY, GREY_SHARE, band_weights, best_linear, covered_steps, line_between
 
 TRIANGLE = Band("triangle", (0.5, 0.6, 0.7), (0.0, 1.0, 0.0))
 BANDS = [band.response for name in ("OLI", "MSI", "TM") for band in instrument(name).bands]
@@ -42,12 +42,6 @@ def test_mean_is_the_integral_of_the_straight_spectrum(spectrum, sun):
         assert found.weights @ values == pytest.approx(by_quadrature(band, wavelength, values, sun), rel=1e-9)
 
 
-def test_flat_spectrum_stays_flat(spectrum):
-    wavelength, _ = spectrum
-    sums = [band_weights(band, wavelength, covered_steps(wavelength)).weights.sum() for band in BANDS]
-    np.testing.assert_allclose(sums, 1, rtol=0, atol=1e-12)
-
-
 def test_mean_is_near_that_of_the_band_itself():
     """`Band.mean` is the trapezoidal rule at 1 nm: it differs from the integral by its error alone."""
     wavelength, values, _ = leaf_spectrum(Leaf())
@@ -64,6 +58,14 @@ def test_the_sun_draws_a_mean_to_where_it_is_strong():
     with_sun, without = (band_weights(TRIANGLE, wavelength, [True, True], sun=sun).weights @ rising for sun in (1, 0))
     assert without == pytest.approx(0.5, abs=1e-12)
     assert 0.48 < with_sun < 0.4999
+
+
+def test_flat_spectrum_stays_flat_and_a_band_elsewhere_has_no_weights(spectrum):
+    wavelength, _ = spectrum
+    sums = [band_weights(band, wavelength, covered_steps(wavelength)).weights.sum() for band in BANDS]
+    np.testing.assert_allclose(sums, 1, rtol=0, atol=1e-12)
+    found = band_weights(TRIANGLE, [0.8, 0.9], [True])
+    assert (found.coverage, found.weights.tolist()) == (0.0, [0.0, 0.0])
 
 
 def test_half_a_band_is_half_covered():
@@ -84,11 +86,6 @@ def test_a_gap_has_no_weight_and_is_named():
     values = np.where(wavelength < 0.6, 0.1, 0.5)
     left, right = 0.5 * 0.08 * 0.8, 0.5 * 0.07 * 0.7
     assert found.weights @ values == pytest.approx((0.1 * left + 0.5 * right) / (left + right), abs=1e-12)
-
-
-def test_a_band_elsewhere_has_no_weights():
-    found = band_weights(TRIANGLE, [0.8, 0.9], [True])
-    assert (found.coverage, found.weights.tolist()) == (0.0, [0.0, 0.0])
 
 
 @pytest.mark.parametrize(
@@ -116,3 +113,60 @@ def test_means_agree_with_spectral_python():
         gauss = np.exp(-4 * np.log(2) * ((nodes - center) / width) ** 2)
         ours = band_weights(Band("gauss", nodes, gauss), wavelength, covered_steps(wavelength), sun=False)
         assert ours.weights @ values == pytest.approx(theirs, rel=1e-4)
+
+
+# ------------------------------------------------------------------------------------------ other bands
+
+
+@pytest.fixture
+def library():
+    """Spectra of 500 leaves, 8 of each, in 6 bands."""
+    return np.random.Generator(np.random.Philox(2)).uniform(0.05, 0.5, (500, 8, 6))
+
+
+def test_estimate_is_least_squares_with_noisy_bands(library):
+    """With as many noisy copies of the library as one likes, ordinary least squares finds the same weights."""
+    truth = library @ np.array([0.5, 0.2, 0.0, 0.3, 0.0, -0.1])
+    noise = 0.05 * np.random.Generator(np.random.Philox(3)).standard_normal(library.shape)
+    found = best_linear(library, truth[..., None], 0.05)
+    noisy = (library + noise).reshape(-1, 6)
+    by_squares, *_ = np.linalg.lstsq(noisy, truth.ravel(), rcond=None)
+    np.testing.assert_allclose(found.weights[0], by_squares, atol=0.02)
+    left = np.sqrt(np.mean((truth.ravel() - noisy @ found.weights[0]) ** 2))
+    assert found.error[0] == pytest.approx(left, rel=0.03)
+
+
+def test_error_is_that_of_fits_without_each_leaf():
+    """Few leaves of few library, so that each has much influence, fitted again without each of them."""
+    random = np.random.Generator(np.random.Philox(5))
+    source, target = random.uniform(0.05, 0.5, (7, 3, 2)), random.uniform(0.05, 0.5, (7, 3, 2))
+    uncertainty, grey = 0.02, np.sqrt(21 * GREY_SHARE) * GREY
+    found = best_linear(source, target, uncertainty)
+
+    def fitted(leaves):
+        # Rows of least squares: library, the grey surfaces, and the uncertainty of each band.
+        left = np.vstack([source[leaves].reshape(-1, 2), [[grey] * 2], np.sqrt(21) * uncertainty * np.eye(2)])
+        right = np.vstack([target[leaves].reshape(-1, 2), [[grey] * 2], np.zeros((2, 2))])
+        return np.linalg.lstsq(left, right, rcond=None)[0].T
+
+    leaves = np.arange(7)
+    np.testing.assert_allclose(found.weights, fitted(leaves), rtol=1e-10)
+    errors = [target[leaf] - source[leaf] @ fitted(leaves[leaves != leaf]).T for leaf in leaves]
+    expected = np.mean(np.square(errors), axis=(0, 1)) + uncertainty**2 * np.sum(found.weights**2, axis=1)
+    np.testing.assert_allclose(found.error**2, expected, rtol=1e-10)
+
+
+def test_a_band_that_is_there_is_itself(library):
+    found = best_linear(library, library, 1e-6)
+    np.testing.assert_allclose(found.weights, np.eye(6), atol=1e-6)
+    assert np.all(found.error < 1e-5)
+
+
+def test_line_is_that_of_a_fit():
+    random = np.random.Generator(np.random.Philox(6))
+    source = random.uniform(0, 0.5, 300)
+    target = 0.9 * source + 0.01 + 0.02 * random.standard_normal(300)
+    found = line_between(source, target)
+    np.testing.assert_allclose((found.slope, found.offset), np.polyfit(source, target, 1), rtol=1e-10)
+    assert found.error == pytest.approx(np.std(target - np.polyval([found.slope, found.offset], source)), rel=1e-12)
+    assert found.difference == pytest.approx(np.sqrt(np.mean((target - source) ** 2)), rel=1e-12)

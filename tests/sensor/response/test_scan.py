@@ -1,0 +1,437 @@
+"""Scan geometry, sweeps of several lines, and turned footprints, beside published sizes, rays and dense sums."""
+
+import numpy as np
+import pytest
+
+from fifesim.base.footprints import axis_operator
+from fifesim.base.line_spread import Boxcar
+from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.response.scan import (
+    EARTH_RADIUS,
+    Footprints,
+    ScanPattern,
+    Track,
+    apply_operator,
+    footprint_operator,
+    ground_of_detector,
+    growth,
+    place_beside,
+    place_of,
+    swath_width,
+    view_components,
+    view_from_ground,
+    view_from_scan,
+)
+from fifesim.sensor.response.spatial import AggregatedSpread, CosineSpread, GaussianSpread
+
+# ------------------------------------------------------------------------------------------ track
+
+
+TRACK = Track(39.0, -97.0, 193.0)
+
+
+@pytest.mark.parametrize(
+    ("scan_angle", "vza", "along", "across"),
+    [(0.0, 0.0, 1.17, 1.17), (20.0, 22.8, 1.25, 1.36), (40.0, 46.6, 1.60, 2.33), (55.4, 68.6, 2.47, 6.74)],
+)
+def test_avhrr_pixels_grow_as_they_are_known_to(scan_angle, vza, along, across):
+    """1.4 mrad from 833 km, to the last digit [km]."""
+    assert float(view_from_scan(scan_angle, 833e3)[0]) == pytest.approx(vza, abs=0.05)
+    assert [0.0014 * 833 * float(each) for each in growth(scan_angle, 833e3)] == pytest.approx(
+        [along, across], abs=0.006
+    )
+
+
+def unit(latitude, longitude):
+    phi, lam = np.radians(latitude), np.radians(longitude)
+    return np.array([np.cos(phi) * np.cos(lam), np.cos(phi) * np.sin(lam), np.sin(phi)])
+
+
+@pytest.mark.parametrize("place", [(39.2, -96.5), (38.0, -99.5), (41.0, -88.0), (30.0, -97.3)])
+@pytest.mark.parametrize("altitude", [705e3, 833e3])
+def test_directions_agree_with_vectors_in_space(place, altitude):
+    """The satellite abeam is the place on its orbit nearest to the point: found by search along the track."""
+    steps = np.linspace(-2.5e6, 2.5e6, 500_001)
+    below = np.stack(unit(*place_of(TRACK, steps, 0.0)), axis=-1)
+    point = unit(*place)
+    satellite = (EARTH_RADIUS + altitude) * below[np.argmax(below @ point)]
+    sight = satellite - EARTH_RADIUS * point
+    distance = np.linalg.norm(sight)
+    vza = np.degrees(np.arccos(sight @ point / distance))
+    nadir = -satellite / np.linalg.norm(satellite)
+    scan_angle = np.degrees(np.arccos(-sight @ nadir / distance))
+    east = np.cross([0, 0, 1.0], point)
+    east /= np.linalg.norm(east)
+    components = [sight @ east / distance, sight @ np.cross(point, east) / distance]
+    # The search stands within 5 m of the nearest place.
+    np.testing.assert_allclose(view_components(TRACK, *place, altitude), components, rtol=0, atol=1e-5)
+    _, aside = place_beside(TRACK, *place)
+    found_vza, found_scan = view_from_ground(abs(aside), altitude)
+    assert float(found_vza) == pytest.approx(vza, abs=1e-4)
+    assert float(found_scan) == pytest.approx(scan_angle, abs=1e-4)
+    along, across = growth(found_scan, altitude)
+    assert float(along) == pytest.approx(distance / altitude, rel=1e-5)
+    assert float(across) == pytest.approx(distance / altitude / np.cos(np.radians(vza)), rel=1e-5)
+
+
+def test_growth_is_how_the_ground_turns_with_the_scan():
+    """Across the track: the derivative of the way over the ground by the scan angle, over the altitude."""
+    theta, step = np.array([0.0, 10.0, 30.0, 55.0]), 1e-3
+    ground = np.radians(view_from_scan(theta + step, 833e3)[1] - view_from_scan(theta - step, 833e3)[1])
+    expected = EARTH_RADIUS * ground / np.radians(2 * step) / 833e3
+    np.testing.assert_allclose(growth(theta, 833e3)[1], expected, rtol=1e-6)
+
+
+def test_left_and_right_of_a_meridian_are_mirrored():
+    track = Track(0.0, 0.0, 0.0)
+    east, north = view_components(track, np.array([10.0, 10.0]), np.array([-4.0, 4.0]), 705e3)
+    assert east[0] == pytest.approx(-east[1], rel=1e-12) and east[0] > 0
+    assert north[0] == pytest.approx(north[1], rel=1e-12)
+    distance, aside = place_beside(track, 10.0, np.array([-4.0, 4.0]))
+    assert aside[1] > 0 and aside[0] == pytest.approx(-aside[1]) and distance[0] == pytest.approx(distance[1])
+
+
+def test_places_come_back():
+    distance, aside = np.array([-3e5, 0.0, 4e5]), np.array([-8.0, 0.0, 5.0])
+    back = place_beside(TRACK, *place_of(TRACK, distance, aside))
+    np.testing.assert_allclose(back[0], distance, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(back[1], aside, rtol=0, atol=1e-12)
+
+
+def test_what_lies_beyond_the_horizon_is_missing():
+    assert np.isnan(view_from_scan(70.0, 833e3)[0])
+    assert np.isnan(view_from_ground(30.0, 833e3)).all()
+
+
+def test_a_polar_orbit_over_a_turning_earth_drifts_westward():
+    """Equator: ground velocity is that in space, less 465 m/s eastward at the speed of the subsatellite point."""
+    altitude, inclination = 705e3, 98.2
+    speed = EARTH_RADIUS * np.sqrt(3.986004418e14 / (EARTH_RADIUS + altitude) ** 3)
+    east = speed * np.cos(np.radians(inclination)) - 2 * np.pi * EARTH_RADIUS / 86164.1
+    north = speed * np.sin(np.radians(inclination))
+    track = Track.from_inclination(0.0, 10.0, inclination, altitude, ascending=True)
+    assert track.heading == pytest.approx(np.degrees(np.arctan2(east, north)) % 360, abs=1e-3)
+    down = Track.from_inclination(0.0, 10.0, inclination, altitude)
+    assert (down.heading + track.heading) % 360 == pytest.approx(180.0)
+
+
+def test_tracks_that_cannot_be_are_refused():
+    with pytest.raises(ValueError, match="latitude"):
+        Track(90.0, 0.0, 0.0)
+    with pytest.raises(ValueError, match="finite"):
+        Track(0.0, np.nan, 0.0)
+    with pytest.raises(ValueError, match="does not reach latitude 85"):
+        Track.from_inclination(85.0, 0.0, 98.2, 705e3)
+
+
+@pytest.mark.parametrize("angle", [0.5, 7.5, 30.0, 55.4])
+def test_swath_is_an_arc_whose_chord_closes_the_triangle(angle):
+    """Law of sines in the triangle of satellite, ground and earth's centre."""
+    half = swath_width(833e3, angle) / 2 / EARTH_RADIUS
+    vza = np.radians(angle) + half
+    assert (EARTH_RADIUS + 833e3) * np.sin(np.radians(angle)) == pytest.approx(EARTH_RADIUS * np.sin(vza), rel=1e-12)
+    assert half > 0
+
+
+def test_scan_beyond_the_horizon_has_no_width():
+    horizon = np.degrees(np.arcsin(EARTH_RADIUS / (EARTH_RADIUS + 705e3)))
+    assert np.isnan(swath_width(705e3, horizon + 0.01)) and np.isfinite(swath_width(705e3, horizon - 0.01))
+
+
+# ------------------------------------------------------------------------------------------ sweeps
+
+
+def pattern_of(name, band):
+    item = instrument(name)
+    (found,) = item.select([band])
+    return item.scan_pattern(found), item.altitude
+
+
+def pixel_size(name, band, scan_angle):
+    """Along and across the track, between the edges of the sample and between two lines in the middle. [m]"""
+    pattern, altitude = pattern_of(name, band)
+    sample = np.floor(pattern.position(scan_angle))
+    edges = pattern.scan_angle(np.array([sample, sample + 1]))
+    across = np.diff(np.radians(view_from_scan(edges, altitude)[1])) * EARTH_RADIUS
+    lines = pattern.track_angle()[pattern.lines // 2 - 1 :][:2]
+    ahead, aside = ground_of_detector(lines, edges.mean(), altitude)
+    return float(np.diff(ahead)[0] * np.cos(np.radians(aside[0]))), float(across[0])
+
+
+def modis_by_ichoku_and_kaufman(scan_angle, size=1000.0):
+    """Size of a pixel along and across the track, IEEE TGRS 43 (2005), doi:10.1109/TGRS.2005.857328. [m]"""
+    radius, orbit, step = 6378.137e3, 6378.137e3 + 705e3, size / 705e3
+    theta, ratio = np.radians(scan_angle), 6378.137 / (6378.137 + 705)
+    root = np.sqrt(ratio**2 - np.sin(theta) ** 2)
+    return step * orbit * (np.cos(theta) - root), step * radius * (np.cos(theta) / root - 1)
+
+
+@pytest.mark.parametrize(("band", "size"), [("MODIS1", 250.0), ("MODIS3", 500.0)])
+@pytest.mark.parametrize("scan_angle", [0.01, 30.0, -30.0, 54.9])
+def test_pixels_of_modis_are_as_published(band, size, scan_angle):
+    np.testing.assert_allclose(
+        pixel_size("MODIS", band, scan_angle), modis_by_ichoku_and_kaufman(scan_angle, size), rtol=0.01
+    )
+
+
+def test_a_pixel_of_modis_at_the_edge_is_two_by_nearly_five_kilometres():
+    """NASA: 2.01 x 4.83 km; ten lines of 1 km are 20 km high there."""
+    along, across = pixel_size("MODIS", "MODIS1", 54.99)
+    assert (4 * along, 4 * across) == pytest.approx((2010, 4830), rel=0.01)
+    pattern, altitude = pattern_of("MODIS", "MODIS1")
+    edges = ground_of_detector(np.degrees(20 * pattern.track_interval) * np.array([-1, 1]), 55.0, altitude)
+    assert float(np.diff(edges[0])[0] * np.cos(np.radians(edges[1][0]))) == pytest.approx(20.06e3, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("band", "scan_angle", "published"),
+    [("I1", 0.01, (371, 388)), ("I1", 56.06, (800, 789)), ("M5", 0.01, (742, 776)), ("M5", -56.06, (1600, 1580))],
+)
+def test_pixels_of_viirs_are_as_published(band, scan_angle, published):
+    """Horizontal sampling intervals in Table 2.2-1 of the VIIRS geolocation ATBD (2014)."""
+    np.testing.assert_allclose(pixel_size("VIIRS", band, scan_angle), published, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("scan_angle", "area"),
+    [(0.01, 0.1384), (30.0, 0.2341), (31.5, 0.2483), (31.8, 0.1676), (44.6, 0.3443), (44.9, 0.1759), (55.0, 0.5230)],
+)
+def test_areas_of_viirs_follow_its_zones(scan_angle, area):
+    """
+    Areas of I pixels by W. Schroeder (NOAA), in km2, within 3 % of a side.
+
+    A fit of degree 5 in NASA's fire emission code is evaluated at the samples that have these angles by design, with
+    0.1552 mrad between two elementary samples.
+    """
+    along, across = pixel_size("VIIRS", "I1", scan_angle)
+    assert np.sqrt(along * across * 1e-6) == pytest.approx(np.sqrt(area), rel=0.03)
+
+
+def test_a_sweep_of_viirs_grows_as_published():
+    """ATBD: from 11.87 km at nadir to 25.60 km at 56.063 degrees."""
+    pattern, altitude = pattern_of("VIIRS", "M5")
+    half = np.degrees(8 * pattern.track_interval)
+    for scan_angle, height in ((0.0, 11.87e3), (56.063, 25.60e3)):
+        ahead, aside = ground_of_detector(half, scan_angle, altitude)
+        assert 2 * float(ahead * np.cos(np.radians(aside))) == pytest.approx(height, rel=0.01)
+
+
+def test_places_of_detectors_agree_with_rays_in_space():
+    """The point where a ray from the orbit meets the sphere, by bisection, in the frame of a turned track."""
+    track, altitude, distance = Track(39.0, -97.0, 193.0), 824e3, 4e5
+    point, along, right = track.axes()
+    turn = distance / EARTH_RADIUS
+    up, forward = np.cos(turn) * point + np.sin(turn) * along, np.cos(turn) * along - np.sin(turn) * point
+    for beta, theta in ((0.4, 0.0), (0.4, 30.0), (-0.4, 56.0), (3.0, -50.0)):
+        b, t = np.radians([beta, theta])
+        ray = np.cos(b) * (np.sin(t) * right - np.cos(t) * up) + np.sin(b) * forward
+        start = (EARTH_RADIUS + altitude) * up
+        low, high = 0.0, -start @ ray
+        for _ in range(60):
+            middle = (low + high) / 2
+            outside = np.linalg.norm(start + middle * ray) > EARTH_RADIUS
+            low, high = (middle, high) if outside else (low, middle)
+        x, y, z = (start + low * ray) / EARTH_RADIUS
+        ahead, aside = ground_of_detector(beta, theta, altitude)
+        found = place_of(track, distance + ahead, aside)
+        expected = np.degrees(np.arcsin(z)), np.degrees(np.arctan2(y, x))
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+def test_a_line_of_sight_beside_the_earth_has_no_place():
+    assert np.isnan(ground_of_detector(0.1, 70.0, 833e3)).all()
+
+
+@pytest.mark.parametrize("band", ["I1", "M5"])
+def test_samples_and_angles_of_zones_are_inverse(band):
+    """Zones of the SDR User's Guide 1.2: 31.72, 44.86 and 56.28 degrees; samples of OCSSW's viirs_pxcvt.c."""
+    pattern, _ = pattern_of("VIIRS", band)
+    half = {"I1": (1184, 1920, 3200), "M5": (592, 960, 1600)}[band]
+    np.testing.assert_allclose(pattern.scan_angle(np.array(half)), (31.72, 44.86, 56.28), rtol=0, atol=0.015)
+    position = np.array([-half[2], -half[0] - 7.5, -0.5, 0.0, 0.5, half[0] + 7.5, half[1] + 3.5])
+    np.testing.assert_allclose(pattern.position(pattern.scan_angle(position)), position, rtol=1e-14, atol=0)
+    assert float(pattern.position(60.0)) == half[2]
+    found = pattern.zone_of(
+        np.array([-half[1] - 1, -half[1], -half[0] - 1, -half[0], 0, half[0] - 1, half[0], half[1]])
+    )
+    assert found.tolist() == [2, 1, 1, 0, 0, 0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("band", "lines", "samples", "zones"),
+    [
+        ("I1", 32, 6400, [((0, 1, 30, 31), 2016, 4384), ((2, 3, 28, 29), 1280, 5120)]),
+        ("M5", 16, 3200, [((0, 15), 1008, 2192), ((1, 14), 640, 2560)]),
+    ],
+)
+def test_lines_deleted_on_board_are_those_of_granules(band, lines, samples, zones):
+    """Rows of a scan and the columns that are left in them, as granules have them (CoastWatch, VIIRSBowtieFilter)."""
+    expected = np.zeros((lines, samples), bool)
+    for rows, first, last in zones:
+        expected[list(rows), :first] = expected[list(rows), last:] = True
+    pattern, _ = pattern_of("VIIRS", band)
+    line, sample = np.arange(-3 * lines, -2 * lines)[:, None], np.arange(samples) - samples // 2
+    np.testing.assert_array_equal(pattern.is_deleted(line, sample), expected)
+
+
+@pytest.mark.parametrize("band", ["I1", "M5"])
+def test_deleted_lines_leave_no_gap_between_sweeps(band):
+    """
+    The last line left of a sweep reaches the first line left of the next, at every sample.
+
+    User's Guide: sweeps overlap by more than 1 and 2 M pixels at either end where 1 and 2 lines are deleted.
+    """
+    item = instrument("VIIRS")
+    pattern, altitude = pattern_of("VIIRS", band)
+    sample = np.arange(0, sum(zone.samples for zone in pattern.zones), 5)
+    ahead, _ = ground_of_detector(pattern.track_angle()[:, None], pattern.scan_angle(sample + 0.5), altitude)
+    spacing = np.diff(ahead, axis=0)[pattern.lines // 2]
+    advance = pattern.lines * item.ground_intervals(item.select([band])[0]).along
+    overlap = (ahead[-1] - ahead[0] + spacing - advance) / spacing / 2
+    deleted = pattern.is_deleted(np.arange(pattern.lines)[:, None], sample).sum(axis=0) / 2
+    assert set(deleted) == {0, pattern.lines // 16, pattern.lines // 8}
+    assert np.all(overlap >= deleted - 1e-6)
+    assert np.all(overlap[deleted == deleted.max()] > 1.2 * deleted.max())
+
+
+def test_a_pushbroom_and_a_single_detector_sweep_one_line():
+    for name in ("OLI", "MSI", "AVHRR"):
+        item = instrument(name)
+        pattern = item.scan_pattern(item.bands[0])
+        assert pattern.lines == 1 and pattern.track_angle() == [0.0] and not pattern.zones
+    assert not ScanPattern(1e-3, 1e-3).is_deleted(np.arange(3)[:, None], np.arange(2)).any()
+
+
+def test_sums_of_samples_add_their_variances():
+    """The variance of a sum is the variance of one sample plus the variance of the places, (n^2 - 1) d^2 / 12."""
+    x = np.linspace(-1500, 1500, 60_001)
+    for count in (1, 2, 3):
+        spread = AggregatedSpread(GaussianSpread(150.0), count, 128.0)
+        density = np.gradient(spread.cumulative(x), x)
+        variance = np.trapezoid(density * x**2, x)
+        assert variance == pytest.approx(GaussianSpread(150.0).sigma ** 2 + (count**2 - 1) * 128.0**2 / 12, rel=1e-5)
+        transfer = np.trapezoid(density * np.cos(2 * np.pi * 0.002 * x), x)
+        assert float(spread.mtf(0.002)) == pytest.approx(transfer, abs=1e-5)
+        ends = spread.cumulative(spread.half_width * np.array([-1, 1]))
+        assert ends.tolist() == pytest.approx([0.0, 1.0], abs=1e-15)
+    with pytest.raises(ValueError, match="count must be at least 1, got 0"):
+        AggregatedSpread(Boxcar(10.0), 0, 10.0)
+
+
+@pytest.mark.parametrize(("name", "sample"), [("I1", 0.35), ("M5", 0.25)])
+def test_blur_of_viirs_is_that_of_one_sample_before_aggregation(name, sample):
+    """Half a cycle per sum of n samples: the sample passes m^(1 / n^2), the sum 1 / (n sin(pi / 2 n))."""
+    item = instrument("VIIRS")
+    (band,) = item.select(name)
+    step = item.ground_intervals(band).across / 3
+    for count in (1, 2, 3):
+        expected = sample ** (1 / count**2) / (count * np.sin(np.pi / (2 * count)))
+        found = float(item.line_spreads(band, count).across.mtf(0.5 / (count * step)))
+        assert found == pytest.approx(expected, rel=1e-6)
+    spread = item.line_spreads(band)
+    assert float(spread.along.mtf(0.5 / item.ground_intervals(band).along)) == pytest.approx(0.42, rel=1e-9)
+
+
+# ------------------------------------------------------------------------------------------ turned footprints
+
+
+N = 60
+CELL = 10 / 3
+
+
+def turned(angle, cell=CELL, growth=(1.0, 1.0)):
+    """Steps of a row and a column in a frame that is turned by an angle and grown."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    return cell * np.array([[c, s], [-s, c]]) / np.array(growth)[:, None]
+
+
+def weights(angle, along, across, row=30.3, column=28.7, growth=(1.0, 1.0), cell=CELL):
+    pixel = Footprints(np.array([row]), np.array([column]), turned(angle, cell, growth)[None], along, across)
+    operator = footprint_operator(pixel, slice(0, N), slice(0, N))
+    return operator.toarray().reshape(N, N)
+
+
+@pytest.mark.parametrize("quarter", [0, 90, 180])
+def test_a_footprint_along_the_grid_is_separable(quarter):
+    """Exactly so, but for the steps of the tables, 1/4096 of the support."""
+    along, across = CosineSpread(30.32), GaussianSpread(24.0)
+    order = (along, across) if quarter % 180 == 0 else (across, along)
+    rows, columns = (
+        axis_operator(
+            spread, cell_origin=0.0, cell_size=CELL, n_cells=N, pixel_origin=center * CELL - 15, pixel_size=30.0,
+            n_pixels=1,
+        )
+        for spread, center in zip(order, (30.3, 28.7), strict=True)
+    )  # fmt: skip
+    lines = np.zeros((2, N))
+    for line, axis in zip(lines, (rows, columns), strict=True):
+        line[axis.start[0] : axis.start[0] + axis.count[0]] = axis.weights[0, : axis.count[0]]
+    expected = np.outer(*lines)
+    found = weights(quarter, along, across)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("angle", [13.6, 45.0, -72.0])
+@pytest.mark.parametrize(
+    ("along", "across", "growth"),
+    [(Boxcar(30.0), CosineSpread(30.32), (1.0, 1.0)), (CosineSpread(30.32), GaussianSpread(20.0), (1.25, 1.36))],
+)
+def test_a_turned_footprint_agrees_with_dense_sums(angle, along, across, growth):
+    """Each cell cut in 24 x 24 points, and densities from differences of the cumulative response."""
+    fine = 24
+    places = (np.arange(N * fine) + 0.5) / fine
+    down, right = np.meshgrid(places - 30.3, places - 28.7, indexing="ij")
+    frame = turned(angle, growth=growth)
+    step = 0.01
+    dense = np.ones_like(down)
+    for spread, (by_row, by_column) in zip((along, across), frame, strict=True):
+        x = by_row * down + by_column * right
+        dense *= spread.cumulative(x + step / 2) - spread.cumulative(x - step / 2)
+    expected = dense.reshape(N, fine, N, fine).sum(axis=(1, 3)) / dense.sum()
+    found = weights(angle, along, across, growth=growth)
+    # Pieces that the jump of a response cuts are upright instead of turned.
+    np.testing.assert_allclose(found, expected, rtol=0, atol=0.04 * expected.max())
+    assert np.abs(found - expected).sum() < 0.015
+
+
+@pytest.mark.parametrize("angle", [0.0, 30.0, 77.0])
+def test_moments_are_those_of_the_turned_response(angle):
+    """Centre of the pixel; covariance of the Gaussians, turned and grown, plus a twelfth of a cell."""
+    growth = (1.25, 1.6)
+    found = weights(angle, GaussianSpread(12.0), GaussianSpread(18.0), growth=growth, cell=CELL)
+    place = np.arange(N) + 0.5
+    down, right = np.meshgrid(place - 30.3, place - 28.7, indexing="ij")
+    assert float((found * down).sum()) == pytest.approx(0, abs=1e-6)
+    assert float((found * right).sum()) == pytest.approx(0, abs=1e-6)
+    back = np.linalg.inv(turned(angle, growth=growth))
+    sigma = np.array([12.0, 18.0]) / np.sqrt(8 * np.log(2))
+    expected = back @ np.diag(sigma**2) @ back.T + np.eye(2) / 12
+    covariance = np.array([[np.sum(found * a * b) for b in (down, right)] for a in (down, right)])
+    np.testing.assert_allclose(covariance, expected, rtol=0, atol=2e-3 * expected.max())
+
+
+def test_means_are_over_valid_cells():
+    pixels = Footprints(
+        np.array([30.3, 2.0]), np.array([28.7, 28.7]), np.stack([turned(14.0)] * 2), CosineSpread(30.32), Boxcar(30.0)
+    )
+    operator = footprint_operator(pixels, slice(0, N), slice(0, N))
+    share = operator.sum(axis=1)
+    assert share[0] == pytest.approx(1.0, rel=1e-12) and 0.5 < share[1] < 0.98
+    constant = np.full((2, N * N), 0.3)
+    constant[1, 30 * N + 28] = np.nan
+    means = apply_operator(operator, constant, 0.9)
+    assert means[:, 0] == pytest.approx(0.3, rel=1e-14)
+    assert np.isnan(means[:, 1]).all()
+    assert np.isfinite(apply_operator(operator, constant, 0.5)).all()
+    scene = np.random.default_rng(1).random((1, N * N))
+    weight = operator.toarray()[0]
+    assert apply_operator(operator, scene, 0.9)[0, 0] == pytest.approx(weight @ scene[0], rel=1e-12)
+
+
+def test_the_window_holds_the_footprint():
+    pixels = Footprints(np.array([30.3]), np.array([28.7]), turned(33.0)[None], CosineSpread(30.32), Boxcar(30.0))
+    rows, columns = pixels.window((N, N))
+    whole = footprint_operator(pixels, slice(0, N), slice(0, N)).toarray().reshape(N, N)
+    part = footprint_operator(pixels, rows, columns).toarray().reshape(rows.stop - rows.start, -1)
+    np.testing.assert_array_equal(part, whole[rows, columns])
+    assert part.sum() == pytest.approx(1.0, rel=1e-12)
