@@ -1,4 +1,4 @@
-"""Any cube in: hyperspectral images and field spectra as the bands of an instrument."""
+"""Hyperspectral images and field spectra as the bands of an instrument, and the unit of their wavelengths."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ from lazy import check_raster_function
 import fifesim
 from fifesim.grids import grid as grids
 from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
+from fifesim.sensor.band_labels import spectral_axis
 from fifesim.sensor.response.spectral import band_weights, covered_steps
 
 
@@ -34,32 +35,24 @@ def test_cube_becomes_bands_lazily(cube):
     assert image["band"].values.tolist() == [band.name for band in fifesim.instrument("OLI").bands]
     assert image.attrs["instrument"] == "OLI" and float(image["sza"]) == 30
     assert image.attrs["history"] == "to_bands: OLI, 106 wavelengths weighted by response and sun"
+    toa = cube.assign_attrs(standard_name="toa_bidirectional_reflectance")
+    assert toa.fifesim.to_bands("OLI").name == "toa_reflectance"
+    seen = (
+        image.sel(band=["OLI4", "OLI5"]).fifesim.to_toa().fifesim.sense(fifesim.instrument("OLI", response="detector"))
+    )
+    assert seen.dtype == np.uint16 and np.isfinite(seen.fifesim.ndvi()).all()
 
 
 def test_bands_are_weighted_sums_of_samples(leaf):
     image = leaf.fifesim.to_bands("TM", bands=["TM4", "TM2"])
+    back = leaf.isel(wavelength=slice(None, None, -1)).fifesim.to_bands("TM", bands=["TM4", "TM2"])
+    np.testing.assert_allclose(back, image, rtol=1e-13)
     wavelength = leaf["wavelength"].values
     for name in ("TM4", "TM2"):
         (band,) = fifesim.instrument("TM").select(name)
         weights = band_weights(band.response, wavelength, covered_steps(wavelength)).weights
         np.testing.assert_allclose(image.sel(band=name), leaf.values @ weights, rtol=1e-9)
     assert image.dims == ("sample", "band") and image["band"].values.tolist() == ["TM4", "TM2"]
-
-
-@pytest.mark.parametrize("name", ["OLI", "MSI", "MODIS", "AVHRR"])
-def test_flat_spectrum_stays_flat(leaf, name):
-    np.testing.assert_allclose(xr.full_like(leaf, 0.3).fifesim.to_bands(name), 0.3, rtol=0, atol=1e-12)
-
-
-def test_order_of_the_samples_does_not_matter(leaf):
-    back = leaf.isel(wavelength=slice(None, None, -1))
-    np.testing.assert_allclose(back.fifesim.to_bands("OLI"), leaf.fifesim.to_bands("OLI"), rtol=1e-13)
-
-
-def test_bands_go_on_to_an_image(cube):
-    toa = cube.fifesim.to_bands("OLI", bands=["OLI4", "OLI5"]).fifesim.to_toa()
-    image = toa.fifesim.sense(fifesim.instrument("OLI", response="detector"))
-    assert image.dtype == np.uint16 and np.isfinite(image.fifesim.ndvi()).all()
 
 
 def test_missing_sample_is_missing_in_its_bands_and_cell_alone(cube):
@@ -84,11 +77,6 @@ def test_radiance_is_weighted_by_the_response_alone():
     assert float(reflectance.fifesim.to_bands("OLI", bands=["OLI4"])[0]) < float(found[0]) / 100 - 1e-5
 
 
-def test_reflectance_at_the_top_stays_what_it_is(cube):
-    toa = cube.assign_attrs(standard_name="toa_bidirectional_reflectance")
-    assert toa.fifesim.to_bands("OLI").name == "toa_reflectance"
-
-
 def without(leaf, low, high):
     return leaf.isel(wavelength=(leaf["wavelength"].values < low) | (leaf["wavelength"].values > high))
 
@@ -99,7 +87,7 @@ def without(leaf, low, high):
         (
             lambda leaf: without(leaf, 1.58, 1.61),
             {},
-            r"OLI6 [\d.]+%, without 1\.579 to 1\.611 um: pick others with bands=",
+            r"OLI6 [\d.]+%, without 1\.579 to 1\.611 um: pick others with band",
         ),
         (lambda leaf: without(leaf, 2.2, 9.0), {}, r"to 2\.199 um, and cover less than 0\.99 of OLI7 \d"),
         (lambda leaf: without(leaf, 1.0, 9.0), {}, r"hold nothing of OLI6, OLI7, OLI9 of OLI: pick bands, .*'OLI8'\]"),
@@ -115,13 +103,10 @@ def test_what_cannot_be_bands_is_refused(leaf, change, options, said):
     assert len(str(error.value)) <= 500
 
 
-def test_a_gap_may_be_accepted(leaf):
-    """What is missing then has no weight, and the rest keeps the mean of a flat spectrum."""
-    gap = without(xr.full_like(leaf, 0.3), 1.58, 1.61)
-    assert float(gap.fifesim.to_bands("OLI", bands="OLI6", min_coverage=0.5)[0, 0]) == pytest.approx(0.3, abs=1e-12)
-
-
 def test_widths_decide_what_a_gap_is(leaf):
+    """What is missing in a gap that is accepted has no weight, and the rest keeps the mean of a flat spectrum."""
+    flat = without(xr.full_like(leaf, 0.3), 1.58, 1.61).fifesim.to_bands("OLI", bands="OLI6", min_coverage=0.5)
+    np.testing.assert_allclose(flat, 0.3, rtol=0, atol=1e-12)
     sparse = leaf.isel(wavelength=slice(None, None, 20))
     assert sparse.fifesim.to_bands("OLI", bands="OLI6").notnull().all()
     narrow = sparse.assign_coords(fwhm=("wavelength", np.full(sparse.sizes["wavelength"], 0.005)))
@@ -137,3 +122,45 @@ def test_packed_cubes_are_unpacked_and_looked_at(leaf):
     np.testing.assert_allclose(found, known, rtol=1e-12)
     with pytest.raises(ValueError, match="it is a fraction"):
         (unpacked * 100).fifesim.to_bands("OLI", bands="OLI4")
+
+
+# ------------------------------------------------------------------------------------------ wavelengths
+
+
+def spectra(wavelength, units=None, dim="band", **coords):
+    attrs = {} if units is None else {"units": units}
+    found = xr.DataArray(np.zeros((2, len(wavelength))), dims=("sample", dim))
+    return found.assign_coords(wavelength=(dim, wavelength, attrs), **coords)
+
+
+def test_wavelengths_and_widths_have_a_unit_or_are_micrometres():
+    for units in ("nm", "Nanometers", "nanometre"):
+        np.testing.assert_allclose(spectral_axis(spectra([500.0, 600.0], units)).wavelength, [0.5, 0.6], rtol=1e-15)
+    for units in (None, "um", "µm", "micrometers"):
+        axis = spectral_axis(spectra([0.5, 0.6], units, dim="wavelength"))
+        assert (axis.dim, axis.wavelength.tolist(), axis.fwhm) == ("wavelength", [0.5, 0.6], None)
+    cube = spectra([500.0, 600.0], "nm", fwhm=("band", [5.0, 6.0]))
+    np.testing.assert_allclose(spectral_axis(cube).fwhm, [0.005, 0.006])
+    cube["fwhm"].attrs["units"] = "nm"
+    np.testing.assert_allclose(spectral_axis(cube).fwhm, [0.005, 0.006])
+    cube = spectra([0.5, 0.6], fwhm=("band", [5.0, 6.0], {"units": "nm"}))
+    np.testing.assert_allclose(spectral_axis(cube).fwhm, [0.005, 0.006])
+
+
+@pytest.mark.parametrize(
+    ("cube", "said"),
+    [
+        (spectra([400.0, 2500.0]), "reaches 2500 without a unit.*'nm'"),
+        (spectra([400.0, 2500.0], "um"), "reaches 2500 um"),
+        (spectra([0.4, 2.5], "nm"), "reaches only 2.5 nm"),
+        (spectra([400.0, 2500.0], "cm-1"), "'cm-1', it must be in 'um' or 'nm'"),
+        (spectra([0.5, np.nan]), "positive throughout, got nan"),
+        (spectra([0.5, 0.5]), "each once, got 2, of which 1 differ"),
+        (spectra([0.5]), "two different wavelengths"),
+        (spectra([0.5, 0.6]).drop_vars("wavelength"), "need a coordinate 'wavelength'"),
+        (spectra([0.5, 0.6], fwhm=("band", [0.01, -0.01])), "fwhm must be positive"),
+    ],
+)
+def test_wavelengths_that_are_not_known_are_refused(cube, said):
+    with pytest.raises(ValueError, match=said):
+        spectral_axis(cube)

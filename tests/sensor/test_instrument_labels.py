@@ -1,0 +1,208 @@
+"""Instruments that rasters carry, their bands by name and wavelength, and their spread and noise as rasters."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fifesim
+from fifesim.sensor.description.instruments import instrument, instrument_names
+from fifesim.sensor.description.spatial_response import BoxcarResponse, CosineResponse, TwoAxesResponse
+from fifesim.sensor.instrument_labels import (
+    attributes_of,
+    carried_instrument,
+    check_wavelengths,
+    given_instrument,
+    matching_bands,
+    noise_equivalent_radiance,
+    snr,
+)
+
+TM = instrument("TM")
+PAPER = instrument("TM", "paper")
+
+
+def raster(**attrs):
+    return xr.DataArray(0.1, name="mine", attrs=attrs)
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_an_instrument_of_ones_own_comes_back_whole(name):
+    own = replace(instrument(name), name="MINE")
+    again = carried_instrument(raster(**attributes_of(own)))
+    assert [band.response for band in again.bands] == [band.response for band in own.bands]
+    assert [again.line_spreads(band) for band in again.bands] == [own.line_spreads(band) for band in own.bands]
+    srf = own.bands[0].srf
+    one, other = (replace(each, bands=tuple(replace(band, srf=srf) for band in each.bands)) for each in (again, own))
+    assert one == other
+
+
+def test_one_of_fifesims_is_a_name():
+    assert attributes_of(TM) == {"instrument": "TM"}
+    assert carried_instrument(raster(instrument="TM")) is TM
+    assert carried_instrument(raster(instrument="landsat 5")) is TM, "an alias"
+    assert carried_instrument(raster()) is None
+    assert carried_instrument(raster(**attributes_of(replace(TM, bits=10)))).bits == 10, "another of the same name"
+
+
+def test_given_wins_over_carried(lai):
+    assert given_instrument("MSI", raster(instrument="TM")).name == "MSI"
+    assert given_instrument(None, raster(instrument="OLI")).name == "OLI"
+    assert given_instrument(None, lai).name == "TM"
+    with pytest.raises(ValueError, match="the instrument of mine is unknown: give instrument=, one of AVHRR"):
+        given_instrument(None, raster())
+    with pytest.raises(ValueError, match="for an instrument 'MINE', which fifesim does not have: give instrument="):
+        carried_instrument(raster(instrument="MINE"))
+    with pytest.raises(ValueError, match="instrument_description is no instrument"):
+        carried_instrument(raster(instrument="MINE", instrument_description='{"name": "MINE"}'))
+
+
+# ------------------------------------------------------------------------------------------ bands
+
+
+def named(bands=None, wavelengths=None, **attrs):
+    count = len(bands or wavelengths)
+    found = xr.DataArray(np.zeros((count, 1, 1)), dims=("band", "y", "x"), attrs=attrs)
+    found = found.assign_coords(band=bands) if bands else found
+    return found.assign_coords(wavelength=("band", wavelengths)) if wavelengths else found
+
+
+def matched(array, name):
+    return [band.name for band in matching_bands(array, instrument(name))]
+
+
+@pytest.mark.parametrize(
+    ("name", "bands", "wavelengths", "said"),
+    [
+        ("TM", ["TM3", "TM4"], [0.83, 0.66], r"band TM3 has the wavelength 0.83 um, and TM3 of TM is at 0.661 um"),
+        ("TM", ["TM4"], [0.66], "band TM4 has the wavelength 0.66 um"),
+        # The catalogue has other instruments with bands of these names, at the same wavelengths.
+        ("L4TM", ["TM3", "TM4"], [0.83, 0.66], "band TM3 has the wavelength 0.83 um, and TM3 of L4TM"),
+        ("MSI", ["MSI8", "MSI8A"], [0.865, 0.833], "band MSI8A has the wavelength 0.833 um"),
+        ("MSS", ["MSS5", "MSS4"], [0.55, 0.65], "band MSS5 has the wavelength 0.55 um"),
+        ("OLI", ["OLI4", "OLI8"], [0.592, 0.655], "band OLI4 has the wavelength 0.592 um"),
+    ],
+)
+def test_names_that_contradict_wavelengths_are_refused(name, bands, wavelengths, said):
+    with pytest.raises(ValueError, match=f"{said}.*contradict each other.*drop_vars"):
+        matched(named(bands, wavelengths), name)
+    assert matched(named(bands), name) == bands
+
+
+def test_the_wavelengths_of_every_sentinel_hold_for_the_others():
+    """Centres differ by up to 17 nm from satellite to satellite."""
+    for one in ("MSI", "MSI-B", "MSI-C"):
+        names = [band.name for band in instrument(one).bands]
+        array = named(names, [band.wavelength for band in instrument(one).bands])
+        assert all(matched(array, other) == names for other in ("MSI", "MSI-B", "MSI-C"))
+
+
+def test_names_that_two_instruments_share_hold_where_the_wavelength_is_the_bands():
+    """MSS4 is green on Landsat-1, near infrared on Landsat-5; MSI4 is red on each Sentinel-2."""
+    first = named(["MSS4", "MSS5"], [0.55, 0.65])
+    assert (matched(first, "MSS"), matched(first, "MSS5")) == (["MSS4", "MSS5"], ["MSS1", "MSS2"])
+    for wavelength, names in ((0.553, ("MSS4", "MSS1")), (0.93, ("MSS7", "MSS4"))):
+        seen = named(["MSS4"], [wavelength])
+        assert tuple(matched(seen, name)[0] for name in ("MSS", "MSS5")) == names
+    assert matched(named(["MSS4", "MSS5"], [np.nan, np.nan]), "MSS") == ["MSS4", "MSS5"]
+    assert matched(named(["MSI4", "MSI8"], [0.665, 0.842]), "MSI-B") == ["MSI4", "MSI8"]
+    # Bands TM3 and TM4 that the raster's own instrument has elsewhere are matched by wavelength.
+    own = replace(TM, name="mine", bands=tuple(replace(TM.bands[k], name=n) for k, n in ((3, "TM3"), (2, "TM4"))))
+    assert matched(named(["TM3", "TM4"], [0.84, 0.66], **attributes_of(own)), "TM") == ["TM4", "TM3"]
+
+
+def test_only_names_of_an_instrument_are_checked():
+    wavelengths = [0.83, 0.66]
+    for array in (
+        named(None, wavelengths),
+        named(["a", "b"], wavelengths),
+        named(["MSS4", "MSS5"], [0.55, 0.65]),
+        named(["TM3", "TM4"]),
+    ):
+        check_wavelengths(array)
+    with pytest.raises(ValueError, match=r"band TM3 has the wavelength 0.83 um, and TM3 of TM is at"):
+        check_wavelengths(named(["TM3", "TM4"], wavelengths, instrument="TM"))
+    with pytest.raises(ValueError, match="contradict each other"):
+        check_wavelengths(named(["TM3", "TM4"], wavelengths, instrument="unknown"))
+
+
+def test_a_wavelength_finds_the_narrow_band_beside_a_panchromatic_one():
+    """The panchromatic bands, 0.52 to 0.90 and 0.50 to 0.68 um, respond there too, and at some of them more."""
+    known = {"ETM+": {"TM2": "ETM2", "TM3": "ETM3", "TM4": "ETM4"}, "OLI": {"TM2": "OLI3", "TM3": "OLI4"}}
+    for name, expected in known.items():
+        wavelengths = [band.wavelength for band in TM.select(list(expected))]
+        assert matched(named(None, wavelengths), name) == list(expected.values())
+
+
+# ------------------------------------------------------------------------------------------ spread and transfer
+
+
+def test_psf_holds_the_whole_response():
+    spread = fifesim.psf(PAPER, "TM4")
+    step = float(spread["x"][1] - spread["x"][0])
+    assert float(spread.sum()) * step**2 == pytest.approx(1.0, rel=1e-12)
+    np.testing.assert_allclose(spread, spread.T, rtol=1e-12)
+    # The paper's cosine: half at the ends, both of its axes at the centre.
+    peak = (2 * np.pi / (3 * PAPER.line_spread.width) / np.sqrt(3)) ** 2
+    assert float(spread.sel(x=0, y=0)) == pytest.approx(peak, rel=1e-3)
+    assert spread["x"].attrs["units"] == "m" and spread.attrs["units"] == "m-2" and spread["band"] == "TM4"
+    with pytest.raises(ValueError, match="spacing"):
+        fifesim.psf("TM", spacing=0)
+
+
+def test_axes_stand_where_they_belong():
+    along, across = BoxcarResponse("boxcar", width=90 / 705e3), CosineResponse("cosine", step=4.778e-6, count=9)
+    mixed = replace(PAPER, lsf=TwoAxesResponse(along, across))
+    spread = fifesim.psf(mixed, spacing=1.0)
+    assert (spread.sum("x") > 1e-9).sum() == 91 and (spread.sum("y") > 1e-9).sum() == 31
+    transfer = fifesim.mtf(mixed, "TM3", frequency=[0.0, 1 / 90])[0]
+    np.testing.assert_allclose(transfer.sel(direction="along"), [1.0, 0.0], rtol=0, atol=1e-12)
+    assert transfer.sel(direction="across")[1] > 0.8
+
+
+def test_mtf_reaches_to_the_frequency_of_the_samples_of_each_band():
+    transfer = fifesim.mtf("TM", "TM3")
+    assert transfer.dims == ("band", "direction", "frequency")
+    assert float(transfer["frequency"][-1]) == pytest.approx(1 / 30.315)
+    assert float(transfer["nyquist"].sel(band="TM3", direction="along")) == pytest.approx(0.5 / 30.315)
+    np.testing.assert_allclose(transfer.sel(frequency=0), 1.0, rtol=1e-12)
+    transfer = fifesim.mtf("MSI")
+    assert transfer["band"].values.tolist() == [band.name for band in instrument("MSI").bands]
+    assert float(transfer["nyquist"].sel(band="MSI1", direction="across")) == pytest.approx(0.5 / 60, rel=1e-3)
+    assert float(transfer["product_nyquist"].sel(band="MSI11")) == 0.5 / 20
+    np.testing.assert_allclose(transfer["at_nyquist"].sel(band="MSI4"), [0.24, 0.31], rtol=0, atol=0.01)
+    # A detector passes sinc(1/2) at half a sample per width; sampled more closely than it is wide, less.
+    modis = fifesim.mtf(fifesim.instrument("MODIS", response="detector"), ["MODIS1"]).sel(direction="along")
+    width = instrument("MODIS").ground_fields(instrument("MODIS").bands[0]).along
+    np.testing.assert_allclose(modis["at_product_nyquist"], np.sinc(width * modis["product_nyquist"]), rtol=1e-12)
+    assert fifesim.mtf("SuperDove", "PS6")["at_nyquist"].values == pytest.approx(2 / np.pi, rel=1e-6)
+    with pytest.raises(ValueError, match="TM9"):
+        fifesim.mtf("TM", "TM9")
+
+
+# ------------------------------------------------------------------------------------------ noise
+
+
+def test_ratio_is_that_of_the_specification_and_follows_the_share_of_shot_noise():
+    """MSI4: 223 at 108 W m-2 sr-1 um-1. What is left of the variance at none of the light is not shot noise."""
+    (band,) = instrument("MSI").select("MSI4")
+    assert float(snr("MSI", "msi4", 108.0)) == pytest.approx(223.0, rel=1e-12)
+    full = (108.0 / 223.0) ** 2
+    found = noise_equivalent_radiance("MSI", "MSI4", np.array([108.0, 54.0, 0.0])) ** 2
+    np.testing.assert_allclose(found, full * (1 - band.noise.shot * np.array([0.0, 0.5, 1.0])), rtol=1e-12)
+    np.testing.assert_allclose(snr("MSI", "MSI4", 54.0), 54.0 / np.sqrt(found[1]), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("band", "radiance", "error", "said"),
+    [
+        ("TM3", 50.0, ValueError, "TM has no noise for TM3"),
+        ("TM3", [50.0, -1.0], ValueError, "radiance must not be negative, got -1 W"),
+        (["TM3", "TM4"], 50.0, TypeError, "band must be a name, got a list of 2"),
+    ],
+)
+def test_noise_that_is_not_known_is_refused(band, radiance, error, said):
+    silent = replace(TM, bands=tuple(replace(each, noise=None) for each in TM.bands))
+    with pytest.raises(error, match=said):
+        fifesim.snr(TM if radiance != 50.0 else silent, band, radiance)

@@ -1,0 +1,489 @@
+"""The sensor on labelled rasters: images, their calibration, digital numbers of products, and noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import products
+import pytest
+import xarray as xr
+from lazy import ODD_CHUNKS, check_place, check_raster_function, in_chunks, no_compute
+
+import fifesim
+from fifesim.base.footprints import axis_operator, regularize
+from fifesim.base.geometry import Geometry
+from fifesim.grids import cf, directions
+from fifesim.grids import grid as grids
+from fifesim.sensor.description.instrument_file import Noise
+from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.spatial_response import GaussianResponse
+from fifesim.sensor.labels import check_scaling, noisy, scale
+from fifesim.sensor.response import calibration
+from fifesim.sensor.response.noise import NoiseModel, add_noise
+
+TM, PAPER = instrument("TM"), instrument("TM", "paper")
+RED_NIR = TM.select(["TM3", "TM4"])
+SUN = Geometry(40.0, 120.0, earth_sun_distance=1.0148)
+
+
+def scene(grid, bands=("TM3", "TM4"), sun=SUN, seed=2, **coords):
+    """Reflectance at the top of the atmosphere, different in each cell."""
+    values = np.random.default_rng(seed).uniform(0.02, 0.5, (len(bands), *grid.shape))
+    return directions.with_geometry(products.labelled(values, grid, list(bands), coords), sun)
+
+
+@pytest.fixture
+def toa(site):
+    return scene(site)
+
+
+def radiance_by_kernels(toa, pixels):
+    """Footprints, then radiance, called directly."""
+    cells = grids.geobox(toa)
+    rows, columns = (
+        axis_operator(
+            TM.line_spread, cell_origin=origin, cell_size=cell, n_cells=n, pixel_origin=start, pixel_size=size,
+            n_pixels=count,
+        )
+        for origin, cell, n, start, size, count in (
+            (cells.affine.f, cells.affine.e, cells.shape.y, pixels.affine.f, pixels.affine.e, pixels.shape.y),
+            (cells.affine.c, cells.affine.a, cells.shape.x, pixels.affine.c, pixels.affine.a, pixels.shape.x),
+        )
+    )  # fmt: skip
+    sun = np.array([band.solar_irradiance for band in RED_NIR])[:, None, None]
+    means = regularize(toa.values, rows, columns)
+    return calibration.reflectance_to_radiance(means, sun, SUN.mu_s, SUN.earth_sun_distance)
+
+
+ONTO = {
+    "aligned": None,
+    "offset": fifesim.grid_at("EPSG:26914", 705581.3, 4333911.9, 110.0, 95.0, 30.0),
+    "own-interval": fifesim.grid_at("EPSG:26914", 705571.0, 4333919.0, 150.0, 130.0, 30.315),
+    "beyond-the-scene": fifesim.grid_at("EPSG:26914", 705520.0, 4333960.0, 300.0, 300.0, 30.0),
+}
+
+
+@pytest.mark.parametrize("onto", ONTO.values(), ids=ONTO.keys())
+def test_sense_keeps_its_word_and_equals_the_kernels(toa, site, onto):
+    image = check_raster_function(lambda toa: fifesim.sense(toa, "TM", onto=onto), toa, quantity="dn")
+    pixels = grids.aligned_grid(site, 30.0) if onto is None else onto
+    assert grids.same_grid(grids.geobox(image), pixels)
+    full, low = ([getattr(band, f"{name}_radiance") for band in RED_NIR] for name in ("full_scale", "min"))
+    gain, offset = (each[:, None, None] for each in calibration.gain_offset(full, low, 8))
+    radiance = radiance_by_kernels(toa, pixels)
+    np.testing.assert_array_equal(image, calibration.radiance_to_dn(radiance, gain, offset, bits=8))
+    assert image.dtype == np.uint8 and (image > 0).any()
+    # Half a count, and the rounding of a division.
+    inside = (image.values > 1) & (image.values < 255)
+    assert (np.abs(fifesim.to_radiance(image).values - radiance) <= 0.5 * gain * (1 + 1e-9))[inside].all()
+
+
+def test_image_carries_its_calibration(toa):
+    image = fifesim.sense(toa, "TM")
+    for name in ("gain", "offset", "wavelength", "solar_irradiance"):
+        assert image[name].dims == ("band",) and cf.attributes(name).items() <= image[name].attrs.items()
+    assert image["solar_irradiance"].values.tolist() == [band.solar_irradiance for band in RED_NIR]
+    assert image.attrs["instrument"] == "TM" and directions.geometry_of(image) == SUN
+    assert image.attrs["_FillValue"] == 0 and image.attrs["_FillValue"].dtype == image.dtype
+
+
+def test_pixels_over_a_hole_are_no_data(toa):
+    toa[0, 20:26, 20:26] = np.nan
+    image = fifesim.sense(toa, PAPER)
+    assert (image.sel(band="TM3") == 0).sum() == 1 and (image.sel(band="TM4") > 0).all()
+    assert (fifesim.sense(toa, PAPER, min_valid=0.3) > 0).all()
+
+
+def test_radiance_and_reflectance_keep_their_word(toa):
+    image = fifesim.sense(toa.where(toa["x"] > 705640), "TM")
+    radiance = check_raster_function(fifesim.to_radiance, image, quantity="toa_radiance")
+    reflectance = check_raster_function(fifesim.to_reflectance, image, quantity="toa_reflectance")
+    gain, offset, sun = (image[name].values[:, None, None] for name in ("gain", "offset", "solar_irradiance"))
+    expected = calibration.dn_to_radiance(image.values, gain, offset)
+    np.testing.assert_array_equal(radiance, expected)
+    known = calibration.radiance_to_reflectance(expected, sun, SUN.mu_s, SUN.earth_sun_distance)
+    np.testing.assert_array_equal(reflectance, known)
+    assert (image == 0).any()
+    np.testing.assert_array_equal(np.isnan(radiance), image == 0)
+    np.testing.assert_array_equal(fifesim.to_reflectance(radiance), reflectance)
+
+
+def test_radiance_is_sensed_as_it_is(toa):
+    """A raster in radiance gives the image that its reflectance gives, but for rounding at the halves."""
+    sun = np.array([band.solar_irradiance for band in RED_NIR])[:, None, None]
+    radiance = toa.copy(data=calibration.reflectance_to_radiance(toa.values, sun, SUN.mu_s, SUN.earth_sun_distance))
+    radiance.attrs = {"units": "W m-2 sr-1 um-1"}
+    difference = fifesim.sense(radiance, "TM").astype(int) - fifesim.sense(toa, "TM").astype(int)
+    assert (difference == 0).mean() > 0.99 and np.abs(difference).max() <= 1
+
+
+def test_bands_are_found_by_name_or_wavelength(site, toa):
+    named = fifesim.sense(scene(site, ("tm4", "TM3")), "TM")
+    assert named["band"].values.tolist() == ["TM4", "TM3"]
+    image = fifesim.sense(scene(site, (1, 2), wavelength=("band", [0.66, 0.83])), "TM")
+    assert image["band"].values.tolist() == ["TM3", "TM4"]
+    np.testing.assert_array_equal(image, fifesim.sense(toa, "TM"))
+    one = fifesim.sense(toa.sel(band="TM3"), "TM")
+    assert one.dims == ("band", "y", "x")
+    np.testing.assert_array_equal(one, image.sel(band=["TM3"]))
+
+
+@pytest.mark.parametrize(
+    "change, options, message",
+    [
+        (lambda toa: toa.assign_attrs(units="K"), {}, "units 'K', toa_reflectance needs '1' or 'W m-2 sr-1 um-1'"),
+        (lambda toa: toa.assign_coords(band=["TM3", "TM9"]), {}, "TM9.*TM"),
+        (lambda toa: toa.drop_vars("band"), {}, "neither names of TM.*nor a wavelength"),
+        (lambda toa: toa.assign_coords(band=[1, 2], wavelength=("band", [0.66, 1.2])), {}, r"responds at 1\.2 um"),
+        (lambda toa: toa, {"instrument": "MT"}, "MT"),
+        (lambda toa: toa, {"instrument": PAPER, "min_valid": 98}, "min_valid must be in"),
+        (lambda toa: toa, {"onto": fifesim.grid_at("EPSG:32614", 0, 0, 60, 60, 30)}, "CRS of the scene"),
+        (lambda toa: toa, {"scaling": "level1"}, "scaling must be 'detector' or 'product', got 'level1'"),
+        (lambda toa: toa, {"scaling": "product"}, "TM has no product scaled to reflectance, unlike OLI"),
+        (lambda toa: toa, {"scaling": "product", "quantise": False}, "is one of digital numbers"),
+    ],
+)
+def test_what_cannot_be_sensed_is_refused(toa, change, options, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.sense(change(toa), **({"instrument": "TM"} | options))
+    with pytest.raises(TypeError, match="GeoBox"):
+        fifesim.sense(toa, "TM", onto=30)
+
+
+def test_image_without_calibration_is_refused(toa):
+    image = fifesim.sense(toa, "TM")
+    with pytest.raises(ValueError, match=r"no gain: open it with fifesim\.open_image"):
+        fifesim.to_radiance(image.drop_vars("gain"))
+    with pytest.raises(ValueError, match="no sza or no solar_irradiance"):
+        fifesim.to_reflectance(image.drop_vars("sza"))
+    with pytest.raises(ValueError, match="toa_radiance needs"):
+        fifesim.to_reflectance(toa.assign_attrs(units="1"))
+    with pytest.raises(ValueError, match="units 'm', dn needs '1'"):
+        fifesim.to_radiance(image.assign_attrs(units="m"))
+
+
+def test_geometry_given_wins(toa):
+    low = Geometry(60.0, 120.0)
+    image = fifesim.sense(toa, "TM", geometry=low)
+    assert directions.geometry_of(image) == low
+    assert image.astype(int).sum() < fifesim.sense(toa, "TM").astype(int).sum()
+
+
+def test_a_part_of_a_lazy_image_has_the_same_bits(toa):
+    with no_compute():
+        image = fifesim.sense(in_chunks(toa, ODD_CHUNKS), "TM")
+        check_place(image, grids.geobox(toa).crs)
+    xr.testing.assert_identical(image[:, :3].compute(), fifesim.sense(toa, "TM")[:, :3])
+
+
+@pytest.mark.slow
+def test_blur_decides_what_a_line_on_ndvi_explains():
+    """Sentinel-2 with the detector alone, with a quarter at the Nyquist frequency, and as it was measured."""
+    grid = fifesim.fife_site(10 / 9, window=((0, 1800), (0, 1800)))
+    msi = instrument("MSI")
+    quarter = GaussianResponse(kind="gaussian", mtf_at_nyquist=0.25)
+    soft = replace(msi, lsf=quarter, bands=tuple(replace(band, lsf=None) for band in msi.bands))
+    known = {0.05: (0.964, 0.650, 0.66), 0.15: (0.980, 0.722, 0.73), 0.24: (0.980, 0.860, 0.87)}
+    for arp, expected in known.items():
+        lai = fifesim.lai_scene(grid, arp=arp, seed=1)
+        toa = lai.fifesim.surface_reflectance("MSI", bands=["MSI4", "MSI8"]).fifesim.to_toa()
+        images = (toa.fifesim.sense(each) for each in (instrument("MSI", "detector"), soft, msi))
+        found = [fifesim.regress(lai.fifesim.aggregate(10), image.fifesim.ndvi()).r2 for image in images]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=0.02)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:26915", "+proj=tmerc +lon_0=-96.3 +x_0=500000 +datum=NAD83 +units=m"])
+def test_pixels_in_another_crs_are_one_line(toa, crs):
+    box = toa.odc.geobox.boundingbox
+    said = r"onto must be in the CRS of the scene, EPSG:26914, got .*: make it there"
+    with pytest.raises(ValueError, match=said) as error:
+        fifesim.sense(toa, "TM", onto=fifesim.grid_at(crs, box.left, box.top, 90, 90, 30))
+    assert "\n" not in str(error.value) and len(str(error.value)) < 300
+
+
+# ------------------------------------------------------------------------------------------ several resolutions
+
+
+@pytest.fixture
+def mixed(site):
+    return scene(site, ("MSI11", "MSI4", "MSI8"))
+
+
+def test_each_band_lies_on_its_own_grid(mixed):
+    noise = {"noise": "thermal", "seed": 3, "noise_models": NoiseModel(thermal=2.0, shot=0.01)}
+    tree = fifesim.sense(mixed, "MSI", **noise)
+    assert [node.path for node in tree.leaves] == ["/10m", "/20m"]
+    for path, names in (("10m", ["MSI4", "MSI8"]), ("20m", ["MSI11"])):
+        xr.testing.assert_identical(tree[path]["dn"], fifesim.sense(mixed.sel(band=names), "MSI", **noise))
+        assert grids.cell_size(grids.geobox(tree[path]["dn"]))[0] == float(path.removesuffix("m"))
+    with no_compute():
+        lazy = fifesim.sense(in_chunks(mixed, ODD_CHUNKS), "MSI", **noise)
+    xr.testing.assert_identical(lazy.compute(), tree)
+    native = fifesim.sense(mixed, "MSI", interval="native", quantise=False)
+    assert all(set(node.data_vars) == {"toa_radiance"} for node in native.leaves) and len(native.leaves) == 2
+
+
+def test_one_resolution_and_one_grid_for_all_stay_arrays(mixed, site):
+    assert isinstance(fifesim.sense(mixed.sel(band=["MSI4", "MSI8"]), "MSI"), xr.DataArray)
+    for where in ({"interval": 20.0}, {"onto": grids.aligned_grid(site, 30.0)}):
+        assert fifesim.sense(mixed, "MSI", **where)["band"].values.tolist() == ["MSI11", "MSI4", "MSI8"]
+
+
+def test_a_file_is_one_node(mixed, tmp_path):
+    tree = fifesim.sense(mixed, "MSI")
+    with pytest.raises(TypeError, match=r"got an xarray.DataTree of 10m, 20m: take one of its arrays, such as"):
+        fifesim.to_geotiff(tree, tmp_path / "image.tif")
+    path = fifesim.to_geotiff(tree["10m/dn"], tmp_path / "image_10m.tif")
+    np.testing.assert_array_equal(fifesim.open_image(path), tree["10m/dn"])
+
+
+# ------------------------------------------------------------------------------------------ digital numbers
+
+LOW_SUN = Geometry(50.0, 120.0, 7.0, 280.0, earth_sun_distance=1.0148)
+UTM = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 240.0, 180.0, 10.0)
+
+
+def bright(name):
+    """Reflectance with a gap in red and near infrared of an instrument."""
+    near_infrared = 0.835 if "MSI" in name else 0.86
+    found = scene(UTM, (1, 2), LOW_SUN, seed=5, wavelength=("band", [0.66, near_infrared])) * 1.8
+    found[:, 4, 5] = np.nan
+    return found.drop_vars("band")
+
+
+@pytest.mark.parametrize(
+    ("name", "gain", "mu_s"),
+    [("OLI", 2e-5, LOW_SUN.mu_s), ("OLI2", 2e-5, LOW_SUN.mu_s), ("MSI", 1e-4, 1.0), ("MSI-B", 1e-4, 1.0)],
+)
+def test_product_numbers_are_those_of_the_agency(name, gain, mu_s, tmp_path):
+    """Read by the formula of the product's handbook they give the reflectance, to within half a count."""
+    onto = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 240.0, 180.0, 30.0)
+    image = bright(name).fifesim.sense(name, scaling="product", onto=onto)
+    assert image.dtype == np.uint16
+    fine = bright(name).fifesim.sense(name, quantise=False, onto=onto).fifesim.to_reflectance()
+    by_hand = (image.astype(float).where(image > 0) * gain - 0.1) / mu_s
+    assert float(abs(by_hand - fine).max()) <= 0.5 * gain / mu_s * (1 + 1e-9)
+    np.testing.assert_allclose(image.fifesim.to_reflectance(), by_hand, rtol=0, atol=1e-12)
+    assert "scaling product" in image.attrs["history"] and "16 bits" in image.attrs["history"]
+    again = fifesim.open_image(image.fifesim.to_geotiff(tmp_path / "image.tif"))
+    np.testing.assert_array_equal(again, image)
+    np.testing.assert_array_equal(again.fifesim.ndvi(), image.fifesim.ndvi())
+    check_scaling("product", instrument(name))
+
+
+def test_the_detector_is_the_default():
+    image = bright("OLI").fifesim.sense("OLI")
+    assert int(image.max()) <= 4095
+    xr.testing.assert_identical(image, bright("OLI").fifesim.sense("OLI", scaling="detector"))
+    gain, offset, bits = scale(TM, TM.select("TM3"))
+    np.testing.assert_allclose([gain[0] * 255 + offset[0], offset[0], bits], [204.3, -1.2, 8])
+
+
+def test_msi_wants_one_sun_and_oli_does_not():
+    sza = ("y", "x"), np.linspace(40, 41, UTM.shape.y * UTM.shape.x).reshape(UTM.shape)
+    varying = bright("OLI").assign_coords(sza=sza)
+    image = varying.fifesim.sense("OLI", scaling="product")
+    fine = varying.fifesim.sense("OLI", quantise=False).fifesim.to_reflectance()
+    assert float(abs(image.fifesim.to_reflectance() - fine).max()) <= 0.5 * 2e-5 / np.cos(np.radians(41))
+    with pytest.raises(ValueError, match="scaling='product' of MSI needs one direction of sun"):
+        bright("MSI").assign_coords(sza=sza).fifesim.sense("MSI", scaling="product")
+
+
+@pytest.fixture(scope="module")
+def image():
+    dn = np.random.default_rng(8).integers(1, 256, (2, *UTM.shape)).astype(np.uint8)
+    dn[:, 1, 1] = 0
+    return fifesim.calibrate(products.labelled(dn, UTM, ["TM3", "TM4"], {}), "TM", geometry=LOW_SUN)
+
+
+CHANGES = {
+    "radiance": lambda image: image * image.gain + image.offset,
+    "half": lambda image: image * 0.5,
+    "doubled": lambda image: image.astype(np.int32) * 2,
+    "negative": lambda image: image.astype(np.int16) - 100,
+    "wider": lambda image: image.astype(np.uint16) * np.uint16(2),
+}
+VERBS = {
+    "radiance": fifesim.to_radiance,
+    "reflectance": fifesim.to_reflectance,
+    "ndvi": fifesim.ndvi,
+    "index": lambda image: fifesim.index(image, "EVI2"),
+    "surface": lambda image: fifesim.to_surface(image, fifesim.Atmosphere()),
+}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("change", CHANGES)
+def test_values_that_are_no_digital_numbers_are_refused(image, change, verb):
+    with xr.set_options(keep_attrs=True):
+        changed = CHANGES[change](image).assign_attrs(units="1")
+    with pytest.raises(ValueError, match=r"is not a whole number from 0 to (255|65535): calibrate with .*drop_vars"):
+        VERBS[verb](changed)
+    with no_compute():
+        lazy = VERBS[verb](in_chunks(changed, {"y": 5, "x": 7}))
+    with pytest.raises(ValueError, match="is not a whole number"):
+        lazy.compute()
+
+
+def test_the_block_that_is_computed_is_checked(image):
+    changed = image.astype(np.float32)
+    changed[0, 0, 0] = 7.5
+    lazy = fifesim.to_radiance(in_chunks(changed, {"y": 5, "x": 7}))
+    np.testing.assert_array_equal(lazy[:, -1, -1], fifesim.to_radiance(image)[:, -1, -1])
+    with pytest.raises(ValueError, match=r"digital number of 7\.5 is not"):
+        lazy[:, 0, 0].compute()
+
+
+@pytest.mark.parametrize("change", ["kept", "dropped"])
+def test_radiance_computed_by_hand_is_not_calibrated_again(image, change):
+    """Arithmetic keeps attributes since xarray 2025.11; before, it dropped them."""
+    with xr.set_options(keep_attrs=change == "kept"):
+        radiance = image * image.gain + image.offset
+    radiance = radiance.assign_attrs(units="W m-2 sr-1 um-1") if change == "kept" else radiance
+    with pytest.raises(ValueError, match=r"type \.drop_vars\(\['gain', 'offset'\]\)\.assign_attrs"):
+        fifesim.ndvi(radiance.rio.write_crs(image.rio.crs))
+    remedied = radiance.where(image > 0).drop_vars(["gain", "offset"]).assign_attrs(units="W m-2 sr-1 um-1")
+    np.testing.assert_allclose(fifesim.ndvi(remedied.rio.write_crs(image.rio.crs)), fifesim.ndvi(image), rtol=1e-12)
+
+
+@pytest.mark.parametrize("dtype", [np.uint16, np.int16, np.float32, np.float64])
+def test_digital_numbers_of_another_type_are_calibrated(image, dtype):
+    np.testing.assert_array_equal(fifesim.to_radiance(image.astype(dtype)), fifesim.to_radiance(image))
+    masked = image.astype(np.float32).where(image > 0)
+    np.testing.assert_array_equal(fifesim.to_radiance(masked), fifesim.to_radiance(image))
+
+
+# ------------------------------------------------------------------------------------------ noise
+
+# Figures of a test, of no real instrument.
+FIGURES = Noise(radiance=50.0, snr=60.0, shot=0.5, gain_spread=0.02, offset_spread=0.3)
+NOISY = replace(
+    PAPER,
+    detectors=16,
+    sources=PAPER.sources | {"noise": "Friedl1995", "detectors": "Friedl1995"},
+    bands=tuple(replace(band, noise=FIGURES) for band in PAPER.bands),
+)
+ALL = ("shot", "thermal", "fixed-pattern")
+RADIANCE = {"TM3": 40.0, "TM4": 90.0}
+
+
+def uniform(shape=(900, 990), row=0, column=0, radiance=(40.0, 90.0)):
+    """Radiance by cells, each band of one value."""
+    grid = fifesim.fife_site(30 / 9, window=((row, row + shape[0]), (column, column + shape[1])))
+    values = np.broadcast_to(np.array(radiance)[:, None, None], (2, *shape))
+    array = products.labelled(values, grid, list(RADIANCE), {}).assign_attrs(units="W m-2 sr-1 um-1")
+    return directions.with_geometry(array, Geometry(40.0, 120.0))
+
+
+def test_uniform_scene_shows_the_published_ratio():
+    """Within three standard errors, also in digital numbers, whose rounding adds a twelfth of a count squared."""
+    radiance = fifesim.sense(uniform(), NOISY, noise=["shot", "thermal"], seed=3, quantise=False)
+    dn = fifesim.sense(uniform(), NOISY, noise=["shot", "thermal"], seed=3)
+    for name, signal in RADIANCE.items():
+        image = radiance.sel(band=name).values
+        expected = float(fifesim.noise_equivalent_radiance(NOISY, name, signal))
+        assert abs(image.std() - expected) < 3 * expected / np.sqrt(2 * image.size)
+        counts = fifesim.to_radiance(dn).sel(band=name)
+        quantised = np.hypot(expected, float(dn["gain"].sel(band=name)) / np.sqrt(12))
+        assert abs(float(counts.std()) - quantised) < 3 * quantised / np.sqrt(2 * image.size)
+
+
+def test_sixteen_detectors_stripe_the_lines():
+    image = fifesim.sense(uniform(), NOISY, noise="fixed-pattern", seed=3, quantise=False)
+    lines = image.sel(band="TM3").values
+    assert np.ptp(lines, axis=1).max() < 1e-10 and lines[:16, 0].std() > 0.3
+    np.testing.assert_allclose(lines[16:], lines[:-16], rtol=1e-14)
+    assert not np.allclose(lines, image.sel(band="TM4").values * 40 / 90)
+
+
+def test_noise_is_the_same_in_any_chunks_windows_and_bands():
+    for quantity, quantise in (("dn", True), ("toa_radiance", False)):
+        options = {"noise": ALL, "seed": 3, "quantise": quantise}
+        check_raster_function(
+            lambda toa, o=options: fifesim.sense(toa, NOISY, **o), uniform((90, 99)), quantity=quantity
+        )
+    whole = fifesim.sense(uniform((180, 198)), NOISY, noise=ALL, seed=3)
+    window = fifesim.sense(uniform((90, 99), row=90, column=45), NOISY, noise=ALL, seed=3)
+    np.testing.assert_array_equal(window, whole.sel(y=window["y"], x=window["x"]))
+    one = fifesim.sense(uniform((180, 198)).sel(band=["TM4"]), NOISY, noise=ALL, seed=3)
+    np.testing.assert_array_equal(one, whole.sel(band=["TM4"]))
+
+
+def test_noise_clips_and_never_wraps():
+    loud = replace(
+        NOISY, bands=tuple(replace(band, noise=Noise(radiance=50.0, snr=4.0, shot=0.0)) for band in TM.bands)
+    )
+    image = fifesim.sense(uniform((270, 270), radiance=(-1.2, 206.0)), loud, noise="thermal", seed=1)
+    dark, bright = image.sel(band="TM3").values, image.sel(band="TM4").values
+    assert dark.min() == 1 and (dark == 1).mean() == pytest.approx(0.5, abs=0.1) and dark.max() < 100
+    assert bright.max() == 255 and (bright == 255).mean() == pytest.approx(0.5, abs=0.1) and bright.min() > 150
+
+
+def test_history_says_what_noise_there_is():
+    assert fifesim.sense(uniform((90, 99)), NOISY).attrs["history"].endswith("sense: TM, 8 bits")
+    noisy = fifesim.sense(uniform((90, 99)), NOISY, noise=["shot", "thermal"], seed=9)
+    assert noisy.attrs["history"].endswith("sense: TM, 8 bits, noise shot thermal, seed 9")
+
+
+BARE = NoiseModel(0.5, 0.0)
+SILENT = replace(PAPER, bands=tuple(replace(band, noise=None) for band in TM.bands))
+
+
+@pytest.mark.parametrize(
+    ("name", "noise", "models", "said"),
+    [
+        (SILENT, "shot", None, "TM has no noise for TM3"),
+        (NOISY, "thermic", None, "unknown noise thermic"),
+        (NOISY, ["all", "shot"], None, "'all' alone"),
+        (NOISY, ALL, BARE, r"TM has no shot and no fixed-pattern noise for TM3.*noise_models=\{'TM3'"),
+        (NOISY, "shot", {"TM4": BARE}, "TM has no shot noise for TM4"),
+        (NOISY, "thermal", {"TM33": BARE}, "unknown band of TM 'TM33': did you mean TM3"),
+    ],
+)
+def test_noise_that_is_not_described_is_refused(name, noise, models, said):
+    with pytest.raises(ValueError, match=said):
+        fifesim.sense(uniform((90, 99)), name, noise=noise, noise_models=models)
+
+
+def test_each_requested_kind_must_exist_in_every_band():
+    """The noise of L4TM is the same at any radiance; the other verbs refuse shot noise as `sense` does."""
+    lai = fifesim.lai_scene(fifesim.fife_site(cell=10, window=((0, 60), (0, 60))), "burned-grazed", seed=7)
+    said = "L4TM has no shot noise for TM3, only thermal; type noise='all'"
+    with pytest.raises(ValueError, match=said):
+        fifesim.compare(lai, ["MSI", "L4TM"], fifesim.Setup(noise=("shot", "thermal")))
+    with pytest.raises(ValueError, match=said):
+        fifesim.Scenario(sensor={"instrument": "L4TM", "noise": ["shot", "thermal"]})
+    with pytest.raises(ValueError, match="TM has no fixed-pattern noise for TM3, only thermal"):
+        fifesim.Scenario(sensor={"noise": ["thermal", "fixed-pattern"], "noise_model": {"thermal": 0.4}})
+    images = fifesim.compare(lai, ["MSI", "L4TM"], fifesim.Setup(noise="all"))
+    assert images["L4TM"]["dn"].attrs["history"].endswith("noise all, seed 0")
+
+
+def test_all_noise_is_every_kind_that_a_band_has_and_models_may_be_given():
+    def seen(name=NOISY, noise="all", bands=("TM3", "TM4"), **options):
+        return fifesim.sense(uniform((270, 297)).sel(band=list(bands)), name, noise=noise, seed=3, **options)
+
+    np.testing.assert_array_equal(seen(), seen(noise=ALL))
+    models = {"noise_models": {"TM3": NoiseModel(0.8, 0.0)}}
+    mixed = seen(**models)
+    np.testing.assert_array_equal(mixed.sel(band="TM4"), seen().sel(band="TM4"))
+    np.testing.assert_array_equal(mixed.sel(band=["TM3"]), seen(noise="thermal", bands=["TM3"], **models))
+    np.testing.assert_array_equal(seen(noise_models={"tm3": NoiseModel(0.8, 0.0)}), mixed)
+    both = seen(PAPER, "thermal", noise_models=NoiseModel(0.8, 0.0), quantise=False)
+    # 810 pixels: four standard errors.
+    assert float(both.sel(band="TM3").std()) == pytest.approx(0.8, rel=0.1)
+
+
+@pytest.mark.parametrize("chunk", [1, 2, 3])
+def test_bands_in_chunks_of_their_own_have_the_noise_of_the_whole(chunk):
+    """Each band by its number in the instrument and with its own model, wherever its chunk begins."""
+    names = ["TM5", "TM1", "TM4", "TM3", "TM2"]
+    models = {name: NoiseModel(0.2 + 0.1 * k, 0.01) for k, name in enumerate(names)}
+    radiance = xr.DataArray(np.full((5, 9, 11), 50.0), dims=("band", "y", "x"))
+    bands, kinds = TM.select(names), ("shot", "thermal")
+    whole = noisy(radiance, TM, bands, kinds, 5, (3, 4), models)
+    parts = noisy(radiance.chunk(band=chunk, y=4), TM, bands, kinds, 5, (3, 4), models)
+    np.testing.assert_array_equal(parts, whole)
+    for layer, name in enumerate(names):
+        number = [band.name for band in TM.bands].index(name)
+        alone = add_noise(radiance.values[layer], models[name], kinds, seed=5, band=number, row=3, column=4)
+        np.testing.assert_array_equal(whole[layer], alone)

@@ -1,0 +1,545 @@
+"""Scans on labelled rasters: view angles, light of the view, images by line and sample, and sweeps."""
+
+from dataclasses import replace
+
+import dask.array as da
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import CHUNKS, ODD_CHUNKS, check_place, in_chunks, no_compute
+
+import fifesim
+from fifesim.analysis.regression import Regression
+from fifesim.base.geometry import Geometry
+from fifesim.grids import cf, directions, projection
+from fifesim.grids import grid as grids
+from fifesim.sensor.description.instrument_file import Noise, Scan
+from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.spatial_response import BoxcarResponse
+from fifesim.sensor.response.scan import growth, place_beside, view_components, view_from_ground
+from fifesim.sensor.scan_labels import at_pixels, latitude_longitude, seen_alike
+
+# ------------------------------------------------------------------------------------------ view angles
+
+
+TM = instrument("TM")
+SCANS = TM.sources | {"scan": "Friedl1995"}
+WIDE = replace(TM, name="wide", altitude=833e3, scan=Scan("whiskbroom", max_angle=55.4), sources=SCANS)
+SITE = fifesim.fife_site(30.0)
+
+
+def test_angles_are_those_of_each_cell():
+    view = fifesim.scan_geometry(TM, SITE, nadir_offset=3e3, heading=193.0)
+    rows, columns = np.meshgrid(*(np.arange(size) + 0.5 for size in SITE.shape), indexing="ij")
+    track = fifesim.Track(view.attrs["track_latitude"], view.attrs["track_longitude"], view.attrs["track_heading"])
+    east, north = view_components(track, *latitude_longitude(SITE, rows, columns), 705e3)
+    vza, vaa = np.radians(view["vza"].values), np.radians(view["vaa"].values)
+    np.testing.assert_allclose(np.sin(vza) * np.sin(vaa), east, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(np.sin(vza) * np.cos(vaa), north, rtol=0, atol=1e-9)
+    for name in ("vza", "vaa"):
+        check_place(view[name], SITE.crs)
+        assert cf.attributes(name).items() <= view[name].attrs.items()
+
+
+def test_the_track_may_cross_the_scene():
+    """It lies 3 km to the left of the middle, which flying south is the east: the sensor changes sides."""
+    view = fifesim.scan_geometry(TM, SITE, nadir_offset=3e3)
+    middle = view.isel(y=250)
+    assert middle["vza"].min() < 0.002
+    nadir = float(middle["x"][int(middle["vza"].values.argmin())])
+    assert nadir - float(middle["x"].mean()) == pytest.approx(3e3, abs=60)
+    west, east = middle.isel(x=5), middle.isel(x=-5)
+    assert float(west["vaa"]) == pytest.approx(90, abs=1.5) and float(east["vaa"]) == pytest.approx(270, abs=1.5)
+    assert float(west["vza"]) == pytest.approx(np.degrees(np.arctan(10.4 / 705)), abs=0.1)
+
+
+def test_lazy_angles_are_the_same_bits():
+    whole = fifesim.scan_geometry(TM, SITE, nadir_offset=3e4)
+    with no_compute():
+        lazy = fifesim.scan_geometry(TM, SITE, nadir_offset=3e4, chunks={"y": 130, "x": 77})
+    xr.testing.assert_identical(lazy.compute(), whole)
+
+
+def test_a_wide_swath_ends():
+    grid = fifesim.grid_at("EPSG:5070", -1.6e6, 2.2e6, 3.2e6, 4e5, 10e3)
+    view = fifesim.scan_geometry(WIDE, grid, fifesim.Track(39.5, -96.0, 190.0))
+    seen = np.isfinite(view["vza"].values)
+    assert 0.5 < seen.mean() < 0.95
+    np.testing.assert_array_equal(seen, np.isfinite(view["vaa"].values))
+    assert float(view["vza"].max()) == pytest.approx(68.55, abs=0.3)
+    rows, columns = np.meshgrid(*(np.arange(size) + 0.5 for size in grid.shape), indexing="ij")
+    east, north = view_components(fifesim.Track(39.5, -96.0, 190.0), *latitude_longitude(grid, rows, columns), 833e3)
+    sine = np.sin(np.radians(view["vza"].values))
+    np.testing.assert_allclose(sine[seen], np.hypot(east, north)[seen], rtol=0, atol=1e-5)
+
+
+def test_a_scene_that_is_not_seen_is_named():
+    narrow = replace(WIDE, scan=Scan("whiskbroom", max_angle=7.5))
+    with pytest.raises(ValueError, match=r"wide does not see the grid: it begins \d+ km from the track.*7\.5 degrees"):
+        fifesim.scan_geometry(narrow, SITE, nadir_offset=2e5)
+    with pytest.raises(ValueError, match="give one of them"):
+        fifesim.scan_geometry(TM, SITE, fifesim.Track(39.0, -96.0, 190.0), nadir_offset=2e5)
+    with pytest.raises(TypeError, match=r"fifesim\.Track"):
+        fifesim.scan_geometry(TM, SITE, (39.0, -96.0))
+
+
+# ------------------------------------------------------------------------------------------ light
+
+
+AWAY = {"nadir_offset": -60e3, "heading": 193.6}
+
+
+def light(site, geometry):
+    lai = xr.DataArray(np.full(site.shape, 2.0), dims=("y", "x")).odc.assign_crs(site.crs)
+    lai = lai.assign_coords(fifesim.grids.grid.coordinates(site))
+    air = fifesim.Atmosphere()
+    return lai.fifesim.surface_reflectance("TM", bands=["TM3"], geometry=geometry, atmosphere=air).fifesim.to_toa()
+
+
+def test_light_at_nadir_is_not_seen_from_the_side(site):
+    toa = light(site, Geometry(30.0, 120.0))
+    with pytest.raises(ValueError, match=r"another view, vza 0.0, than the scan, vza 5.4: up to 5.4 degrees"):
+        toa.fifesim.sense_swath("TM", **AWAY)
+    seen = toa.fifesim.sense_swath("TM", **AWAY, view_tolerance=180)
+    assert float(seen["vza"].min()) > 5.3
+    assert float(toa.fifesim.sense_swath("TM")["vza"].max()) < 0.02
+
+
+def test_the_message_says_what_makes_it_right(site):
+    """Typed as it stands, with the sun, it gives light that the scan takes."""
+    with pytest.raises(ValueError) as refused:
+        light(site, Geometry(30.0, 120.0)).fifesim.sense_swath("TM", **AWAY)
+    said = str(refused.value)
+    assert len(said) <= 500 and "\n" not in said
+    typed = said[said.index("fifesim.scan_geometry(") : said.index(".assign(")]
+    view = eval(typed, {"fifesim": fifesim, "grid": site})
+    image = light(site, view.assign(sza=30.0, saa=120.0)).fifesim.sense_swath("TM", **AWAY, view_tolerance=0.01)
+    assert float(image["vza"].mean()) == pytest.approx(float(view["vza"].mean()), abs=1e-3)
+
+
+def test_light_from_the_other_side_is_refused(site):
+    """Its zenith angle is right, and its azimuth is not."""
+    west = fifesim.scan_geometry("TM", site, **AWAY)
+    wrong = Geometry(30.0, 120.0, float(west["vza"].mean()), (float(west["vaa"].mean()) + 180) % 360)
+    with pytest.raises(ValueError, match=r"10\.[78] degrees apart"):
+        light(site, wrong).fifesim.sense_swath("TM", **AWAY)
+
+
+def test_lazy_angles_are_looked_at_when_it_computes(site):
+    view = fifesim.scan_geometry("TM", site, **AWAY, chunks=20).assign(sza=30.0, saa=120.0)
+    with no_compute():
+        right = light(site, view).fifesim.sense_swath("TM", **AWAY)
+        wrong = light(site, view).fifesim.sense_swath("TM", nadir_offset=60e3, heading=193.6)
+    eager = light(site, view.compute()).fifesim.sense_swath("TM", **AWAY)
+    xr.testing.assert_identical(right.compute(), eager)
+    with pytest.raises(ValueError, match="another view"):
+        wrong.compute()
+
+
+def test_pixels_have_the_angles_of_the_cells_in_which_they_lie():
+    values = np.arange(12.0).reshape(3, 4)
+    row, column = np.array([[-0.2, 0.9], [2.0, 3.7]]), np.array([[0.0, 1.5], [3.99, 9.0]])
+    for data in (values, da.from_array(values, chunks=(2, 3))):
+        geometry = xr.Dataset(
+            {"sza": (("x", "y"), data.T), "saa": 120.0, "vza": 0.0, "vaa": 0.0, "earth_sun_distance": 1.0}
+        )
+        found = at_pixels(geometry, row, column)
+        np.testing.assert_array_equal(found["sza"], [[0, 1], [11, 11]])
+        assert found["sza"].dims == ("line", "sample") and float(found["saa"]) == 120
+    assert at_pixels(Geometry(30.0, 120.0), row, column) == Geometry(30.0, 120.0)
+
+
+def test_no_data_are_seen_from_anywhere():
+    """Light of cells that the scan does not see has no view."""
+    means = xr.DataArray([[[np.nan, 1.0]]], dims=("band", "line", "sample"))
+    vza = xr.DataArray(da.from_array([[np.nan, 3.0]]), dims=("line", "sample"))
+    geometry = xr.Dataset({"sza": 30.0, "saa": 120.0, "vza": vza, "vaa": 0.0})
+    view = np.array([[50.0, 3.5]]), np.zeros((1, 2))
+    assert seen_alike(means, geometry, view, 1.0, "").equals(means)
+    with pytest.raises(ValueError, match="view_tolerance must be"):
+        seen_alike(means, geometry, view, -1.0, "")
+
+
+# ------------------------------------------------------------------------------------------ images
+
+
+PAPER = instrument("TM", "paper")
+ASIDE = {"nadir_offset": -36e3, "heading": 193.6, "view_tolerance": 180}
+
+
+def scene(shape=(180, 198), plane=None):
+    grid = fifesim.fife_site(30 / 9, window=((90, 90 + shape[0]), (180, 180 + shape[1])))
+    x, y = np.meshgrid(*(grids.coordinates(grid)[axis].values for axis in ("x", "y")))
+    values = np.random.default_rng(2).uniform(10, 90, shape) if plane is None else plane(x, y)
+    array = xr.DataArray(np.stack([values, values + 1]), dims=("band", "y", "x"), coords={"band": ["TM3", "TM4"]})
+    array.attrs["units"] = "W m-2 sr-1 um-1"
+    return directions.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
+
+
+def test_pixels_lie_where_they_say():
+    """A plane is seen at the centre of a symmetric footprint; its steps by cells leave a hundredth of one."""
+    plane = scene(plane=lambda x, y: 0.02 * (x - 705600) - 0.03 * (y - 4333900))
+    image = fifesim.sense_swath(plane, PAPER, quantise=False, **ASIDE)
+    expected = 0.02 * (image["x"] - 705600) - 0.03 * (image["y"] - 4333900)
+    difference = (image.sel(band="TM3") - expected).values
+    x, y = projection.transform_points(~grids.geobox(plane).affine, image["x"], image["y"])
+    inside = (x > 9) & (x < 189) & (y > 9) & (y < 171)
+    assert inside.mean() > 0.5
+    assert np.abs(difference[inside]).max() < np.hypot(0.02, 0.03) * 0.01 * 10 / 3
+
+
+def test_pixels_stand_at_the_instruments_interval_and_turn_with_the_track():
+    image = fifesim.sense_swath(scene(), PAPER, quantise=False, **ASIDE)
+    assert image.dims == ("band", "line", "sample")
+    along = np.hypot(image["x"].diff("line"), image["y"].diff("line"))
+    across = np.hypot(image["x"].diff("sample"), image["y"].diff("sample"))
+    wider = growth(float(image["vza"].mean()) * 0.9, 705e3)
+    # The sphere and the map's scale cost a few thousandths.
+    swept = (image["sweep"].diff("line") == 0).values
+    np.testing.assert_allclose(along[swept], 30.315 * float(wider[0]), rtol=4e-3)
+    # 16 lines together are 0.15 % higher than a sweep advances.
+    assert (~swept).sum() == 1 and float(along[~swept].max()) < 30.315 - 16 * 30.315 * (float(wider[0]) - 1) + 0.1
+    np.testing.assert_allclose(across, 30.315 * float(wider[1]), rtol=5e-3)
+    heading = np.degrees(np.arctan2(image["x"].diff("line"), image["y"].diff("line"))) % 360
+    convergence = projection.convergence(grids.geobox(scene()))
+    np.testing.assert_allclose(heading, 193.6 - convergence, rtol=0, atol=0.4)
+    # Flying south, the right is the west.
+    assert (image["x"].diff("sample") < 0).all()
+    assert (abs(image["vaa"] - 283.6) < 0.5).all()
+
+
+def test_constant_scene_stays_constant_and_its_labels_are_whole():
+    image = fifesim.sense_swath(scene(plane=lambda x, y: 0 * x + 40.0), PAPER, quantise=False, **ASIDE)
+    found = image.sel(band="TM3").values
+    np.testing.assert_allclose(found[np.isfinite(found)], 40.0, rtol=1e-14)
+    assert image["latitude"].attrs["units"] == "degrees_north"
+    assert image["vza"].dims == ("line", "sample") and cf.attributes("vza").items() <= image["vza"].attrs.items()
+    assert image.rio.crs == scene().rio.crs
+    assert image.attrs["units"] == "W m-2 sr-1 um-1"
+
+
+@pytest.mark.parametrize("chunks", [CHUNKS, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}])
+def test_a_scan_is_the_same_in_any_chunks(chunks, monkeypatch):
+    monkeypatch.setattr("fifesim.sensor.scan_labels._SWATH_BLOCK", 7)
+    whole = fifesim.sense_swath(scene(), PAPER, **ASIDE)
+    with no_compute():
+        lazy = fifesim.sense_swath(in_chunks(scene(), chunks), PAPER, **ASIDE)
+    xr.testing.assert_identical(lazy.compute(), whole)
+
+
+def test_digital_numbers_come_back_as_radiance_and_reflectance():
+    image = fifesim.sense_swath(scene(), PAPER, **ASIDE)
+    radiance = fifesim.sense_swath(scene(), PAPER, quantise=False, **ASIDE)
+    assert image.dtype == np.uint8 and image.attrs["_FillValue"] == 0
+    back = fifesim.to_radiance(image)
+    assert float(abs(back - radiance).max()) <= float(image["gain"].max()) / 2 * (1 + 1e-9)
+    reflectance = fifesim.to_reflectance(image)
+    assert reflectance.dims == ("band", "line", "sample") and "latitude" in reflectance.coords
+
+
+def test_noise_goes_by_lines_of_the_scan():
+    noisy = replace(
+        PAPER,
+        detectors=16,
+        bands=tuple(replace(band, noise=Noise(radiance=50.0, snr=50.0, gain_spread=0.02)) for band in PAPER.bands),
+        sources=PAPER.sources | {"noise": "Friedl1995", "detectors": "Friedl1995"},
+    )
+    flat = scene(plane=lambda x, y: 0 * x + 40.0)
+    image = fifesim.sense_swath(flat, noisy, noise="fixed-pattern", seed=1, quantise=False, **ASIDE).sel(band="TM3")
+    spread = image.max("sample") - image.min("sample")
+    assert float(spread.max()) < 1e-10
+    assert float(image.mean("sample").std()) > 0.2
+
+
+def test_wide_scans_see_wider():
+    """At 40 degrees a footprint covers 1.37 x 2.0 times as much: the variance of white cells falls in proportion."""
+    wide = replace(PAPER, altitude=833e3, scan=Scan("whiskbroom", max_angle=55.0), sources=SCANS)
+    # 705 km and 833 km widen the footprint alike.
+    variance = {}
+    for offset in (0.0, 735e3):
+        image = fifesim.sense_swath(scene((360, 360)), wide, quantise=False, nadir_offset=offset, view_tolerance=180)
+        variance[offset] = float(image.sel(band="TM3").var())
+        angle = float(image["vza"].mean())
+    scan_angle = np.degrees(np.arcsin(np.sin(np.radians(angle)) * 6371 / (6371 + 833)))
+    along, across = growth(scan_angle, 833e3)
+    assert 38 < scan_angle < 42
+    # 300 pixels in the wide image: a standard error of 8 %, and neighbours overlap a little.
+    assert variance[0.0] / variance[735e3] == pytest.approx(float(along * across), rel=0.3)
+
+
+def test_a_scene_that_is_not_scanned_is_named():
+    narrow = replace(PAPER, scan=Scan("whiskbroom", max_angle=7.7), sources=SCANS)
+    with pytest.raises(ValueError, match="does not see the scene"):
+        fifesim.sense_swath(scene(), narrow, nadir_offset=4e5)
+    with pytest.raises(ValueError, match="simulate a larger one"):
+        fifesim.sense_swath(scene((6, 6)), PAPER)
+
+
+def test_lines_and_samples_are_all_those_whose_centres_lie_in_the_scene():
+    """Neither more nor less, from the first to the last; corners of the scene are the farthest along and across."""
+    track = fifesim.Track(39.1, -96.9, 193.6)
+    plane = scene()
+    image = fifesim.sense_swath(plane, PAPER, track, quantise=False, view_tolerance=180)
+    rows, columns = np.meshgrid([0, plane.sizes["y"]], [0, plane.sizes["x"]])
+    distance, aside = place_beside(track, *latitude_longitude(grids.geobox(plane), rows, columns))
+    theta = np.radians(view_from_ground(aside, 705e3)[1])
+    for name, place, step in (("line", distance, 30.315), ("sample", theta, 43e-6)):
+        centres = (np.arange(-10_000, 10_000) + 0.5) * step
+        within = np.flatnonzero((centres >= place.min()) & (centres <= place.max())) - 10_000
+        np.testing.assert_array_equal(image[name], within)
+
+
+def test_bands_with_other_line_spreads_are_seen_each_by_its_own():
+    wide = replace(PAPER.bands[3], lsf=BoxcarResponse("boxcar", width=120 / 705e3))
+    mixed, alone = replace(PAPER, bands=(*PAPER.bands[:3], wide, *PAPER.bands[4:])), replace(PAPER, lsf=wide.lsf)
+    options = {"quantise": False, "min_valid": 0.5} | ASIDE
+    image = fifesim.sense_swath(scene().isel(band=[1, 0]), mixed, **options)
+    assert image["band"].values.tolist() == ["TM4", "TM3"]
+    both = fifesim.sense_swath(scene(), alone, **options)
+    np.testing.assert_array_equal(image.sel(band="TM4"), both.sel(band="TM4"))
+    np.testing.assert_array_equal(image.sel(band="TM3"), fifesim.sense_swath(scene(), PAPER, **options).sel(band="TM3"))
+
+
+def lit(reflectance=(0.05, 0.4)):
+    """A uniform ground seen as the scan sees it, in Track's own directions."""
+    grid = grids.geobox(scene((60, 66)))
+    ground = xr.DataArray(np.broadcast_to(np.reshape(reflectance, (2, 1, 1)), (2, 60, 66)), dims=("band", "y", "x"))
+    ground = grids.place(ground.assign_coords(band=["TM3", "TM4"]), grid)
+    away = {"nadir_offset": -60e3, "heading": 193.6}
+    view = fifesim.scan_geometry("TM", grid, **away).assign(sza=30.0, saa=120.0)
+    return fifesim.to_toa(ground, fifesim.Atmosphere(), geometry=view, instrument="TM"), away
+
+
+def test_a_scan_goes_back_to_the_ground_that_it_was_made_of():
+    """Through radiance, planetary reflectance and air, in the scan's own directions: what was put in comes out."""
+    toa, away = lit()
+    image = fifesim.sense_swath(toa, "TM", quantise=False, **away)
+    surface = image.fifesim.to_surface()
+    assert surface.dims == ("band", "line", "sample") and surface.name == "surface_reflectance"
+    assert "latitude" in surface.coords and surface.encoding["grid_mapping"] == "spatial_ref"
+    valid = surface.isel(band=0).notnull().values
+    assert valid.sum() > 10
+    # The air's terms are interpolated over the angles to 1e-5, there and back at slightly different nodes.
+    np.testing.assert_allclose(surface.values[:, valid].T, np.tile([0.05, 0.4], (valid.sum(), 1)), rtol=0, atol=2e-5)
+    ndvi = image.fifesim.ndvi()
+    planetary = image.fifesim.to_reflectance()
+    by_hand = (planetary[1] - planetary[0]) / (planetary[1] + planetary[0])
+    assert ndvi.dims == ("line", "sample")
+    np.testing.assert_array_equal(ndvi, by_hand)
+
+
+def test_verbs_of_a_lazy_scan_are_lazy_and_the_same():
+    toa, away = lit()
+    image = fifesim.sense_swath(toa, "TM", **away)
+    fit = Regression(3.0, -0.5, 0.9, 100, 0.1, 0.5, 10.0)
+    for verb in (fifesim.to_radiance, fifesim.to_surface, lambda array: fifesim.index(array, "EVI2"),
+                 lambda array: fifesim.invert(fifesim.ndvi(array), fit)["lai"]):  # fmt: skip
+        with no_compute():
+            lazy = verb(in_chunks(image, {"line": 2, "sample": 3}))
+        assert lazy.chunks is not None and lazy.dims[-2:] == ("line", "sample")
+        xr.testing.assert_identical(lazy.compute(), verb(image))
+
+
+def test_what_takes_maps_names_the_way_to_one(tmp_path):
+    toa, away = lit()
+    image = fifesim.sense_swath(toa, "TM", **away)
+    ndvi = image.fifesim.ndvi()
+    with pytest.raises(ValueError, match=r"\.fifesim\.grid_swath\(grid\)"):
+        fifesim.regress(ndvi, ndvi)
+    with pytest.raises(ValueError, match=r"map the scan with .grid_swath\(grid\)"):
+        image.fifesim.to_geotiff(tmp_path / "scan.tif")
+    with pytest.warns(UserWarning, match="lacks vza, vaa"):
+        image.fifesim.grid_swath(grids.aligned_grid(grids.geobox(toa), 30.0)).fifesim.to_geotiff(tmp_path / "map.tif")
+    assert fifesim.open_image(tmp_path / "map.tif").dtype == np.uint8
+
+
+def test_sun_that_varies_over_the_scene_is_that_of_each_pixel():
+    toa, away = lit()
+    angles = np.linspace(20.0, 40.0, 66)
+    varied = toa.assign_coords(sza=(("y", "x"), np.broadcast_to(angles, (60, 66)), cf.attributes("sza")))
+    image = fifesim.sense_swath(varied, "TM", quantise=False, **away)
+    column = ((image["x"] - toa["x"][0]) / (10 / 3)).round().astype(int).clip(0, 65)
+    np.testing.assert_allclose(image["sza"], angles[column], rtol=0, atol=0.32)
+    np.testing.assert_allclose(image.fifesim.to_reflectance().mean(), toa.mean(), rtol=1e-4, atol=0)
+
+
+def test_a_scan_is_written_as_netcdf_and_read_again(tmp_path):
+    toa, away = lit()
+    image = fifesim.sense_swath(toa, "TM", **away)
+    image.to_netcdf(tmp_path / "scan.nc")
+    with xr.open_dataarray(tmp_path / "scan.nc", decode_coords="all", mask_and_scale=False) as back:
+        xr.testing.assert_equal(back, image)
+        xr.testing.assert_identical(back.fifesim.to_radiance().drop_attrs(), image.fifesim.to_radiance().drop_attrs())
+        assert back.rio.crs == image.rio.crs
+    with xr.open_dataset(tmp_path / "scan.nc") as plain:
+        assert {"latitude", "longitude"} <= set(plain["dn"].encoding["coordinates"].split())
+        assert plain["dn"].attrs["grid_mapping"] == "spatial_ref"
+
+
+def test_what_lies_on_a_map_is_not_spread_over_a_scan():
+    toa, away = lit()
+    image = fifesim.sense_swath(toa, "TM", quantise=False, **away)
+    height = toa.isel(band=0, drop=True).drop_vars(["vza", "vaa"]).drop_attrs() * 0 + 400
+    for option in ({"elevation": height}, {"adjacency": True}):
+        with pytest.raises(ValueError, match="does not fit the lines and samples"):
+            image.fifesim.to_surface(**option)
+
+
+# ------------------------------------------------------------------------------------------ sweeps
+
+
+# Around the central meridian, where the rows of the map run across a track to the south.
+CELL = 100.0
+GRID = fifesim.grid_at("EPSG:32614", 484000.0, 4346000.0, 32000.0, 26000.0, CELL)
+# Scan angles of 30 and 55 degrees.
+OFFSETS = {"MODIS": {0: 0.0, 30: 415e3, 55: 1140e3}, "VIIRS": {0: 0.0, 30: 486e3, 55: 1404e3}}
+BANDS = {"MODIS": "MODIS1", "VIIRS": "I1"}
+
+
+def plane(x, y):
+    return 100 + 1e-3 * (x - 500000) + 2e-3 * (y - 4333000)
+
+
+def wide_scene(name, values=plane):
+    x, y = np.meshgrid(*(grids.coordinates(GRID)[axis].values for axis in ("x", "y")))
+    array = xr.DataArray(values(x, y)[None], dims=("band", "y", "x"), coords={"band": [BANDS[name]]})
+    array.attrs["units"] = "W m-2 sr-1 um-1"
+    return directions.with_geometry(grids.place(array, GRID), Geometry(40.0, 120.0))
+
+
+def swept(name, angle, values=plane, **options):
+    view = {"nadir_offset": OFFSETS[name][angle], "heading": 180.0, "view_tolerance": 180, "min_valid": 0.0}
+    return fifesim.sense_swath(wide_scene(name, values), name, quantise=False, **view, **options)
+
+
+def scan_angle_of(image, name):
+    altitude = instrument(name).altitude
+    return np.degrees(np.arcsin(np.sin(np.radians(image["vza"])) * 6371e3 / (6371e3 + altitude)))
+
+
+@pytest.mark.parametrize(
+    ("name", "angle", "along", "across"),
+    [
+        ("MODIS", 0, 250.0, 250.0),
+        ("MODIS", 30, 294.2, 353.8),
+        ("MODIS", 55, 501.5, 1207.5),
+        ("VIIRS", 0, 371.0, 388.0),
+        ("VIIRS", 30, 437.4, 555.0),
+        ("VIIRS", 55, 769.0, 706.0),
+    ],
+)
+def test_lines_and_samples_lie_as_far_apart_as_published(name, angle, along, across):
+    """
+    MODIS after Ichoku and Kaufman (2005); VIIRS at nadir after its ATBD.
+
+    At 30 and 55 degrees the ATBD's sizes at nadir grow with the slant range: the sides of the triangle of Earth's
+    centre, ground and satellite, and one instead of three samples in the sum.
+    """
+    image = swept(name, angle)
+    near = (abs(scan_angle_of(image, name) - angle) < 0.3).values
+    assert near.any()
+    steps = {axis: np.hypot(image["x"].diff(axis), image["y"].diff(axis)).values for axis in ("line", "sample")}
+    swept_together = (image["sweep"].diff("line") == 0).values
+    down, right = steps["line"][swept_together], steps["sample"]
+    assert np.median(down[near[1:][swept_together]]) == pytest.approx(along, rel=0.03)
+    assert np.median(right[near[:, 1:]]) == pytest.approx(across, rel=0.03)
+
+
+@pytest.mark.parametrize(("name", "height"), [("MODIS", 10_000.0), ("VIIRS", 11_871.0)])
+def test_sweeps_follow_each_other_by_their_height_at_nadir_and_overlap_at_the_edge(name, height):
+    for angle in (0, 55):
+        image = swept(name, angle)
+        # Flying south; the middle of each whole sweep.
+        middle = (-image["y"].isel(sample=0)).groupby("sweep").mean()
+        whole = image["line"].groupby("sweep").count() == instrument(name).scan.lines
+        aside = OFFSETS[name][angle] / 6371e3
+        np.testing.assert_allclose(middle[whole].diff("sweep"), height * np.cos(aside), rtol=5e-3)
+        jump = -image["y"].diff("line").isel(sample=0)[image["sweep"].diff("line").values > 0]
+        assert np.all(jump < 0) if angle else np.all(jump > 200)
+
+
+def test_deleted_pixels_are_missing_and_say_so():
+    image = swept("VIIRS", 55)
+    deleted = image["deleted"].values
+    assert np.isnan(image.values[0][deleted]).all()
+    detector = image["line"].values % 32
+    assert (deleted.all(axis=1) == (np.minimum(detector, 31 - detector) < 4)).all()
+    inside = (abs(image["x"] - 500000) < 15000) & (abs(image["y"] - 4333000) < 12000)
+    assert np.isfinite(image.values[0][inside.values & ~deleted]).all() and (inside.values & deleted).any()
+    assert not swept("VIIRS", 0)["deleted"].any()
+    assert "deleted" not in swept("MODIS", 55).coords
+    view = {"nadir_offset": OFFSETS["VIIRS"][55], "view_tolerance": 180, "min_valid": 0.0}
+    numbers = fifesim.sense_swath(wide_scene("VIIRS"), "VIIRS", **view).values[0]
+    assert (numbers[deleted] == 0).all() and (numbers[inside.values & ~deleted] > 0).all()
+
+
+@pytest.mark.parametrize("name", ["MODIS", "VIIRS"])
+@pytest.mark.parametrize("angle", [0, 55])
+def test_pixels_of_all_sweeps_lie_where_they_say(name, angle):
+    image = swept(name, angle)
+    inside = (abs(image["x"] - 500000) < 13000) & (abs(image["y"] - 4333000) < 11000)
+    difference = (image[0] - plane(image["x"], image["y"])).where(inside)
+    assert float(difference.notnull().mean()) > 0.3
+    # A hundredth of a pixel of about 1 km.
+    assert float(abs(difference).max()) < 0.02
+
+
+def test_footprints_are_as_wide_as_the_samples_that_are_summed():
+    """A strip one cell wide along the track: the largest mean is the cell over the width of the footprint."""
+    widths = {}
+    for angle in (31.2, 32.3):
+        gamma = np.radians(angle_at_ground(angle) - angle)
+        view = {"nadir_offset": 6371e3 * gamma, "heading": 180.0, "view_tolerance": 180, "min_valid": 0.0}
+        strips = wide_scene("VIIRS", lambda x, y: np.where(np.abs((x - 484050) % 4000) < 1, 1000.0, 0.0))
+        image = fifesim.sense_swath(strips, "VIIRS", quantise=False, **view)
+        steps = np.hypot(image["x"].diff("sample"), image["y"].diff("sample"))
+        zone = abs(scan_angle_of(image, "VIIRS") - angle).isel(sample=slice(1, None)) < 0.4
+        middle = (abs(image["y"] - 4333000) < 8000).isel(sample=slice(1, None)) & zone
+        largest = float(image[0].isel(sample=slice(1, None)).where(middle).max())
+        widths[angle] = 1000 * CELL / largest
+        assert widths[angle] == pytest.approx(float(steps.where(middle).median()), rel=0.03)
+    assert widths[31.2] / widths[32.3] == pytest.approx(1.5 * 0.97, rel=0.03)
+
+
+def angle_at_ground(scan_angle):
+    return np.degrees(np.arcsin((6371 + 824) / 6371 * np.sin(np.radians(scan_angle))))
+
+
+@pytest.mark.parametrize("name", ["MODIS", "VIIRS"])
+@pytest.mark.parametrize("method", ["nearest", "mean"])
+def test_a_map_of_overlapping_sweeps_has_no_gaps(name, method):
+    """Deleted lines leave no holes, and pixels of neighbouring sweeps keep their places."""
+    image = swept(name, 55)
+    around = fifesim.grid_at("EPSG:32614", 490000.0, 4341000.0, 20000.0, 16000.0, 500.0)
+    on_map = image.fifesim.grid_swath(around, method)
+    x, y = np.meshgrid(on_map["x"], on_map["y"])
+    assert np.isfinite(on_map).all()
+    # The nearest centre is half a pixel away at most. Means with edges that sweeps share are up to 3.3 away (MODIS).
+    limit = {"nearest": 2e-3 * 400 + 1e-3 * 650, "mean": 0.5}[method]
+    assert float(abs(on_map[0] - plane(x, y)).max()) < limit
+
+
+@pytest.mark.parametrize("chunks", [CHUNKS, ODD_CHUNKS])
+def test_zones_and_sweeps_are_the_same_in_any_chunks(chunks, monkeypatch):
+    monkeypatch.setattr("fifesim.sensor.scan_labels._SWATH_BLOCK", 11)
+    view = {"nadir_offset": 525e3, "view_tolerance": 180, "min_valid": 0.0}
+    rough = wide_scene("VIIRS", lambda x, y: np.random.default_rng(3).uniform(10, 90, x.shape))
+    whole = fifesim.sense_swath(rough, "VIIRS", **view)
+    assert len(set(np.unique(whole["deleted"].sum("line")))) == 2
+    with no_compute():
+        lazy = fifesim.sense_swath(in_chunks(rough, chunks), "VIIRS", **view)
+    xr.testing.assert_identical(lazy.compute(), whole)
+
+
+def test_indices_and_files_of_a_sweep_keep_what_a_map_needs(tmp_path):
+    image = swept("VIIRS", 55)
+    image.to_netcdf(tmp_path / "sweep.nc")
+    with xr.open_dataarray(tmp_path / "sweep.nc", decode_coords="all") as back:
+        xr.testing.assert_equal(back, image)
+        assert back["deleted"].dtype == bool
+    view = {"nadir_offset": OFFSETS["VIIRS"][55], "view_tolerance": 180, "min_valid": 0.0}
+    pair = xr.concat(
+        [wide_scene("VIIRS"), 2 * wide_scene("VIIRS").assign_coords(band=["I2"])], "band", combine_attrs="override"
+    )
+    ndvi = fifesim.sense_swath(pair.assign_attrs(units="W m-2 sr-1 um-1"), "VIIRS", **view).fifesim.ndvi()
+    assert {"sweep", "deleted"} <= set(ndvi.coords)
