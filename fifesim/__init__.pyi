@@ -113,6 +113,13 @@ from .retrieval.labels import retrieve as retrieve  # method
 from .retrieval.description import Retrieval as Retrieval
 from .retrieval.description import read_retrieval as read_retrieval
 
+# Models of the land surface
+from .models.labels import gpp as gpp  # method, of a Dataset too
+from .models.labels import evapotranspiration as evapotranspiration  # method, of a Dataset too
+from .models.labels import albedo as albedo  # method, of a Dataset too
+from .models.weather import Weather as Weather
+from .models.weather import fife_weather as fife_weather
+
 # Pictures
 from .output.pictures import plot as plot  # method
 from .output.maps import rgb as rgb  # method

@@ -180,9 +180,9 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
     return _band_terms(atmosphere, tuple(bands), float(sza), float(vza), float(raa))
 
 
-def photons_at_ground(atmosphere, bands, sza):
+def light_at_ground(atmosphere, bands, sza, photons=True):
     r"""
-    Share of each band in the solar photons that reach black ground, and the diffuse fraction of their flux.
+    Share of each band in the sunlight that reaches black ground, and the diffuse fraction of its flux.
 
     .. math:: w_i \propto T_i(\theta_s) \int_i E(\lambda) \, \lambda \, T_g(\lambda) \, d\lambda
 
@@ -193,6 +193,8 @@ def photons_at_ground(atmosphere, bands, sza):
         Within 0.4 to 2.5 um.
     sza : float
         [degree]
+    photons : bool, optional
+        Count photons; energy, without the factor :math:`\lambda`, if False.
 
     Returns
     -------
@@ -215,17 +217,17 @@ def photons_at_ground(atmosphere, bands, sza):
     >>> from fifesim.atmosphere.models import Atmosphere
     >>> from fifesim.base.bands import Band
     >>> bands = Band("blue", (0.45, 0.47), (1, 1)), Band("red", (0.65, 0.67), (1, 1))
-    >>> shares, _ = photons_at_ground(Atmosphere(), bands, 30.0)
+    >>> shares, _ = light_at_ground(Atmosphere(), bands, 30.0)
     >>> bool(shares[1] > shares[0])
     True
     """
     terms = band_terms(atmosphere, tuple(bands), sza, 0.0, 0.0)
     wavelength = table_wavelengths()
     gas = gas_transmittance(wavelength, atmosphere, 1 / np.cos(np.radians(sza)))
-    spectrum = solar_irradiance_steps(wavelength) * wavelength * gas
+    spectrum = solar_irradiance_steps(wavelength) * gas * (wavelength if photons else 1.0)
     means = [band.mean(spectrum, wavelength) * np.trapezoid(band.response, band.wavelength) for band in bands]
-    photons = np.array(means) * terms.transmittance_down
-    return photons / photons.sum(), terms.diffuse_fraction
+    flux = np.array(means) * terms.transmittance_down
+    return flux / flux.sum(), terms.diffuse_fraction
 
 
 def check_zenith(name, angle):

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
-from fifesim.atmosphere.engines import photons_at_ground
+from fifesim.atmosphere.engines import light_at_ground
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.annotations import Time
 from fifesim.base.bands import Band
@@ -213,8 +213,8 @@ def _absorbed(lai, part, canopy, atmosphere, geometry, time):
     if "sza" in directions.varying(geometry):
         directions.uniform_geometry(geometry, "light")
     atmosphere = air_of(atmosphere, area)
-    _check_spectra(stands_of(land.classes, canopy, land.cells))
-    shares, diffuse = photons_at_ground(atmosphere, PAR_BANDS, float(geometry.sza))
+    check_spectra(stands_of(land.classes, canopy, land.cells))
+    shares, diffuse = light_at_ground(atmosphere, PAR_BANDS, float(geometry.sza))
     # Absorption does not depend on the view.
     sun = Light(Geometry(sza=float(geometry.sza), saa=0.0), diffuse)
     names, weights = [band.name for band in PAR_BANDS], tuple(shares.tolist())
@@ -232,7 +232,7 @@ def _absorbed(lai, part, canopy, atmosphere, geometry, time):
     return out, ", ".join(words), area
 
 
-def _check_spectra(stands):
+def check_spectra(stands):
     """Raise ValueError for optics by band, which have no spectrum from 0.4 to 0.7 um."""
     for stand in stands.values():
         for name in ("leaf_optics", "brown_leaf", "background"):

@@ -7,7 +7,7 @@ import xarray as xr
 from lazy import check_raster_function
 
 import fifesim
-from fifesim.atmosphere.engines import photons_at_ground
+from fifesim.atmosphere.engines import light_at_ground
 from fifesim.chain.absorbed_light import PAR_BANDS
 from fifesim.ground.canopy import layers, optics
 from fifesim.ground.canopy.soil import brightened, soil_line
@@ -18,7 +18,7 @@ MIXED = fifesim.Canopy(brown=0.3, dissociation=0.4, crown_cover=0.8, leaf_angles
 
 def by_cell(lai, brown=0.0, soil=0.0, crown_cover=1.0, dissociation=0.0, leaf_angles="spherical", leaf=None):
     """Light budget of each cell in each band, shape (4, band, n), and the share of each band."""
-    shares, sky = photons_at_ground(fifesim.Atmosphere(), PAR_BANDS, SZA)
+    shares, sky = light_at_ground(fifesim.Atmosphere(), PAR_BANDS, SZA)
     green, dead = (optics.band_leaf_optics(PAR_BANDS, each) for each in (leaf, optics.DEAD_LEAF))
     ground = brightened(optics.band_background(PAR_BANDS), np.broadcast_to(soil, lai.shape), soil_line(PAR_BANDS))
     columns = [each[:, None] for each in (*green, *dead)]
@@ -51,7 +51,7 @@ def test_shares_of_photons_are_those_of_the_standard_spectrum():
     spectrum = pvlib.spectrum.get_reference_spectra(standard="ASTM G173-03")["global"]
     photons = spectrum * spectrum.index
     expected = np.array([photons.loc[1000 * band.limits[0] : 1000 * band.limits[1]].mean() for band in PAR_BANDS])
-    shares, _ = photons_at_ground(fifesim.Atmosphere(), PAR_BANDS, 48.2)
+    shares, _ = light_at_ground(fifesim.Atmosphere(), PAR_BANDS, 48.2)
     np.testing.assert_allclose(shares, expected / expected.sum(), rtol=0.1)
 
 

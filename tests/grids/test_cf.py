@@ -16,6 +16,8 @@ def raster(**attrs):
 STANDARD_NAMES = {
     "area_fraction": "1",
     "fraction_of_surface_downwelling_photosynthetic_radiative_flux_absorbed_by_vegetation": "1",
+    # Convertible to the canonical kg m-2 s-1.
+    "gross_primary_productivity_of_biomass_expressed_as_carbon": "g m-2 d-1",
     "ground_slope_angle": "degree",
     "ground_slope_direction": "degree",
     "leaf_area_index": "1",
@@ -27,10 +29,12 @@ STANDARD_NAMES = {
     "solar_azimuth_angle": "degree",
     "solar_irradiance_per_unit_wavelength": "W m-2 um-1",
     "solar_zenith_angle": "degree",
+    "surface_albedo": "1",
     "surface_altitude": "m",
     "surface_bidirectional_reflectance": "1",
     "toa_bidirectional_reflectance": "1",
     "toa_outgoing_radiance_per_unit_wavelength": "W m-2 sr-1 um-1",
+    "water_evapotranspiration_flux": "kg m-2 d-1",
 }
 
 

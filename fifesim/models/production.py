@@ -1,0 +1,297 @@
+"""Gross primary production: light use efficiency, photosynthesis of a canopy, and the biochemistry of two leaves."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+# Grassland of MOD17, collection 5.1 [Running2004]: efficiency [kg MJ-1] and ends of the ramps [degC, Pa].
+LIGHT_USE = 0.001215
+TMIN_RAMP = (-8.0, 12.02)
+VPD_RAMP = (650.0, 4200.0)
+
+CARBON = 12.011e-6
+"""Mass of carbon in a micromole. [g]"""
+
+
+def ramp(values, low, high):
+    """
+    Linear rise from 0 at one value to 1 at another, constant beyond.
+
+    Parameters
+    ----------
+    values : array
+        NaN gives NaN.
+    low, high : float
+        Values with a result of 0 and of 1, in the unit of the values.
+
+    Returns
+    -------
+    ramp : array, shape of values
+        [1]
+
+    Examples
+    --------
+    >>> ramp([-10.0, 2.01, 30.0], -8.0, 12.02).round(6).tolist()
+    [0.0, 0.5, 1.0]
+    """
+    return np.clip((np.asarray(values, float) - low) / (high - low), 0.0, 1.0)
+
+
+def light_use_gpp(tmin_c, vpd_pa, fpar, par_mj, lue_kg_mj=LIGHT_USE, tmin_ramp=TMIN_RAMP, vpd_ramp=VPD_RAMP):
+    r"""
+    Gross primary production of a day from absorbed light, after MOD17.
+
+    .. math:: \mathrm{GPP} = \epsilon_{max} \, m(T_{min}) \, m(\mathrm{VPD}) \, \mathrm{FPAR} \cdot \mathrm{PAR}
+
+    Parameters
+    ----------
+    tmin_c : array
+        Lowest air temperature of the day. [degC]
+    vpd_pa : array
+        Vapour pressure deficit of the daylight hours. [Pa]
+    fpar : array
+        [1]
+    par_mj : array
+        Photosynthetically active radiation. [MJ m-2 d-1]
+    lue_kg_mj : float, optional
+        Largest light use efficiency, by default of grassland. [kg MJ-1]
+    tmin_ramp, vpd_ramp : (float, float), optional
+        Temperatures with no and full production [degC], and deficits with full and no production [Pa].
+
+    Returns
+    -------
+    gpp : array, shape of the broadcast inputs
+        [g m-2 d-1], of carbon
+
+    References
+    ----------
+    [Running2004]_
+
+    Examples
+    --------
+    >>> round(float(light_use_gpp(15.0, 650.0, 0.5, 10.0)), 3)
+    6.075
+    """
+    limits = ramp(tmin_c, *tmin_ramp) * (1 - ramp(vpd_pa, *vpd_ramp))
+    return 1000 * lue_kg_mj * limits * (np.asarray(fpar, float) * par_mj)
+
+
+class Respiration(NamedTuple):
+    """Maintenance respiration of a day. [g m-2 d-1], of carbon"""
+
+    leaf: np.ndarray
+    root: np.ndarray
+
+
+def maintenance_respiration(lai, tmean_c, sla=38.0, root_per_leaf=2.6, leaf_rate=0.0098, root_rate=0.00819):
+    r"""
+    Maintenance respiration of leaves and fine roots, after MOD17.
+
+    .. math::
+
+        R_l = \frac{1000 \, L}{\mathrm{SLA}} \, r_l \, (3.22 - 0.046 \, T)^{(T - 20) / 10}, \qquad
+        R_r = \frac{1000 \, L}{\mathrm{SLA}} \, f \, r_r \, 2^{(T - 20) / 10}
+
+    Parameters
+    ----------
+    lai : array
+        [m2 m-2]
+    tmean_c : array
+        Mean air temperature of the day, below 70. [degC]
+    sla : float, optional
+        Leaf area per carbon, by default of grassland, as the others. [m2 kg-1]
+    root_per_leaf : float, optional
+        Carbon of fine roots over that of leaves. [1]
+    leaf_rate, root_rate : float, optional
+        Respired share of the carbon at 20 degC. [d-1]
+
+    Returns
+    -------
+    respiration : Respiration
+
+    References
+    ----------
+    [Running2004]_
+
+    Examples
+    --------
+    >>> round(float(maintenance_respiration(3.8, 20.0).leaf), 3)
+    0.98
+    """
+    warmth = (np.asarray(tmean_c, float) - 20) / 10
+    carbon = 1000 / sla * np.asarray(lai, float)
+    leaf = carbon * leaf_rate * (3.22 - 0.046 * np.asarray(tmean_c, float)) ** warmth
+    return Respiration(leaf, carbon * root_per_leaf * root_rate * 2.0**warmth)
+
+
+def canopy_photosynthesis(lai, extinction, par, quantum_yield, p_max):
+    r"""
+    Photosynthesis of a canopy whose leaves respond to light by a rectangular hyperbola.
+
+    .. math::
+
+        \int_0^L \frac{a I P}{a I + P} \, dl = \frac{P}{K} \, \ln \frac{a K I_0 + P}{a K I_0 \, e^{-K L} + P},
+        \qquad I = K I_0 \, e^{-K l}
+
+    Parameters
+    ----------
+    lai : array
+        :math:`L`. NaN gives NaN. [m2 m-2]
+    extinction : array
+        :math:`K`, above 0. [1]
+    par : array
+        Photon flux above the canopy, :math:`I_0`. [umol m-2 s-1]
+    quantum_yield : array
+        Slope of the response at no light, :math:`a`. [mol mol-1]
+    p_max : array
+        Photosynthesis of a leaf in full light, :math:`P`. [umol m-2 s-1]
+
+    Returns
+    -------
+    photosynthesis : array, shape of the broadcast inputs
+        [umol m-2 s-1]
+
+    References
+    ----------
+    [MonsiSaeki1953]_
+
+    Examples
+    --------
+    In weak light each absorbed photon counts:
+
+    >>> round(float(canopy_photosynthesis(3.0, 0.5, 1e-6, 0.05, 20.0) / 0.05e-6), 4)
+    0.7769
+    """
+    k, p = np.asarray(extinction, float), np.asarray(p_max, float)
+    top = quantum_yield * k * par
+    # log1p of the light absorbed keeps the digits of thin canopies and weak light.
+    return p / k * np.log1p(-top * np.expm1(-k * lai) / (top * np.exp(-k * lai) + p))
+
+
+# Leaf biochemistry at 25 degC and its activation energies [J mol-1], from Tables 2 and 3 of [DePury1997].
+_GAS = 8.314
+_KC, _KC_ENERGY = 40.4, 59400.0  # Michaelis constant of carboxylation [Pa]
+_KO, _KO_ENERGY = 24.8e3, 36000.0  # and of oxygenation [Pa]
+_OXYGEN = 20.5e3  # [Pa]
+_V_ENERGY = 64800.0
+_J_PER_V = 2.1
+_J_ENERGY, _J_HIGH, _J_ENTROPY = 37000.0, 220000.0, 710.0
+_CURVATURE, _LOST = 0.7, 0.15  # of electron transport, and share of the light that it does not use
+_NITROGEN = 0.713  # decline of capacity from the top of the canopy to its bottom
+_SCATTERED, _DIFFUSE_REFLECTED = 0.15, 0.036
+_BEAM, _BEAM_SCATTERED, _DIFFUSE = 0.5, 0.46, 0.719  # extinction of black and of real leaves
+
+
+class TwoLeaves(NamedTuple):
+    """Light [umol m-2 s-1] and capacity [umol m-2 s-1] of sunlit and shaded leaves, per ground area."""
+
+    light_sun: np.ndarray
+    light_shade: np.ndarray
+    capacity_sun: np.ndarray
+    capacity_shade: np.ndarray
+
+
+def two_leaves(lai, par, diffuse_fraction, sza, vcmax25):
+    r"""
+    Light absorbed by sunlit and by shaded leaves, and their capacity of carboxylation.
+
+    Parameters
+    ----------
+    lai : array
+        [m2 m-2]
+    par : array
+        Photon flux above the canopy. [umol m-2 s-1]
+    diffuse_fraction : array
+        Of the photon flux. [1]
+    sza : array
+        Below 90. [degree]
+    vcmax25 : array
+        Capacity of the uppermost leaves at 25 degC. [umol m-2 s-1]
+
+    Returns
+    -------
+    leaves : TwoLeaves
+
+    References
+    ----------
+    [DePury1997]_, Eqs. 20 to 23
+    """
+    lai, mu = np.asarray(lai, float), np.cos(np.radians(sza))
+    kb, kbs, kd = _BEAM / mu, _BEAM_SCATTERED / mu, _DIFFUSE
+    beam, sky = par * (1 - np.asarray(diffuse_fraction, float)), par * np.asarray(diffuse_fraction, float)
+    horizontal = (1 - np.sqrt(1 - _SCATTERED)) / (1 + np.sqrt(1 - _SCATTERED))
+    reflected = 1 - np.exp(-2 * horizontal * kb / (1 + kb))
+    direct_through, beam_through, sky_through = (np.exp(-k * lai) for k in (kb, kbs, kd))
+    total = (1 - reflected) * beam * (1 - beam_through) + (1 - _DIFFUSE_REFLECTED) * sky * (1 - sky_through)
+    direct = beam * (1 - _SCATTERED) * (1 - direct_through)
+    diffuse = sky * (1 - _DIFFUSE_REFLECTED) * (1 - sky_through * direct_through) * (kd / (kd + kb))
+    again = (1 - reflected) * (1 - beam_through * direct_through) * (kbs / (kbs + kb))
+    scattered = beam * (again - (1 - _SCATTERED) * (1 - direct_through * direct_through) / 2)
+    light_sun = direct + diffuse + scattered
+    of_area = np.asarray(vcmax25, float) * lai
+    capacity = of_area * (-np.expm1(-_NITROGEN) / _NITROGEN)
+    capacity_sun = of_area * (1 - np.exp(-_NITROGEN) * direct_through) / (_NITROGEN + kb * lai)
+    return TwoLeaves(light_sun, total - light_sun, capacity_sun, capacity - capacity_sun)
+
+
+def farquhar_canopy(lai, par, diffuse_fraction, sza, ta_k, vcmax25=60.0, ci_pa=24.5):
+    r"""
+    Gross photosynthesis of a canopy of C3 leaves: the biochemistry of sunlit and of shaded leaves.
+
+    .. math::
+
+        A = \min \left( V_c \, \frac{C_i - \Gamma^*}{C_i + K_c (1 + O / K_o)}, \;
+            \frac{J}{4} \, \frac{C_i - \Gamma^*}{C_i + 2 \Gamma^*} \right), \qquad
+        \theta J^2 - (I_e + J_m) J + I_e J_m = 0
+
+    Parameters
+    ----------
+    lai : array
+        NaN gives NaN. [m2 m-2]
+    par : array
+        Photon flux above the canopy. [umol m-2 s-1]
+    diffuse_fraction : array
+        Of the photon flux. [1]
+    sza : array
+        Below 90. [degree]
+    ta_k : array
+        Temperature of the leaves, taken as that of the air. [K]
+    vcmax25 : array, optional
+        Capacity of carboxylation of the uppermost leaves at 25 degC; the default is a typical C3 grass (assumed).
+        [umol m-2 s-1]
+    ci_pa : array, optional
+        Partial pressure of carbon dioxide in the leaves; the default is 0.7 of 35 Pa. [Pa]
+
+    Returns
+    -------
+    photosynthesis : array, shape of the broadcast inputs
+        Without the respiration of the leaves. [umol m-2 s-1]
+
+    References
+    ----------
+    [DePury1997]_; [Farquhar1980]_
+
+    Examples
+    --------
+    >>> round(float(farquhar_canopy(3.0, 1500.0, 0.2, 30.0, 298.15)), 1)
+    22.5
+    """
+    ta_k = np.asarray(ta_k, float)
+    leaves = two_leaves(lai, par, diffuse_fraction, sza, vcmax25)
+    warm = (ta_k - 298.15) / (298.15 * _GAS * ta_k)
+    michaelis = _KC * np.exp(_KC_ENERGY * warm) * (1 + _OXYGEN / (_KO * np.exp(_KO_ENERGY * warm)))
+    tc = ta_k - 298.15
+    compensation = 3.69 + 0.188 * tc + 0.0036 * tc**2
+    of_v = np.exp(_V_ENERGY * warm) * (ci_pa - compensation) / (ci_pa + michaelis)
+    of_j = (ci_pa - compensation) / (4 * (ci_pa + 2 * compensation))
+    high = (1 + np.exp((_J_ENTROPY * 298.15 - _J_HIGH) / (_GAS * 298.15))) / (
+        1 + np.exp((_J_ENTROPY * ta_k - _J_HIGH) / (_GAS * ta_k))
+    )
+    of_jmax = _J_PER_V * np.exp(_J_ENERGY * warm) * high
+    total = 0.0
+    for light, capacity in ((leaves.light_sun, leaves.capacity_sun), (leaves.light_shade, leaves.capacity_shade)):
+        used, largest = light * (1 - _LOST) / 2, capacity * of_jmax
+        both = used + largest
+        transport = (both - np.sqrt(both**2 - 4 * _CURVATURE * used * largest)) / (2 * _CURVATURE)
+        total = total + np.minimum(capacity * of_v, transport * of_j)
+    return total

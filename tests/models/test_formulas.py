@@ -1,0 +1,163 @@
+"""Models of production, evaporation and albedo, against tables of other programs, quadrature and limits."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.integrate import quad
+
+from fifesim.models import evaporation, production
+from fifesim.models.production import canopy_photosynthesis, farquhar_canopy, two_leaves
+from fifesim.models.radiation import two_stream
+
+DATA = Path(__file__).parents[1] / "data"
+
+
+def mod17(table):
+    breath = production.maintenance_respiration(table["lai"], table["tmean_c"])
+    return {
+        "tmin_scalar": production.ramp(table["tmin_c"], *production.TMIN_RAMP),
+        "vpd_scalar": 1 - production.ramp(table["vpd_pa"], *production.VPD_RAMP),
+        "gpp_g": production.light_use_gpp(*given(table, "tmin_c vpd_pa fpar par_mj")),
+        "leaf_respiration_g": breath.leaf,
+        "root_respiration_g": breath.root,
+    }
+
+
+def given(table, names):
+    return [table[name].to_numpy() for name in names.split()]
+
+
+def of_fields(function, names):
+    return lambda table: function(*given(table, names))._asdict()
+
+
+def of_column(function, column, names):
+    return lambda table: {column: function(*given(table, names))}
+
+
+# Results by column for the rows of each table.
+TABLES = {
+    "mod17_grass": mod17,
+    "penman_monteith": of_fields(evaporation.penman_monteith, "ta_k rh_percent pressure_pa lai fpar rn tmin_k"),
+    "pt_jpl": of_fields(evaporation.pt_jpl, "ta_k rh_percent pressure_pa ndvi fapar_max lai rn g"),
+    "sellers_two_stream": of_fields(two_stream, "leaf_reflectance leaf_transmittance chi sza lai ground"),
+    "canopy_photosynthesis": of_column(
+        canopy_photosynthesis, "canopy_quadrature", "lai extinction par quantum_yield p_max"
+    ),
+    "reference_et_daily": of_column(
+        evaporation.reference_evapotranspiration,
+        "eto_asce",
+        "tmin tmax ea_kpa rs_mj u2 elevation latitude day_of_year",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_every_row_of_the_table_is_met(name):
+    table = pd.read_csv(DATA / f"{name}.csv", comment="#")
+    found = TABLES[name](table)
+    assert len(table) >= 24
+    for column, values in found.items():
+        # Columns that the table has; its last digit limits small numbers.
+        np.testing.assert_allclose(values, table[column], rtol=1e-6, atol=1e-12, err_msg=column)
+
+
+def test_reference_evapotranspiration_is_that_of_refet_and_of_the_book():
+    refet = pytest.importorskip("refet")
+    random = np.random.default_rng(3)
+    low = random.uniform(-5, 20, 200)
+    day = (low, low + random.uniform(3, 15, 200), random.uniform(0.2, 1.5, 200), random.uniform(3, 30, 200),
+           random.uniform(0.3, 6, 200), random.uniform(0, 2000, 200), random.uniform(-60, 70, 200),
+           random.integers(1, 366, 200))  # fmt: skip
+    made = evaporation.reference_evapotranspiration(*day, wind_height=10.0)
+    tmin, tmax, ea, rs, wind, elevation, latitude, number = day
+    expected = refet.Daily(
+        tmin=tmin, tmax=tmax, ea=ea, rs=rs, uz=wind, zw=10.0, elev=elevation, lat=latitude, doy=number
+    ).eto()
+    np.testing.assert_allclose(made, expected, rtol=1e-6)
+    # Example 18 of FAO-56.
+    uccle = evaporation.reference_evapotranspiration(12.3, 21.5, 1.409, 22.07, 2.078, 100.0, 50.8, 187)
+    assert abs(uccle - 3.9) < 0.1
+
+
+def test_light_of_two_leaves_is_the_integral_over_depth():
+    """Eqs. 20 of de Pury and Farquhar (1997) by quadrature; sunlit leaves are the share that no leaf shades."""
+    lai, par, sky, sza = 3.5, 1500.0, 0.3, 40.0
+    mu, sigma, below = np.cos(np.radians(sza)), 0.15, 0.036
+    kb, kbs, kd = 0.5 / mu, 0.46 / mu, 0.719
+    horizontal = (1 - np.sqrt(1 - sigma)) / (1 + np.sqrt(1 - sigma))
+    above = 1 - np.exp(-2 * horizontal * kb / (1 + kb))
+    beam, diffuse = par * (1 - sky), par * sky
+
+    def absorbed(depth):
+        total_beam = (1 - above) * beam * kbs * np.exp(-kbs * depth)
+        from_sky = (1 - below) * diffuse * kd * np.exp(-kd * depth)
+        scattered = total_beam - (1 - sigma) * beam * kb * np.exp(-kb * depth)
+        return total_beam + from_sky, (1 - sigma) * beam * kb + from_sky + scattered
+
+    both = quad(lambda depth: absorbed(depth)[0], 0, lai)[0]
+    sun = quad(lambda depth: absorbed(depth)[1] * np.exp(-kb * depth), 0, lai)[0]
+    capacity = quad(lambda depth: 60 * np.exp(-0.713 * depth / lai), 0, lai)[0]
+    sunlit = quad(lambda depth: 60 * np.exp(-(0.713 / lai + kb) * depth), 0, lai)[0]
+    leaves = two_leaves(lai, par, sky, sza, 60.0)
+    np.testing.assert_allclose(leaves, [sun, both - sun, sunlit, capacity - sunlit], rtol=1e-10)
+
+
+def test_photosynthesis_of_two_leaves_has_its_limits():
+    lai, sza, ci = np.array([0.5, 3.0]), 30.0, 24.5
+    leaves = two_leaves(lai, 1e-4, 0.2, sza, 60.0)
+    light = leaves.light_sun + leaves.light_shade
+    # At 25 degC the compensation point is 3.69 Pa, and half of the light that is not lost moves electrons.
+    dim = light * 0.85 / 2 / 4 * (ci - 3.69) / (ci + 2 * 3.69)
+    np.testing.assert_allclose(farquhar_canopy(lai, 1e-4, 0.2, sza, 298.15), dim, rtol=1e-6)
+    capacity = leaves.capacity_sun + leaves.capacity_shade
+    bright = capacity * (ci - 3.69) / (ci + 40.4 * (1 + 20.5 / 24.8))
+    np.testing.assert_allclose(farquhar_canopy(lai, 1e6, 0.2, sza, 298.15), bright, rtol=1e-12)
+    # Warmth raises the capacity; near 50 degC electron transport fails.
+    cold, warm, hot = (farquhar_canopy(3.0, 1500.0, 0.2, sza, each) for each in (283.15, 298.15, 323.15))
+    assert cold < warm and hot < warm
+
+
+def test_conductance_is_the_integral_over_leaves():
+    def leaf(depth):
+        flux = 0.6 * 900 * np.exp(-0.6 * depth)
+        return 0.006 * flux / (flux + 200) * (1 - (8 / 25) ** 2) / (1 + 1200 / 1500)
+
+    options = {"extinction": 0.6, "g_max": 0.006, "half_light": 200.0}
+    made = evaporation.canopy_conductance(4.0, 900.0, 290.15, 1200.0, **options)
+    assert np.isclose(made, quad(leaf, 0, 4)[0], rtol=1e-9)
+    # SiB2 scales the uppermost leaf by the light that the canopy intercepts over its extinction.
+    sib2 = evaporation.canopy_conductance(4.0, 900.0, 290.15, 1200.0, **options, integral="sib2")
+    assert np.isclose(sib2, leaf(0) * (1 - np.exp(-2.4)) / 0.6, rtol=1e-12)
+    with pytest.raises(ValueError, match="integral must be 'leaves' or 'sib2'"):
+        evaporation.canopy_conductance(4.0, 900.0, 290.15, 1200.0, integral="leaf")
+
+
+def test_two_stream_holds_where_printed_solutions_divide_by_zero():
+    """The beam's extinction equals the eigenvalue at mu = 1 / (2 m); results are continuous there."""
+    omega, back = 0.3, (0.3 + 0.1 / 4) / 2
+    eigenvalue = np.sqrt((1 - omega) * (1 - omega + 2 * back))
+    sza = np.degrees(np.arccos(0.5 / eigenvalue))
+    around = two_stream(0.2, 0.1, 0.0, sza + np.array([-1e-4, 0, 1e-4]), 2.0, 0.1)
+    for field in (around.albedo_beam, around.absorbed_beam):
+        assert np.isfinite(field).all()
+        np.testing.assert_allclose(field[1], (field[0] + field[2]) / 2, rtol=1e-9)
+    energy = around.albedo_diffuse + around.absorbed_diffuse + 0.9 * around.ground_diffuse
+    np.testing.assert_allclose(energy, 1, rtol=1e-12)
+    with pytest.raises(ValueError, match="chi must be in"):
+        two_stream(0.1, 0.1, 0.7, 30.0, 1.0, 0.1)
+
+
+def test_missing_cells_stay_missing_and_bare_ground_is_quiet():
+    lai = np.array([np.nan, 0.0, 2.0])
+    results = [
+        canopy_photosynthesis(lai, 0.5, 1000.0, 0.05, 30.0),
+        farquhar_canopy(lai, 1000.0, 0.2, 30.0, 298.0),
+        evaporation.penman_monteith(298.0, 50.0, 1e5, lai, 0.3 * lai, 400.0, 288.0).le,
+        evaporation.canopy_conductance(lai, 1000.0, 298.0, 1000.0),
+        two_stream(0.1, 0.05, 0.0, 30.0, lai, 0.15).absorbed_beam,
+    ]
+    for result in results:
+        assert np.isnan(result[0]) and abs(result[1]) < 1e-12 and result[2] > 0

@@ -1,0 +1,93 @@
+"""Maps of production, evapotranspiration and albedo: labels, weather and refusals."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import check_raster_function, in_chunks
+
+import fifesim
+from fifesim.models import production
+from fifesim.models.radiation import two_stream
+
+WEATHER = fifesim.fife_weather()
+
+
+def field(lai, low, high):
+    values = np.random.default_rng(2).uniform(low, high, lai.shape)
+    return lai.copy(data=values).drop_attrs().rename("field")
+
+
+@pytest.mark.parametrize("model", ["light-use", "photosynthesis", "farquhar"])
+def test_production_is_a_raster_function(lai, model):
+    check_raster_function(lambda each: each.fifesim.gpp(model=model), lai, quantity="gpp")
+
+
+@pytest.mark.parametrize("model", ["penman-monteith", "pt-jpl"])
+def test_evapotranspiration_is_a_raster_function(lai, model):
+    warm = WEATHER.replace(temperature=field(lai, 290, 300))
+    check_raster_function(
+        lambda each: each.fifesim.evapotranspiration(warm, model=model), lai, quantity="evapotranspiration"
+    )
+
+
+def test_light_use_is_the_formula_at_each_cell(lai):
+    temperature, absorbed = field(lai, 285, 305), field(lai, 0, 1)
+    weather = WEATHER.replace(temperature=temperature, temperature_min=276.0)
+    made = lai.fifesim.gpp(weather, fpar=absorbed)
+    celsius = temperature.values - 273.15
+    deficit = 0.5 * 610.8 * np.exp(17.27 * celsius / (celsius + 237.3))
+    energy = 0.45 * 550 * 14.9 * 0.0036
+    expected = production.light_use_gpp(276.0 - 273.15, deficit, absorbed.values, energy)
+    np.testing.assert_allclose(made, expected, rtol=1e-12)
+    assert made.attrs["units"] == "g m-2 d-1" and "temperature by cell" in made.attrs["history"]
+
+
+def test_only_green_leaves_produce(lai):
+    half = fifesim.Canopy(brown=0.5)
+    expected = (0.5 * lai).fifesim.gpp(model="farquhar")
+    np.testing.assert_allclose(lai.fifesim.gpp(model="farquhar", canopy=half), expected, rtol=1e-12)
+    land = lai.to_dataset(name="lai").assign(brown=xr.full_like(lai, 0.5).drop_attrs())
+    np.testing.assert_allclose(land.fifesim.gpp(model="farquhar"), expected, rtol=1e-12)
+    green = lai.fifesim.fpar(method="energy", leaves="green", canopy=half)
+    np.testing.assert_array_equal(lai.fifesim.gpp(canopy=half), lai.fifesim.gpp(fpar=green))
+
+
+def test_albedo_is_the_two_stream_model_of_each_band(lai):
+    leaf, ground = (0.3, 0.2), 0.15
+    made = lai.fifesim.albedo(canopy=fifesim.Canopy(leaf_optics=leaf, background=ground), chi=0.2)
+    found = two_stream(*leaf, 0.2, float(fifesim.fife_geometry().sza), lai.values, ground)
+    low, high = np.minimum(found.albedo_beam, found.albedo_diffuse), np.maximum(found.albedo_beam, found.albedo_diffuse)
+    # All bands are alike, so that albedo lies between both, nearer to the beam's.
+    assert ((made >= low - 1e-6) & (made <= high + 1e-6)).all()
+    assert (abs(made - found.albedo_beam) <= abs(made - found.albedo_diffuse) + 2e-6).all()
+    check_raster_function(lambda each: each.fifesim.albedo(), lai, quantity="albedo")
+    with pytest.raises(ValueError, match="canopies that differ in leaf area only, got crown_cover"):
+        lai.fifesim.albedo(canopy=fifesim.Canopy(crown_cover=0.5))
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"temperature": 25.0}, r"temperature must be in \[150, 350\] K, got 25: degC was given for K: add 273.15"),
+        ({"humidity": 50.0}, "divide percent by 100"),
+        ({"pressure": 965.0}, "hPa was given for Pa"),
+    ],
+)
+def test_other_units_are_refused(lai, change, message):
+    with pytest.raises(ValueError, match=message):
+        WEATHER.replace(**change)
+    (name, value), *_ = change.items()
+    rasters = WEATHER.replace(**{name: xr.full_like(lai, value).drop_attrs()})
+    lazy = in_chunks(lai, {"y": 9, "x": 9}).fifesim.evapotranspiration(rasters)
+    with pytest.raises(ValueError, match=message):
+        lazy.compute()
+
+
+def test_units_of_rasters_and_ranges_of_formulas_are_checked(lai):
+    celsius = xr.full_like(lai, 25.0).assign_attrs(units="degC")
+    with pytest.raises(ValueError, match="temperature has units 'degC', needs 'K'"):
+        WEATHER.replace(temperature=celsius)
+    with pytest.warns(UserWarning, match=r"temperature is 340 K.*hold from 228.15 to 333.15"):
+        WEATHER.replace(temperature=340.0)
+    with pytest.raises((ValueError, TypeError), match="model"):
+        lai.fifesim.gpp(model="mod16")
