@@ -28,7 +28,7 @@ from fifesim.experiments.friedl1995.case import (
     Case,
 )
 from fifesim.experiments.friedl1995.reproduction import SEED, reproduce_case
-from fifesim.experiments.friedl1995.table import cells_of, ground_of
+from fifesim.experiments.friedl1995.table import cells_of
 from fifesim.output.report import fixed
 
 DOCS = Path(__file__).parent
@@ -160,13 +160,13 @@ def scaling(case, found):
     """
     rows = []
     for arp in ARPS:
-        ground = ground_of(case, "burned-grazed", arp, SEED)
+        cells = cells_of(case, "burned-grazed", arp, SEED)
         one = found.sel(reading=NATIVE.name, arp=arp)
         bias = (one["pixel_ndvi_of_mean"] - one["pixel_boa_ndvi"]).values
         rows.append(
             {
                 "arp": arp,
-                "correlation": linearity_correlation(*ground.reflectance.values),
+                "correlation": linearity_correlation(*cells.reflectance),
                 "bias": np.nanmean(bias),
                 "largest": np.nanmax(np.abs(bias)),
             }

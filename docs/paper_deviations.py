@@ -21,6 +21,7 @@ from fifesim.ground.canopy.labels import BandCanopy, Light
 from fifesim.ground.canopy.layers import extinction_coefficient
 from fifesim.ground.landscape.autoregression import autocorrelation, correlation_length
 from fifesim.ground.landscape.lai_labels import lai_scene
+from fifesim.scenario.ground import elevation, in_memory
 from fifesim.sensor.instrument_labels import attributes_of
 
 # Length scales of the three landscapes, "roughly" (Analyses). [m]
@@ -91,7 +92,7 @@ def deviations(seeds):
     case = Case()
     base = fits(case, seeds)
     hills = replace(case, dem="flint-hills")
-    land = hills.land()
+    land = in_memory(*elevation(hills.common, hills.grid)[:2])
     on_hills = fits(hills, seeds, land=land)
     narrow = replace(case.instrument, lsf=replace(case.instrument.lsf, count=8))
     return {

@@ -16,9 +16,7 @@ from fifesim.grids import cf, directions
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import as_carried
 from fifesim.ground.landscape.lai_labels import scene_cells
-from fifesim.ground.terrain.labels import light_on_slopes
-from fifesim.ground.terrain.source_labels import beside_altitude
-from fifesim.scenario.ground import elevation, fpar_kinds, ground_scene, in_memory, scenario_light_on_hills, truth_of
+from fifesim.scenario.ground import elevation, fpar_kinds, ground_scene, in_memory, light_of, truth_of
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of, simulate, with_margin
 from fifesim.sensor.instrument_labels import attributes_of
@@ -84,20 +82,14 @@ def _scene(scenario, grid, setup, complete):
     if complete:
         wide, setup, inside = with_margin(scenario, setup)
     wide = as_carried(wide)
-    is_one, dem, horizon = scenario.landscape.is_one() and not own.lai_file, None, None
-    light = scenario_light_on_hills(scenario, wide, setup.geometry) if is_one else None
-    if light is None and scenario.terrain.dem != "flat":
-        # For so few cells, starting threads takes longer than the computation.
+    if not scenario.landscape.is_one() or own.lai_file:
         with dask.config.set(scheduler="synchronous"):
             dem, horizon = in_memory(*elevation(scenario, wide)[:2])
-    if not is_one:
         land = ground_scene(scenario, wide, dem=dem)
         reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land).values
         return _Scene(driver, setup, grid, land.isel(inside), wide, reflectance)
     lai = scene_cells(wide, own.distribution, own.arp, own.seed, own.method)
-    reflectance = driver.reflectance(lai)
-    if dem is not None:
-        light = light_on_slopes(beside_altitude(dem, driver.air.altitude), wide, setup.geometry, horizon)
+    reflectance, light = driver.reflectance(lai), light_of(scenario, wide, setup.geometry)
     if light is not None:
         reflectance = driver.on_slopes(reflectance, light)
     return _Scene(driver, setup, grid, lai[tuple(inside.values())], wide, reflectance)

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import dask
 import numpy as np
 import xarray as xr
 
@@ -18,7 +19,7 @@ from fifesim.ground.terrain import labels as terrain_labels
 from fifesim.ground.terrain import sky_labels
 from fifesim.ground.terrain.elevation_labels import fine_dem, flint_hills, source_dem
 from fifesim.ground.terrain.sky_labels import horizon_places
-from fifesim.ground.terrain.source_labels import elevation_grid
+from fifesim.ground.terrain.source_labels import beside_altitude, elevation_grid
 from fifesim.scenario.keys import COVARIATES
 
 # Resolution of the synthetic hills around a scene, equal to the resolution of its horizons. [m]
@@ -65,6 +66,19 @@ def scenario_light_on_hills(scenario, grid, geometry):
     return terrain_labels.light_on_hills(
         grid, around, terrain.seed, terrain.horizon_reach, geometry, scenario.atmosphere.altitude
     )
+
+
+def light_of(scenario, grid, geometry):
+    """Last arguments of `slope_reflectance` for the slopes of a scenario, in memory; None on level ground."""
+    if scenario.terrain.dem == "flat":
+        return None
+    light = scenario_light_on_hills(scenario, grid, geometry)
+    if light is not None:
+        return light
+    # For so few cells, starting threads takes longer than the computation.
+    with dask.config.set(scheduler="synchronous"):
+        dem, horizon = in_memory(*elevation(scenario, grid)[:2])
+    return terrain_labels.light_on_slopes(beside_altitude(dem, scenario.atmosphere.altitude), grid, geometry, horizon)
 
 
 def in_memory(dem, horizon):

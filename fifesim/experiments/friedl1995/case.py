@@ -14,10 +14,11 @@ import pandas as pd
 from fifesim.base import files, times
 from fifesim.base.arguments import is_path
 from fifesim.base.files import check_regular, in_a_line, shown
+from fifesim.grids.grid import as_carried
 from fifesim.ground.canopy import optics as canopy_optics
 from fifesim.ground.canopy.spectra import Background, spectrum_names
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
-from fifesim.scenario.ground import elevation, in_memory
+from fifesim.scenario.ground import light_of
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of
 from fifesim.sensor.description.instruments import instrument
@@ -401,9 +402,9 @@ class Case:
         """Setup of ground, atmosphere and instrument, without elevation."""
         return replace(setup_of(self.common), instrument=self.instrument)
 
-    def land(self):
-        """Elevation of the scenes and the horizon around them, in memory; None on level ground."""
-        return in_memory(*elevation(self.common, self.grid)[:2])
+    def light(self):
+        """Light on the slopes of the scenes, for `Driver.on_slopes`; None on level ground."""
+        return light_of(self.common, as_carried(self.grid), self.setup.geometry)
 
 
 def case_of(

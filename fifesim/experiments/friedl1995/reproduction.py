@@ -17,13 +17,15 @@ from fifesim.chain.driver import Driver, cell_block_means
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import ARPS, TABLE_1, VARIABLES, beside
-from fifesim.experiments.friedl1995.table import COEFFICIENTS, ground_of, realise_scenes, scene_image, truth_means
+from fifesim.experiments.friedl1995.table import COEFFICIENTS, realise_scenes
 from fifesim.grids.files import to_geotiff
+from fifesim.ground.canopy.labels import canopy_fpar
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
 from fifesim.output import stac
 from fifesim.output.maps import write_style
 from fifesim.output.progress import steps
 from fifesim.scenario.scenario import read_scenario
+from fifesim.scenario.simulation import setup_of, simulate
 from fifesim.scenario.toml import write_scenario
 
 # Values of leaf area at which densities are given.
@@ -34,8 +36,8 @@ def shown_scenes(case, readings, seed, each=iter):
     """Cells and pixels of the three scenes of the first treatment."""
     # Variables `cell_*` have dims (arp, y, x), variables `pixel_*` (reading, arp, pixel), with NaN where a reading has
     # fewer pixels.
-    cases, land = [replace(case, reading=reading) for reading in readings], case.land()
-    scenes = [_scene(cases, land, arp, seed) for arp in each(ARPS)]
+    cases, light = [replace(case, reading=reading) for reading in readings], case.light()
+    scenes = [_scene(cases, light, arp, seed) for arp in each(ARPS)]
     longest = max(one["pixel_lai"].size for _, pixels in scenes for one in pixels)
     names = list(scenes[0][1][0])
     variables = {}
@@ -64,11 +66,11 @@ def densities(case):
     return xr.DataArray(values, dims=("distribution", "leaf_area"), coords=coords, attrs=attrs)
 
 
-def _scene(cases, land, arp, seed):
+def _scene(cases, light, arp, seed):
     """Cells of a scene, and its pixels in each reading."""
     treatment = treatments()[0]
     driver = Driver(cases[0].setup)
-    cells = friedl1995_table.cells_of(cases[0], treatment, arp, seed, land, driver)
+    cells = friedl1995_table.cells_of(cases[0], treatment, arp, seed, light, driver)
     toa, truth = driver.toa(cells.reflectance), _truth(cases[0], driver, cells)
     key = [seed, friedl1995.scenes().index((treatment, arp))]
     pixels = []
@@ -222,14 +224,14 @@ def _paper():
 def write_scenarios(case, folder, seed, scenes=False, each=iter):
     """Write the nine scenarios of a realisation, each into a folder such as ``burned-grazed-0.05``."""
     check_named(case)
-    land, items = case.land() if scenes else None, {}
+    items = {}
     for treatment, arp in each(friedl1995.scenes()):
         own = folder / f"{treatment}-{arp:g}"
         own.mkdir(parents=True)
         (own / "scenario.toml").write_text(scenario_text(case, own, treatment, arp, seed), encoding="utf-8")
         if scenes:
-            _write_rasters(case, own, land, treatment, arp, seed)
             found = read_scenario(own / "scenario.toml")
+            _write_rasters(own, found)
             items[f"{own.name}/item.json"] = stac.item(
                 found, own, f"{treatment}, arp {arp:g}, seen by {case.instrument.name}"
             )
@@ -261,12 +263,14 @@ def check_named(case):
             )
 
 
-def _write_rasters(case, own, land, treatment, arp, seed):
-    ground = ground_of(case, treatment, arp, seed, land)
-    truth = {name: truth_means(case, ground, getattr(ground, name)) for name in ("lai", "fpar")}
-    cells = {"lai": ground.lai, "fpar": ground.fpar}
-    for band in ground.reflectance["band"].values:
-        cells[str(band)] = ground.reflectance.sel(band=band).drop_vars(["band", "wavelength"], errors="ignore")
-    rasters = {"image": scene_image(case, ground), "truth": xr.Dataset(truth), "scene": xr.Dataset(cells)}
+def _write_rasters(own, scenario):
+    """Write image, truth and cells of a scenario, with styles."""
+    run, setup = simulate(scenario, chunks=None), setup_of(scenario)
+    lai, reflectance = run["scene"]["lai"], run["scene"]["surface_reflectance"]
+    fpar = canopy_fpar(lai, setup.canopy, geometry=setup.geometry, fpar_inf=scenario.ground.fpar_inf)
+    cells = {"lai": lai, "fpar": fpar}
+    for band in reflectance["band"].values:
+        cells[str(band)] = reflectance.sel(band=band).drop_vars(["band", "wavelength"], errors="ignore")
+    rasters = {"image": run["image"]["dn"], "truth": run["truth"].to_dataset(), "scene": xr.Dataset(cells)}
     for name, raster in rasters.items():
         write_style(to_geotiff(raster if name == "image" else raster.astype(np.float32), own / f"{name}.tif"))

@@ -1,6 +1,6 @@
 """Table 2 of Friedl et al. (1995) over realisations, and its agreement with the published values."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -8,55 +8,12 @@ import pandas as pd
 import xarray as xr
 
 from fifesim.analysis import regression
-from fifesim.analysis.scaling_labels import aggregate_blocks
 from fifesim.base.caches import cached
 from fifesim.chain.driver import Driver, cell_block_means
-from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995.case import ARPS, VARIABLES
-from fifesim.ground.canopy import labels as canopy
 from fifesim.ground.landscape.autoregression import periodic_field
 from fifesim.ground.landscape.distribution import lai_distribution, rank_quantiles, treatments
-from fifesim.ground.landscape.lai_labels import lai_scene
-
-
-@dataclass(frozen=True, eq=False)
-class SceneGround:
-    """
-    Ground of a scene.
-
-    Parameters
-    ----------
-    setup : fifesim.chain.setup.Setup
-        Setup with elevation.
-    lai, fpar : xarray.DataArray, dims (y, x)
-    reflectance : xarray.DataArray, dims (band, y, x)
-        Surface reflectance. [1]
-    """
-
-    setup: Setup
-    lai: xr.DataArray
-    fpar: xr.DataArray
-    reflectance: xr.DataArray
-
-
-def ground_of(case, treatment, arp, seed, land=(None, None)):
-    """Ground of a scene by the method of the paper: one Fourier transform of the scene, and exact ranks."""
-    keys, (dem, horizon) = case.common.ground, land
-    setup = replace(case.setup, dem=dem, horizon=horizon)
-    lai = lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method=keys.method)
-    fpar = canopy.canopy_fpar(lai, setup.canopy, geometry=setup.geometry, fpar_inf=keys.fpar_inf)
-    return SceneGround(setup, lai, fpar, reflectance_of(setup, lai).compute())
-
-
-def scene_image(case, ground):
-    """Image that the instrument of a case records of a scene, dims (band, y, x)."""
-    return image_of(case.setup, ground.reflectance)
-
-
-def truth_means(case, ground, array):
-    """Means over the blocks of the truth, dims (..., y, x)."""
-    return aggregate_blocks(array, case.pixel, min_valid=ground.setup.min_valid)
 
 
 def paired(*arrays):
@@ -78,14 +35,14 @@ class Cells(NamedTuple):
     reflectance: np.ndarray
 
 
-def cells_of(case, treatment, arp, seed, land=(None, None), driver=None):
-    """Cells of a scene, identical to `ground_of`."""
-    if land[0] is not None:
-        ground = ground_of(case, treatment, arp, seed, land)
-        return Cells(ground.lai.values, ground.fpar.values, ground.reflectance.values)
+def cells_of(case, treatment, arp, seed, light=None, driver=None):
+    """Cells of a scene by the method of the paper: one Fourier transform of the scene, and exact ranks."""
     driver = driver or Driver(case.setup)
     lai = periodic_scene(case.densities[treatment], arp, seed, tuple(case.grid.shape))
-    return Cells(lai, driver.fpar(lai, case.common.ground.fpar_inf), driver.reflectance(lai))
+    reflectance = driver.reflectance(lai)
+    if light is not None:
+        reflectance = driver.on_slopes(reflectance, light)
+    return Cells(lai, driver.fpar(lai, case.common.ground.fpar_inf), reflectance)
 
 
 def periodic_scene(density, arp, seed, shape):
@@ -128,10 +85,10 @@ def realise_scenes(case, seeds, readings=None, distributions=None, arps=ARPS, ea
     """Lines, noise and ranges of scenes with several seeds, dims (reading, realisation, distribution, arp)."""
     cases = [case] if readings is None else [replace(case, reading=reading) for reading in readings]
     distributions = treatments() if distributions is None else list(distributions)
-    land = case.land()
+    light = case.light()
     scenes = [(seed, treatment, arp) for seed in seeds for treatment in distributions for arp in arps]
     drivers = [Driver(one.setup) for one in cases]
-    found = [_scene(cases, drivers, land, *scene) for scene in each(scenes)]
+    found = [_scene(cases, drivers, light, *scene) for scene in each(scenes)]
     shape = (len(seeds), len(distributions), len(arps), len(cases))
     outer = ("realisation", "distribution", "arp", "reading")
     variables = {}
@@ -230,10 +187,10 @@ def _drawn(seed, pixels, count, draws):
     return order[:, :count].copy()
 
 
-def _scene(cases, drivers, land, seed, treatment, arp):
+def _scene(cases, drivers, light, seed, treatment, arp):
     """Statistics of a scene under each reading, a list of dicts."""
     case, driver = cases[0], drivers[0]
-    cells = cells_of(case, treatment, arp, seed, land, driver)
+    cells = cells_of(case, treatment, arp, seed, light, driver)
     truth = [cell_block_means(array, case.grid, case.pixel, case.setup.min_valid) for array in (cells.lai, cells.fpar)]
     of_cells = driver.ndvi(driver.toa(cells.reflectance))
     limits = np.array([(each.min(), each.max()) for each in (cells.lai, cells.fpar, of_cells)])

@@ -1,20 +1,29 @@
 """The page: what its text holds, and what a browser shows of it."""
 
 import asyncio
+import base64
 import json
 import re
 import tomllib
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from browser import CHROMIUM, opened
+from typer.testing import CliRunner
 
 import fifesim
+from fifesim.cli import app
 from fifesim.experiments import explorer
-from fifesim.experiments.explorer.page import explorer_page, page_data
+from fifesim.experiments.explorer import page
+from fifesim.experiments.explorer.page import explorer_page, packed, page_data, stepped
+from fifesim.experiments.explorer.settings import sweep_of
+from fifesim.experiments.scatter.shares import CURVATURE
+from fifesim.experiments.scatter.stages import STAGES
 from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.toml import write_scenario
 
 READY = "document.body?.classList.contains('ready')"
 in_a_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
@@ -188,3 +197,90 @@ def test_a_scale_has_three_numbers_and_room_for_them(page, tmp_path):
 
     for (low, high, _), found in zip(cases, looked_at(page, tmp_path, look), strict=True):
         assert 3 <= len(found) <= 7 and low <= min(found) and max(found) < high + 1e-6
+
+
+ARRAYS = {
+    "a": np.arange(5, dtype=np.uint8),
+    "b": np.array([[1, 256], [65535, 0]], np.uint16),
+    "c": np.array([0.1, np.nan], np.float32),
+    "d": np.array([[np.pi]]),
+}
+
+
+def test_arrays_come_back():
+    text, places = packed(ARRAYS)
+    whole = zlib.decompress(base64.b64decode(text))
+    for name, array in ARRAYS.items():
+        place = places[name]
+        assert place["start"] % 8 == 0 and tuple(place["shape"]) == array.shape
+        part = np.frombuffer(whole[place["start"] :][: array.nbytes], np.uint8)
+        if place["kind"] == "u2":
+            found = part[: array.size] + 256 * part[array.size :].astype(np.uint16)
+        else:
+            found = np.frombuffer(part.tobytes(), f"<{place['kind']}")
+        np.testing.assert_array_equal(found.reshape(array.shape), array)
+
+
+@pytest.mark.parametrize(("kind", "levels"), [("u1", 254), ("u2", 65534)])
+def test_steps_are_half_a_step_wrong_at_most(kind, levels):
+    values = np.random.default_rng(5).normal(size=500)
+    values[3] = np.nan
+    codes, low, step = stepped(values, kind)
+    assert codes.dtype == kind and codes[3] == 0 and codes.max() == levels + 1
+    found = np.where(codes, low + (codes - 1.0) * step, np.nan)
+    np.testing.assert_allclose(found, values, atol=step / 2 * (1 + 1e-9))
+    assert step == pytest.approx(np.ptp(values[np.isfinite(values)]) / levels)
+    codes, low, _ = stepped(np.full(3, 2.5), kind)
+    assert codes.tolist() == [1, 1, 1] and low == 2.5
+    with pytest.raises(ValueError, match="x is of type int64: packed takes uint8"):
+        packed({"x": np.arange(3)})
+
+
+def test_sliders_begin_at_the_scenario_and_say_its_values(sweep):
+    arp, haze, sza, instrument, registration = page.slider_words(sweep)
+    assert arp["start"] == 0 and "leaf area is correlated up to 8 m, arp 0.15" in arp["texts"][0]
+    assert haze["marks"] == ["45 km"] and haze["start"] == 0
+    assert sza["texts"][0] == "28.5° from overhead"
+    assert instrument["marks"] == ["HRV", "TM"]
+    assert instrument["texts"] == [
+        "SPOT-1 HRV 1, multispectral mode, 20 m; blur: assumed ± 0.08",
+        "Landsat-5 Thematic Mapper, 30 m; blur: in-flight ± 0.12",
+    ]
+    assert registration["marks"] == ["0", "½"] and registration["texts"] == ["none", "0.50 pixel"]
+
+
+def test_words_of_a_slider_follow_what_varies(sweep, small):
+    assert set(page.STAGE_WORDS) == {CURVATURE, *STAGES}
+    arp, haze, *_ = page.slider_words(replace(sweep, arps=(None,), hazes=(None,)))
+    assert arp["texts"] == ["as in the map"] and haze["texts"] == ["without haze"]
+    values = small.model_dump(exclude_unset=True) | {"atmosphere": {"aot": 0.15}}
+    haze = page.slider_words(sweep_of(parse_scenario(values)))[1]
+    assert haze["name"] == "Haze" and haze["texts"][haze["start"]] == "aerosol optical thickness 0.15"
+
+
+@pytest.fixture
+def quick(sweep, monkeypatch):
+    """Four settings in the place of all."""
+    few = type(sweep)(**{**vars(sweep), "arps": sweep.arps[:1], "szas": sweep.szas[:1], "instruments": ("TM",)})
+    monkeypatch.setattr(page, "sweep_of", lambda scenario: few)
+
+
+def test_command_writes_one_page_and_replaces_none(quick, small, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text(write_scenario(small.complete()))
+    made = CliRunner().invoke(app, ["explore", "mine.toml", "-o", "pages/mine.html"])
+    assert made.exit_code == 0, made.output
+    assert re.fullmatch(r"pages/mine.html\ndone in .*: open pages/mine.html in a browser\n", made.output)
+    assert [path.name for path in (tmp_path / "pages").iterdir()] == ["mine.html"]
+    again = CliRunner().invoke(app, ["explore", "mine.toml", "-o", "pages/mine.html"])
+    assert again.exit_code == 2 and "--overwrite" in again.output
+    first = (tmp_path / "pages" / "mine.html").read_bytes()
+    assert CliRunner().invoke(app, ["explore", "mine.toml", "-o", "pages/mine.html", "--overwrite"]).exit_code == 0
+    assert (tmp_path / "pages" / "mine.html").read_bytes() == first
+
+
+def test_what_cannot_be_written_is_named(tmp_path):
+    with pytest.raises(ValueError, match="is a folder, and explore writes one page"):
+        fifesim.explore(path=tmp_path)
+    with pytest.raises(TypeError, match="read_scenario"):
+        fifesim.explore("mine.toml", tmp_path / "explore.html")

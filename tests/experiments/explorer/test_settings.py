@@ -59,12 +59,6 @@ def test_instruments_fit_the_ground_and_its_cells(small):
     assert found.instruments == ("TM", "MSS", "MODIS") and found.scenario.geobox().shape == (120, 120)
 
 
-def test_optics_of_a_band_keep_other_instruments_out(small):
-    values = small.model_dump(exclude_unset=True)
-    values["ground"] |= {"leaf_reflectance": {"TM3": 0.1, "TM4": 0.5}, "leaf_transmittance": {"TM3": 0.05, "TM4": 0.4}}
-    assert sweep_of(parse_scenario(values)).instruments == ("TM",)
-
-
 def test_a_map_has_no_patches_to_vary_and_clear_air_no_haze(tmp_path):
     lai = fifesim.lai_scene(
         fifesim.grid_at("EPSG:26914", 707970.0, 4331220.0, 400.0, 400.0, 10.0), "burned-grazed", arp=0.24, seed=1
@@ -79,20 +73,21 @@ def test_a_map_has_no_patches_to_vary_and_clear_air_no_haze(tmp_path):
     np.testing.assert_array_equal(sweep.at(sweep.settings[0]).ground.arp, own.ground.arp)
 
 
-def test_haze_given_by_optical_thickness_stays_so(small):
-    sweep = sweep_of(parse_scenario(small.model_dump(exclude_unset=True) | {"atmosphere": {"aot": 0.15}}))
-    assert sweep.haze == "aot" and sweep.hazes == (0.05, 0.15, 0.5)
-    assert sweep.at(replace(sweep.settings[0], haze=0.5)).atmosphere.aot == 0.5
-
-
-def test_ground_of_few_pixels_is_refused():
-    with pytest.raises(ValueError, match="fewer than 12 x 12 pixels of 30 m"):
-        sweep_of(parse_scenario(FLAT | {"grid": SITE | {"width": 300.0}}))
-
-
 def test_a_landscape_of_many_stages_has_fewer_settings():
     sweep = sweep_of(fifesim.default_scenario())
     assert sweep.shape == (3, 2, 2, 2, 4)
     assert sweep.hazes == (10.0, 45.0) and sweep.szas[1] == 60.0 and sweep.instruments == ("MSI", "TM")
     hills = sweep_of(fifesim.Scenario())
     assert hills.shape == (3, 3, 3, 4, 4)
+
+
+def test_ground_and_air_decide_what_varies(small):
+    """Optics by band keep other instruments out, and haze by optical thickness stays so."""
+    values = small.model_dump(exclude_unset=True)
+    sweep = sweep_of(parse_scenario(values | {"atmosphere": {"aot": 0.15}}))
+    assert sweep.haze == "aot" and sweep.hazes == (0.05, 0.15, 0.5)
+    assert sweep.at(replace(sweep.settings[0], haze=0.5)).atmosphere.aot == 0.5
+    values["ground"] |= {"leaf_reflectance": {"TM3": 0.1, "TM4": 0.5}, "leaf_transmittance": {"TM3": 0.05, "TM4": 0.4}}
+    assert sweep_of(parse_scenario(values)).instruments == ("TM",)
+    with pytest.raises(ValueError, match="fewer than 12 x 12 pixels of 30 m"):
+        sweep_of(parse_scenario(FLAT | {"grid": SITE | {"width": 300.0}}))

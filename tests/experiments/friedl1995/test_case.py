@@ -2,7 +2,10 @@
 
 import pytest
 
-from fifesim.experiments.friedl1995.case import Case, case_of
+from fifesim.experiments.friedl1995 import case
+from fifesim.experiments.friedl1995.case import ALIGNED, NATIVE, READINGS, Case, beside, case_of
+from fifesim.ground.landscape.distribution import lai_distribution, treatments
+from fifesim.sensor.description.instruments import instrument, read_instrument
 
 
 def test_scenario_says_what_the_ground_is_whatever_the_defaults_are():
@@ -25,20 +28,6 @@ def test_inputs_of_a_readers_own_are_in_the_scenario(folders):
     assert shares.ground.background_spectra == {"soil_dry": 0.4, "shade": 0.6} and not shares.ground.background
 
 
-def test_another_sensor_brings_its_bands_pixels_and_a_scene_that_holds_some():
-    case = case_of(sensor="MODIS")
-    assert case.bands == ("MODIS1", "MODIS2") and case.pixel == 250
-    assert case.cells == 900 and case_of(sensor="OLI").cells == 333
-
-
-def test_corner_of_the_scenes_is_where_it_is_asked_for():
-    """Three kilometres and a third from that of the site by default."""
-    box = case_of().grid.boundingbox
-    assert (box.left, box.top) == pytest.approx((704970 + 10000 / 3, 4334220 - 10000 / 3))
-    box = case_of(west=706000.0, north=4333000.0).grid.boundingbox
-    assert (box.left, box.top) == (706000.0, 4333000.0)
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -47,7 +36,8 @@ def test_corner_of_the_scenes_is_where_it_is_asked_for():
         ({"dem": "nowhere.tif"}, "a raster file of elevation"),
         ({"sensor": "SuperDove"}, "smaller than a ground cell"),
         ({"sensor": "NOPE"}, "unknown instrument"),
-        ({"reading": "mine"}, "must be one of native"),
+        ({"reading": "mine"}, "must be one of native, aligned, narrow"),
+        ({"reading": "narrow", "sensor": "OLI"}, "for OLI use native, aligned, offset"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_is_computed(options, said):
@@ -55,5 +45,125 @@ def test_what_cannot_be_is_refused_before_anything_is_computed(options, said):
         case_of(**options)
 
 
-def test_level_ground_has_no_elevation():
-    assert Case(cells=90).land() == (None, None)
+def test_another_sensor_or_corner_makes_other_scenes():
+    """A coarse sensor has a scene that holds some of its pixels; the corner is a third of 10 km from the site's."""
+    case = case_of(sensor="MODIS")
+    assert (case.bands, case.pixel, case.cells) == (("MODIS1", "MODIS2"), 250, 900) and case_of(
+        sensor="OLI"
+    ).cells == 333
+    for options, corner in (
+        ({}, (704970 + 10000 / 3, 4334220 - 10000 / 3)),
+        ({"west": 706000.0, "north": 4333000.0}, (706000.0, 4333000.0)),
+    ):
+        box = case_of(**options).grid.boundingbox
+        assert (box.left, box.top) == pytest.approx(corner)
+    assert Case(cells=90).light() is None
+
+
+BANDS = ("TM3", "TM4")
+
+
+def test_samples_of_a_folder_are_the_densities_with_their_modes(folders):
+    found = case.densities_of(folders["densities"])
+    assert list(found) == treatments()
+    density = lai_distribution(found["burned-grazed"])
+    middle, low, high = density.pdf([1.1, 0.7, 1.5])
+    assert middle < 0.8 * min(low, high)
+
+
+def test_missing_density_is_named(folders, tmp_path):
+    (tmp_path / "burned-grazed.csv").write_text((folders["densities"] / "burned-grazed.csv").read_text())
+    (tmp_path / "unburned-ungrazed.csv").write_text((folders["densities"] / "burned-grazed.csv").read_text())
+    with pytest.raises(
+        ValueError, match=r"lacks a file of burned-ungrazed: Table 2 needs burned-grazed\.csv, burned-un"
+    ):
+        case.densities_of(tmp_path)
+    with pytest.raises(ValueError, match="lacks an entry of burned-ungrazed and unburned-ungrazed"):
+        case.densities_of({"burned-grazed": "burned-grazed"})
+    with pytest.raises(ValueError, match="unknown treatment 'grazed'"):
+        case.densities_of(case.densities_of(None) | {"grazed": "burned-grazed"})
+    with pytest.raises(ValueError, match=r"is no folder: it holds burned-grazed\.csv"):
+        case.densities_of(tmp_path / "nowhere")
+
+
+def test_optics_and_background_of_a_file(folders):
+    optics = case.optics_by_band(folders["optics"], BANDS, case.OPTICS, "optics")
+    assert optics == {"TM3": (0.09, 0.05), "TM4": (0.42, 0.4)}
+    assert case.background_of(folders["background"], BANDS) == {"TM3": 0.10, "TM4": 0.16}
+    assert case.background_of("soil_dry:0.4 + shade:0.6", BANDS) == {"soil_dry": 0.4, "shade": 0.6}
+    assert case.optics_by_band(None, BANDS, case.OPTICS, "optics") is None
+    assert case.background_of(None, BANDS) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("band,leaf_reflectance,leaf_transmittance\nTM3,0.1,0.1\n", "no line for band TM4: it has TM3"),
+        ("band,reflectance\nTM3,0.1\n", "lacks the column leaf_reflectance and leaf_transmittance"),
+        ("band,leaf_reflectance,leaf_transmittance\nTM3,x,0.1\nTM4,0.4,0.4\n", "band 'TM3' has no number"),
+        ("band,leaf_reflectance,leaf_transmittance\nTM3,0.7,0.4\nTM4,0.4,0.4\n", "add up to more than 1"),
+        ("", "optics file mine.csv"),
+    ],
+)
+def test_optics_that_are_not_right_are_one_line(tmp_path, text, said):
+    (tmp_path / "mine.csv").write_text(text)
+    with pytest.raises(ValueError, match=said) as told:
+        case.optics_by_band(tmp_path / "mine.csv", BANDS, case.OPTICS, "optics")
+    assert "\n" not in str(told.value) and len(str(told.value)) < 500
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("nofile.csv", "there is no background file nofile.csv"),
+        ("soil:0.5+shade:0.5", "no spectrum 'soil'"),
+        ("soil_dry:half", "type shares such as"),
+        ({"TM3": 0.1}, "no line for band TM4"),
+        ({"TM3": 0.1, "TM4": 1.5}, "must be in"),
+    ],
+)
+def test_background_that_is_not_right_is_named(given, said):
+    with pytest.raises(ValueError, match=said):
+        case.background_of(given, BANDS)
+
+
+def test_sensor_without_a_near_infrared_band_is_refused(tmp_path):
+    text = "name = 'CAMERA'\naltitude = 500000.0\ngsd = 30.0\nbits = 10\n"
+    text += "[[bands]]\nname = 'red'\ncenter = 0.65\nwidth = 0.04\n"
+    (tmp_path / "camera.toml").write_text(text)
+    with pytest.raises(ValueError, match="no near infrared band"):
+        case.sensor_of(str(tmp_path / "camera.toml"))
+    assert case.sensor_of("OLI")[1] == ("OLI4", "OLI5")
+
+
+PAPER = instrument("TM", "paper")
+OTHER = [name for name, reading in READINGS.items() if reading.other_response]
+
+
+def test_blur_is_that_measured_in_flight():
+    """Half of the modulation passes at half of the frequency that the field of view is a half period of."""
+    for name, metres in (("blur-40.8", 40.8), ("blur-48.6", 48.6)):
+        spread = READINGS[name].instrument(PAPER).line_spread
+        assert float(spread.mtf(1 / (2 * metres))) == pytest.approx(0.5, abs=1e-4)
+    assert READINGS["narrow"].instrument(PAPER).line_spread.width == pytest.approx(7 / 9 * 30.32, abs=0.005)
+
+
+@pytest.mark.parametrize("name", OTHER)
+def test_instrument_file_of_a_reading_is_that_instrument(name, tmp_path):
+    reading, tm = READINGS[name], PAPER
+    (tmp_path / "own.toml").write_text(reading.instrument_file(tm.altitude), encoding="utf-8")
+    read, made = read_instrument(tmp_path / "own.toml"), reading.instrument(tm)
+    assert read.lsf == made.lsf != tm.lsf
+    assert read.bands == made.bands and read.bits == made.bits and read.ground_interval == made.ground_interval
+    # Its source is no longer the paper.
+    assert read.sources["lsf"] == name and name in read.references
+
+
+def test_aligned_reading_stands_beside_every_other():
+    assert all(beside(reading) == [reading, ALIGNED] for reading in READINGS.values() if reading != ALIGNED)
+    assert beside(ALIGNED) == [ALIGNED, NATIVE]
+
+
+def test_words_of_a_reading_are_those_of_the_instrument():
+    assert all(each.in_words(43e-6 * 705000, 30.0) == each.text for each in READINGS.values())
+    assert "every 21.900 m" in NATIVE.in_words(21.9, 20.0) and "the 20 m blocks" in NATIVE.in_words(21.9, 20.0)

@@ -1,9 +1,18 @@
 """What the page concludes follows from its figures."""
 
+import re
+
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
+from typer.testing import CliRunner
 
-from fifesim.experiments.friedl1995 import report
+from fifesim.cli import app
+from fifesim.experiments.friedl1995 import effects, report
+from fifesim.experiments.friedl1995 import report as reproduction
+from fifesim.experiments.friedl1995 import table as friedl1995_table
+from fifesim.experiments.friedl1995.case import PASSAGES, case_of
+from fifesim.scenario.scenario import read_scenario
 
 
 def row(name, r2, slope, growth, *, dem="flat", lowest=0.45):
@@ -53,16 +62,6 @@ def test_blur_that_has_the_papers_slopes_is_not_told_from_drift(readings, on_blu
     assert on_blur().endswith("these figures do not tell blur from drift.")
 
 
-def test_growth_like_the_papers_leaves_only_the_height_of_slopes(readings, on_blur):
-    readings.loc[readings["name"] == "blur-48.6", "growth"] = 1.27
-    assert on_blur().endswith("against blur, and no more.")
-
-
-def test_without_blur_nothing_is_said_of_it(readings):
-    few = readings[~readings["name"].str.startswith("blur")]
-    assert report.conclusions({"readings": few, "sensitivity": SENSITIVITY})["blurred"] is None
-
-
 def test_displacement_is_told_apart_where_it_differs(readings, sentence):
     def told():
         found = report.conclusions({"readings": readings, "sensitivity": SENSITIVITY})
@@ -84,8 +83,115 @@ def test_relief_is_told_by_the_row_that_it_lowers_most(readings, sentence):
     assert again["hills"]["native"]["lai_r2_rms"] == 0.08 and again["level"]["native"]["lai_r2_rms"] == 0.05
 
 
-def test_relief_that_changes_little_is_not_ruled_out(readings, sentence):
+def test_words_follow_the_figures_of_relief_and_blur(readings, on_blur, sentence):
     readings.loc[5, "lai_r2_rms"] = 0.055
     assert "too little to be told" in sentence("on_relief", report.on_relief(readings)["worse"], report._ALIKE)
     readings.loc[5, "lai_r2_rms"] = 0.01
     assert "nearer to the paper's" in sentence("on_relief", report.on_relief(readings)["worse"], report._ALIKE)
+    readings.loc[readings["name"] == "blur-48.6", "growth"] = 1.27
+    assert on_blur().endswith("against blur, and no more.")
+    few = readings[~readings["name"].str.startswith("blur")]
+    assert report.conclusions({"readings": few, "sensitivity": SENSITIVITY})["blurred"] is None
+
+
+TABLES = {"table2.csv", "readings.csv", "sizes.csv", "sensitivity.csv"}
+
+
+@pytest.fixture
+def quick(monkeypatch, tmp_path):
+    """The command on scenes of 10 x 10 pixels."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(reproduction, "_DPI", 40)
+
+    def call(*arguments):
+        return CliRunner().invoke(app, ["reproduce", "--cells", "90", "--realisations", "1", *map(str, arguments)])
+
+    return call
+
+
+@pytest.fixture
+def prepared(quick, monkeypatch, effect_tables, small):
+    """The same, whose numbers are there already; the cases that they were asked for."""
+    asked = []
+
+    def ready(case, *arguments, **options):
+        asked.append(case)
+        names = {"native": small, "aligned": small.isel(reading=[1, 0])}
+        return names[case.reading.name]
+
+    monkeypatch.setattr(reproduction, "reproduce_case", ready)
+    for name, table in effect_tables.items():
+        monkeypatch.setattr(effects, name, lambda *arguments, table=table, **options: table)
+    quick.asked = asked
+    return quick
+
+
+def test_command_writes_tables_figures_scenarios_and_page(prepared, tmp_path):
+    result = prepared("-o", "out")
+    assert result.exit_code == 0, result.output
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    pictures = set(reproduction.pictures_of(case_of()).values())
+    assert names == TABLES | pictures | {"scenarios", "report.html"}
+    assert {"figure3.png", "figure9.png", "figure9_aligned.png"} <= pictures and len(pictures) == 11
+    table = pd.read_csv(tmp_path / "out" / "table2.csv")
+    wanted = {f"{before}{name}" for before in ("", "paper_", "aligned_") for name in friedl1995_table.COEFFICIENTS}
+    assert len(table) == 18 and wanted <= set(table.columns)
+    assert (table["aligned_r2"] > table["r2"]).mean() > 0.5
+    scenes = sorted((tmp_path / "out" / "scenarios").iterdir())
+    assert len(scenes) == 9 and all([path.name for path in scene.iterdir()] == ["scenario.toml"] for scene in scenes)
+    assert read_scenario(scenes[0] / "scenario.toml").ground.seed == 1995
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == 1 + 11
+    assert "http" not in page.replace("http-equiv", "") and "nan" not in page.split("base64")[0].lower()
+    # Every reading has a row of R2 and slopes, and the aligned one a column of Table 2.
+    assert "Drift or blur?" in page and "slope: native</th>" in page and "aligned</th>" in page
+    # The drift is shown together with the passages of the paper that speak against it.
+    assert "The text of the paper suggests aligned pixels: " in page
+    assert all(f"“{passage}” (section {section})" in page for section, passage in PASSAGES.items())
+    assert prepared("-o", "out").exit_code == 2
+
+
+def test_page_says_the_reading_the_inputs_and_what_is_fitted(prepared, tmp_path, folders, monkeypatch):
+    monkeypatch.setattr(reproduction.figures, "plot_reproduction", lambda *arguments, **options: Figure((1, 1)))
+    result = prepared("-o", "own", "--reading", "aligned", "--dem", "flint-hills", *given(folders))
+    assert result.exit_code == 0, result.output
+    page = re.sub(r"\s+", " ", (tmp_path / "own" / "report.html").read_text())
+    assert "Table 1 is interpreted as <em>aligned</em>" in page and "also shown for <em>native</em>" in page
+    assert "The ground is the synthetic Flint Hills." in page
+    assert "0 of the values below were fitted to the 54" in page
+    assert "given by you" in page and "--reading aligned --dem flint-hills --densities" in page
+    (case,) = prepared.asked
+    assert case.optics == {"TM3": (0.09, 0.05), "TM4": (0.42, 0.40)} and case.cells == 90
+    keys = read_scenario(tmp_path / "own" / "scenarios" / "burned-ungrazed-0.05" / "scenario.toml")
+    assert keys.ground.distribution == str(folders["densities"] / "burned-ungrazed.csv")
+    assert keys.ground.background == {"TM3": 0.1, "TM4": 0.16} and keys.terrain.dem == "flint-hills"
+
+
+def given(folders):
+    return [word for name, path in folders.items() for word in (f"--{name}", str(path))]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--cells", 50), "at least 90, 10 pixels"),
+        (("--realisations", 0), "at least 1"),
+        (("--seed", -1), "seed must be"),
+        (("--reading", "mine"), "must be one of native, aligned"),
+        (("--densities", "."), "lacks a file of burned-grazed and"),
+        (("--optics", "mine.csv"), "there is no optics file mine.csv"),
+        (("--sensor", "OLI", "--background", "soil.csv"), "no background file soil.csv"),
+        (("--sensor", "NOPE"), "unknown instrument"),
+        (("--dem", "hills.tif"), "a raster file of elevation"),
+    ],
+)
+def test_mistake_is_one_line_and_leaves_nothing(quick, tmp_path, arguments, said):
+    result = quick("-o", "out", *arguments)
+    assert result.exit_code == 2
+    assert said in result.stderr and len(result.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_line_of_the_command_makes_the_same_again():
+    line = reproduction.command({"reading": "native", "dem": "my hills.tif", "optics": None, "cells": 333})
+    assert line == "fifesim reproduce --dem 'my hills.tif' --cells 333"

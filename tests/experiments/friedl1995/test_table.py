@@ -1,12 +1,19 @@
 """Table 2 over realisations, beside the paper's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
 
+from fifesim.chain.setup import image_of
 from fifesim.experiments.friedl1995 import effects
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import READINGS, Case
+from fifesim.experiments.friedl1995.table import cells_of, paired, periodic_scene
+from fifesim.grids import grid as grids
+from fifesim.ground.landscape.distribution import lai_distribution
+from fifesim.scenario.simulation import simulate
 
 
 @pytest.fixture(scope="module")
@@ -21,14 +28,6 @@ def test_line_agrees_with_scipy():
     for k in range(4):
         theirs = stats.linregress(x[k], y[k])
         np.testing.assert_allclose(found[k], [theirs.intercept, theirs.slope, theirs.rvalue**2], rtol=1e-11)
-
-
-def test_samples_are_of_different_pixels():
-    pixels = np.arange(3 * 500.0).reshape(3, 500)
-    samples = friedl1995_table.draw(pixels, 200, [1, 2], 7)
-    assert samples.shape == (3, 7, 200)
-    assert all(len(set(row)) == 200 for row in samples[0])
-    np.testing.assert_array_equal(samples[1], samples[0] + 500)
 
 
 def test_table_2_agrees_with_the_paper(tables):
@@ -96,10 +95,61 @@ def test_agreement_counts_in_deviations_and_finds_a_common_factor(tables):
     assert found["lai_slope_rms"] == pytest.approx(0.5) and found["fpar_slope_largest"] == pytest.approx(0.5)
 
 
-def test_noise_and_range_stand_beside_the_papers(found):
+SCENE = ("burned-ungrazed", 0.24, 3)
+
+
+@pytest.mark.parametrize("dem", ["flat", "flint-hills"])
+def test_cells_are_those_of_the_labelled_ground(dem):
+    """Exact ranks: the quantiles of the cells are those of the distribution, and treatments share one field."""
+    case = Case(cells=90, dem=dem)
+    cells, scene = cells_of(case, *SCENE, case.light()), simulate(case.scenario(*SCENE))["scene"]
+    np.testing.assert_array_equal(cells.lai, scene["lai"])
+    np.testing.assert_array_equal(cells.reflectance, scene["surface_reflectance"])
+    ranks = (np.arange(8100) + 0.5) / 8100
+    np.testing.assert_array_equal(np.sort(cells.lai.ravel()), lai_distribution(SCENE[0]).ppf(ranks))
+    other = periodic_scene("burned-grazed", 0.24, 3, (90, 90))
+    np.testing.assert_array_equal(np.argsort(other, axis=None), np.argsort(cells.lai, axis=None))
+    assert (periodic_scene("burned-grazed", 0.24, 6, (90, 90)) != other).any()
+
+
+def test_native_pixels_drift_from_the_truth_by_the_interval():
+    """43 microradian x 705 km = 30.315 m (Table 1): 0.315 m a pixel."""
+    case = Case(cells=180)
+    run = simulate(case.scenario(*SCENE))
+    native, blocks = (grids.geobox(run[node][name]) for node, name in (("image", "dn"), ("truth", "lai")))
+    assert grids.cell_size(native) == pytest.approx((30.315, 30.315), rel=1e-12)
+    drift = (native.affine * (15.5, 15.5))[0] - (blocks.affine * (15.5, 15.5))[0]
+    assert drift == pytest.approx(15.5 * 0.315, rel=1e-6)
+    assert case.drift == pytest.approx((native.shape.x - 1) * 0.315, rel=1e-9)
+    assert Case(cells=180, reading=READINGS["aligned"]).drift == 0
+
+
+def test_offset_pixels_see_the_ground_to_the_south_east():
+    """Two cells each way: the aligned image of the scene without its first two rows and columns."""
+    case, scene = Case(cells=180, reading=READINGS["offset"]), Case(cells=180, reading=READINGS["aligned"])
+    reflectance = simulate(case.scenario(*SCENE))["scene"]["surface_reflectance"].compute()
+    moved = image_of(case.setup, reflectance)
+    aligned = image_of(replace(scene.setup, onto=None), reflectance[:, 2:, 2:])
+    # Sums of another window round otherwise, which may carry a value over the middle of two counts.
+    off = abs(moved[:, :19, :19].values.astype(int) - aligned[:, :19, :19].values)
+    assert off.max() <= 1 and (off > 0).mean() < 0.005
+
+
+def test_pixels_pair_by_row_and_column_without_what_lacks_data():
+    truth = np.arange(12.0).reshape(3, 4)
+    truth[0, 0] = np.nan
+    values = paired(truth, 2 * np.arange(16.0).reshape(4, 4)[:, :3])
+    np.testing.assert_array_equal(values, [[1, 2, 4, 5, 6, 8, 9, 10], [2, 4, 8, 10, 12, 16, 18, 20]])
+
+
+def test_noise_range_and_samples_are_as_the_papers(found):
     """REN grows with arp as in the paper, and the range kept from about 15 % to about three quarters."""
     text = friedl1995_table.text_table(found.sel(reading="native")).set_index(["quantity", "variable", "arp"])
     assert text.loc[("ren", "lai", 0.24), "paper"] == 0.31 and text.loc[("range_kept", "ndvi", 0.24), "paper"] == 0.75
     assert text.loc[("ren", "lai", 0.24), "value"] > 2 * text.loc[("ren", "lai", 0.05), "value"]
     kept = text.loc["range_kept"]["value"].unstack("arp")
     assert (kept[0.05] < 0.25).all() and (kept[0.24] > 0.6).all()
+    pixels = np.arange(3 * 500.0).reshape(3, 500)
+    samples = friedl1995_table.draw(pixels, 200, [1, 2], 7)
+    assert samples.shape == (3, 7, 200) and all(len(set(row)) == 200 for row in samples[0])
+    np.testing.assert_array_equal(samples[1], samples[0] + 500)

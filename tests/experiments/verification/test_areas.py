@@ -8,6 +8,15 @@ import fifesim
 from fifesim.analysis import scaling
 from fifesim.cli import app
 from fifesim.experiments.verification import areas, canopy, deviations
+from fifesim.experiments.verification.deviations import (
+    HEADING,
+    Deviation,
+    by_stage,
+    deviation_line,
+    deviation_summary,
+    largest,
+    rms_percent,
+)
 from fifesim.ground.canopy import layers
 from fifesim.ground.terrain import horizon, spline
 from fifesim.sensor.response import calibration, scan
@@ -81,3 +90,36 @@ def test_python_gets_what_the_command_prints(only):
     assert [each.what for each in found] == [each.what for each in areas.deviations()]
     assert all(each.area == "sensor" and each.within for each in found)
     assert len(run().stdout.splitlines()) == len(found) + 4
+
+
+WITHIN = Deviation("terrain", "slope of planes", 1e-12, 1e-9, "degree", "plane")
+BEYOND = Deviation("canopy", "reciprocity", 0.2, 0.1, "1", "theory")
+
+
+def test_numbers_stand_below_their_headings():
+    for word, text in (("compared", "slope of planes"), ("with", "plane")):
+        assert deviation_line(WITHIN).rindex(text) == HEADING.index(word)
+    assert "EXCEEDED" in deviation_line(BEYOND) and "EXCEEDED" not in deviation_line(WITHIN)
+
+
+def test_summary_names_what_is_beyond():
+    assert deviation_summary([WITHIN, WITHIN]) == "2 checks, all within their bounds"
+    assert deviation_summary([WITHIN, BEYOND]) == "2 checks, 1 beyond their bounds: canopy: reciprocity"
+
+
+def test_every_stage_has_one_heading():
+    sensor = Deviation("sensor", "counts", 0.0, 0.5, "count", "table")
+    lines = list(by_stage([BEYOND, WITHIN, sensor]))
+    assert [text.strip() for text in lines if text.startswith("\n")] == ["Ground", "Sensor"]
+    assert lines[1:3] == [deviation_line(BEYOND), deviation_line(WITHIN)] and lines[4:] == [deviation_line(sensor)]
+
+
+def test_what_is_not_a_number_is_beyond_its_bound():
+    assert np.isnan(largest([1.0, np.nan], 1.0))
+    assert not Deviation("canopy", "anything", np.nan, 1.0, "1", "theory").within
+    assert Deviation("canopy", "anything", 1.0, 1.0, "1", "theory").within
+
+
+def test_deviations_are_the_largest_and_the_mean():
+    assert largest([1.0, 4.0], [2.0, 2.0]) == 2.0 and largest([1.0, 4.0], [2.0, 4.0], relative=True) == 0.5
+    assert rms_percent([1.03, 0.96], 1.0) == pytest.approx(np.sqrt((9 + 16) / 2), rel=1e-12)

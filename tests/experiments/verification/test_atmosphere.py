@@ -17,14 +17,6 @@ from fifesim.experiments.verification import areas, atmosphere
 
 DATA = Path(__file__).parents[2] / "data"
 
-# Many cases of successive orders; their engine has tests of its own.
-SLOW = (atmosphere._light, atmosphere._successive_orders)
-
-
-@pytest.mark.parametrize("check", [each for each in atmosphere.CHECKS if each not in SLOW])
-def test_all_is_well(check):
-    assert exceeded(check) == []
-
 
 def test_successive_orders_without_polarization_are_scalar_6s(monkeypatch):
     """Scalar 6S is not always consistent in itself: its table has fewer cases."""
