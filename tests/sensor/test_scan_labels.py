@@ -15,7 +15,6 @@ from fifesim.grids import cf, directions, projection
 from fifesim.grids import grid as grids
 from fifesim.sensor.description.instrument_file import Noise, Scan
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.description.spatial_response import BoxcarResponse
 from fifesim.sensor.response.scan import growth, place_beside, view_components, view_from_ground
 from fifesim.sensor.scan_labels import at_pixels, latitude_longitude, seen_alike
 
@@ -251,22 +250,6 @@ def test_noise_goes_by_lines_of_the_scan():
     assert float(image.mean("sample").std()) > 0.2
 
 
-def test_wide_scans_see_wider():
-    """At 40 degrees a footprint covers 1.37 x 2.0 times as much: the variance of white cells falls in proportion."""
-    wide = replace(PAPER, altitude=833e3, scan=Scan("whiskbroom", max_angle=55.0), sources=SCANS)
-    # 705 km and 833 km widen the footprint alike.
-    variance = {}
-    for offset in (0.0, 735e3):
-        image = fifesim.sense_swath(scene((360, 360)), wide, quantise=False, nadir_offset=offset, view_tolerance=180)
-        variance[offset] = float(image.sel(band="TM3").var())
-        angle = float(image["vza"].mean())
-    scan_angle = np.degrees(np.arcsin(np.sin(np.radians(angle)) * 6371 / (6371 + 833)))
-    along, across = growth(scan_angle, 833e3)
-    assert 38 < scan_angle < 42
-    # 300 pixels in the wide image: a standard error of 8 %, and neighbours overlap a little.
-    assert variance[0.0] / variance[735e3] == pytest.approx(float(along * across), rel=0.3)
-
-
 def test_a_scene_that_is_not_scanned_is_named():
     narrow = replace(PAPER, scan=Scan("whiskbroom", max_angle=7.7), sources=SCANS)
     with pytest.raises(ValueError, match="does not see the scene"):
@@ -287,17 +270,6 @@ def test_lines_and_samples_are_all_those_whose_centres_lie_in_the_scene():
         centres = (np.arange(-10_000, 10_000) + 0.5) * step
         within = np.flatnonzero((centres >= place.min()) & (centres <= place.max())) - 10_000
         np.testing.assert_array_equal(image[name], within)
-
-
-def test_bands_with_other_line_spreads_are_seen_each_by_its_own():
-    wide = replace(PAPER.bands[3], lsf=BoxcarResponse("boxcar", width=120 / 705e3))
-    mixed, alone = replace(PAPER, bands=(*PAPER.bands[:3], wide, *PAPER.bands[4:])), replace(PAPER, lsf=wide.lsf)
-    options = {"quantise": False, "min_valid": 0.5} | ASIDE
-    image = fifesim.sense_swath(scene().isel(band=[1, 0]), mixed, **options)
-    assert image["band"].values.tolist() == ["TM4", "TM3"]
-    both = fifesim.sense_swath(scene(), alone, **options)
-    np.testing.assert_array_equal(image.sel(band="TM4"), both.sel(band="TM4"))
-    np.testing.assert_array_equal(image.sel(band="TM3"), fifesim.sense_swath(scene(), PAPER, **options).sel(band="TM3"))
 
 
 def lit(reflectance=(0.05, 0.4)):
@@ -531,12 +503,7 @@ def test_zones_and_sweeps_are_the_same_in_any_chunks(chunks, monkeypatch):
     xr.testing.assert_identical(lazy.compute(), whole)
 
 
-def test_indices_and_files_of_a_sweep_keep_what_a_map_needs(tmp_path):
-    image = swept("VIIRS", 55)
-    image.to_netcdf(tmp_path / "sweep.nc")
-    with xr.open_dataarray(tmp_path / "sweep.nc", decode_coords="all") as back:
-        xr.testing.assert_equal(back, image)
-        assert back["deleted"].dtype == bool
+def test_indices_of_a_sweep_keep_what_a_map_needs():
     view = {"nadir_offset": OFFSETS["VIIRS"][55], "view_tolerance": 180, "min_valid": 0.0}
     pair = xr.concat(
         [wide_scene("VIIRS"), 2 * wide_scene("VIIRS").assign_coords(band=["I2"])], "band", combine_attrs="override"

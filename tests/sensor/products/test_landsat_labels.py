@@ -47,29 +47,6 @@ def by_hand(name, files, sza=None):
 
 
 @pytest.mark.parametrize("name", ["TM", "OLI"])
-def test_level_1_is_planetary_reflectance(folders, name):
-    folder, files = folders[name, 1]
-    scene = fifesim.open_landsat(folder)
-    expected, bands = by_hand(name, files)
-    np.testing.assert_allclose(scene.sel(band=bands), expected, rtol=0, atol=1e-7)
-    # No data, the largest number, and one pixel that is flagged.
-    assert np.isnan(expected).sum(axis=(1, 2)).tolist() == [3, 3]
-
-
-def test_level_2_is_surface_reflectance(folders):
-    folder, files = folders["OLI", 2]
-    scene = fifesim.open_landsat(folder)
-    assert scene.name == "surface_reflectance"
-    assert cf.attributes("surface_reflectance").items() <= scene.attrs.items()
-    assert scene["band"].values.tolist() == [f"OLI{number}" for number in range(1, 8)]
-    expected = files["4"] * 2.75e-5 - 0.2
-    found = scene.sel(band="OLI4").values
-    inside = np.isfinite(found)
-    np.testing.assert_allclose(found[inside], expected[inside], rtol=0, atol=1e-7)
-    assert np.count_nonzero(~inside) == 3
-
-
-@pytest.mark.parametrize("name", ["TM", "OLI"])
 def test_a_scene_goes_through_to_a_file(folders, name, tmp_path):
     """
     Level 1, the surface, NDVI and a GeoTIFF, each by hand.
@@ -100,15 +77,6 @@ def test_a_scene_goes_through_to_a_file(folders, name, tmp_path):
     assert again["time"].values == np.datetime64(times[name])
 
 
-def test_a_pixel_that_no_detector_saw_is_nan(copy):
-    path = copy / "LT05_L1TP_058014_20110312_20200823_02_T1_QA_RADSAT.TIF"
-    with rasterio.open(path, "r+") as file:
-        flags = file.read(1)
-        flags[7, 8] = 1 << 9
-        file.write(flags, 1)
-    assert np.isnan(fifesim.open_landsat(copy)[:, 7, 8]).all()
-
-
 def test_labels_are_those_of_the_packages_own_images(folders):
     folder, files = folders["TM", 1]
     with no_compute():
@@ -126,16 +94,6 @@ def test_labels_are_those_of_the_packages_own_images(folders):
     assert float(scene["earth_sun_distance"]) == 0.9936974
     np.testing.assert_array_equal(scene["quality"], files["quality"])
     assert "LT05_L1TP_058014_20110312_20200823_02_T1" in scene.attrs["history"]
-
-
-@pytest.mark.parametrize("form", ["json", "xml"])
-def test_any_form_of_the_metadata_opens(folders, form, tmp_path):
-    expected = fifesim.open_landsat(folders["TM", 1][0]).compute()
-    shutil.copytree(folders["TM", 1][0], tmp_path, dirs_exist_ok=True)
-    (text,) = tmp_path.glob("*_MTL.txt")
-    text.with_suffix(f".{form}").write_text(products.mtl(products.landsat_groups(products.TM), form))
-    text.unlink()
-    assert fifesim.open_landsat(tmp_path).identical(expected)
 
 
 @pytest.mark.parametrize("chunks", [None, {"y": 5, "x": 7}])

@@ -8,7 +8,6 @@ from lazy import check_place, no_compute
 
 import fifesim
 from fifesim.atmosphere import engines
-from fifesim.grids import cf
 
 BASELINES = {"03.01": 0.0, "04.00": -1000.0}
 
@@ -23,18 +22,6 @@ def folders(tmp_path_factory):
 def by_hand(files, names, size, offset):
     dn = np.array([files[name, size] for name in names]).astype(float)
     return np.where((dn == 0) | (dn == 65535), np.nan, (dn + offset) / 10000)
-
-
-@pytest.mark.parametrize("baseline", BASELINES)
-@pytest.mark.parametrize("level", [1, 2])
-def test_reflectance_is_that_of_the_baseline(folders, level, baseline):
-    path, files = folders[level, baseline]
-    scene = fifesim.open_sentinel2(path, 10)
-    expected = by_hand(files, ["B2", "B3", "B4", "B8"], 10, BASELINES[baseline])
-    np.testing.assert_allclose(scene, expected, rtol=0, atol=5e-8)
-    assert scene["band"].values.tolist() == ["MSI2", "MSI3", "MSI4", "MSI8"]
-    assert scene.name == {1: "toa_reflectance", 2: "surface_reflectance"}[level]
-    assert cf.attributes(scene.name).items() <= scene.attrs.items()
 
 
 @pytest.mark.parametrize("baseline", BASELINES)

@@ -10,7 +10,6 @@ from scipy.special import k0
 
 from fifesim.base.footprints import axis_operator, regularize
 from fifesim.base.line_spread import Boxcar
-from fifesim.ground.landscape.autoregression import streaming_field
 from fifesim.sensor.response.spatial import (
     CosineSpread,
     Difference,
@@ -150,33 +149,6 @@ def test_any_ratio_agrees_with_brute_force(pixel, width):
     np.testing.assert_allclose(regularize(scene, rows, columns), total, rtol=1e-6)
 
 
-@pytest.mark.parametrize("spread", [CosineSpread(30.32), GaussianSpread(36.0)], ids=["cosine", "gaussian"])
-@pytest.mark.parametrize("arp", [0.05, 0.15, 0.24])
-def test_variance_of_an_autoregressive_scene_agrees_with_theory(spread, arp):
-    """The scene's covariance summed over the footprint's autocorrelation; the standard error from the image's own."""
-    n, cell, pixel = 1100, 30 / 9, 30.315
-    scene = streaming_field(3, arp, 0, 0, (n, n))
-    count = 110
-    axis = columns_of(spread, n, cell, pixel=pixel, origin=100.0, n_pixels=count)
-    image = regularize(scene, axis, axis)
-    u = 2 * np.pi * np.fft.fftfreq(1024)
-    power = (1 - 2 * arp * (np.cos(u)[:, None] + np.cos(u))) ** -2.0
-    covariance = np.fft.ifft2(power / power.mean()).real
-    # Cells weigh as the footprint integrates over them, for all positions of a pixel on the cells.
-    phases = np.linspace(0, 1, 40, endpoint=False) * cell
-    correlation = np.zeros(1024)
-    for phase in phases:
-        weights = np.zeros(1024)
-        edges = (np.arange(-200, 201) * cell) - phase
-        weights[:400] = np.diff(spread.cumulative(edges))
-        correlation += np.fft.ifft(np.abs(np.fft.fft(weights)) ** 2).real / phases.size
-    expected = float(correlation @ covariance @ correlation)
-    lag = np.fft.ifft2(np.abs(np.fft.fft2(image - image.mean())) ** 2).real
-    error = expected * np.sqrt(2 * np.sum((lag / lag[0, 0]) ** 2)) / count
-    assert abs(image.var() - expected) < 3 * error
-    assert error < 0.1 * expected
-
-
 # ------------------------------------------------------------------------------------------ parts of a system
 
 
@@ -224,13 +196,6 @@ def test_product_passes_what_its_parts_pass():
         spread = SystemSpread((GaussianSpread(12.0), Boxcar(30.0), Boxcar(9.0), LowPass(0.05, 2)), truncation)
         assert spread.truncated_share <= truncation
         np.testing.assert_allclose(spread.mtf(frequency), spread.product(frequency), rtol=0, atol=4 * truncation)
-
-
-def test_widths_of_gaussians_add_by_their_squares():
-    both, one = SystemSpread((GaussianSpread(30.0), GaussianSpread(40.0)), 1e-6), GaussianSpread(50.0)
-    x = np.linspace(-70, 70, 29)
-    np.testing.assert_allclose(both.cumulative(x), one.cumulative(x), rtol=0, atol=1e-5)
-    np.testing.assert_allclose(both.mtf(1 / 60), one.mtf(1 / 60), rtol=0, atol=1e-5)
 
 
 def sampled_contrast(spread, frequency, recorded, cell=10.0, pixel=30.0):

@@ -1,12 +1,103 @@
-"""Composites of labelled images."""
+"""Vegetation indices of labelled reflectance, and composites of labelled images."""
 
 import numpy as np
 import pytest
 import xarray as xr
-from lazy import ODD_CHUNKS, check_place, in_chunks, no_compute
+from lazy import ODD_CHUNKS, check_place, check_raster_function, in_chunks, no_compute
 
 import fifesim
+from fifesim.analysis import indices
+from fifesim.analysis.index_labels import INDICES, reflectance_index, reflectance_ndvi
+from fifesim.base.bands import nearest_band
 from fifesim.grids import grid as grids
+from fifesim.sensor.description.instruments import instrument
+
+
+def reflectance(lai, wavelengths=(0.56, 0.66, 0.83, 1.65)):
+    bands = xr.DataArray(np.linspace(0.1, 0.6, len(wavelengths)), dims="band")
+    cube = (lai * bands + 0.02).transpose("band", "y", "x")
+    cube = grids.place(cube.assign_coords(wavelength=("band", list(wavelengths))), grids.geobox(lai))
+    cube.attrs = {"units": "1", "atmosphere": "some", "arp": 0.15}
+    return cube.rename("toa_reflectance")
+
+
+def test_indices_keep_their_word_and_equal_the_kernels(lai_with_hole):
+    """Bands go to the formula in its order: blue, green, red, near and shortwave infrared are 0 to 4."""
+    cube = reflectance(lai_with_hole, (0.48, 0.56, 0.66, 0.83, 1.65))
+    blue, green, red, nir, swir = cube.values
+    bands = {"EVI": (nir, red, blue), "NDWI": (green, nir), "NDMI": (nir, swir)}
+    for name, (kernel, _) in INDICES.items():
+        result = check_raster_function(lambda array, n=name: reflectance_index(array, n), cube, quantity=name.lower())
+        np.testing.assert_array_equal(result, kernel(*bands.get(name, (nir, red))))
+    result = reflectance_ndvi(cube)
+    np.testing.assert_array_equal(result, reflectance_index(cube, "ndvi"))
+    np.testing.assert_array_equal(np.isnan(result), np.isnan(lai_with_hole))
+    assert result.dims == ("y", "x") and "band" not in result.coords and "wavelength" not in result.coords
+    assert result.attrs["arp"] == 0.15
+
+
+@pytest.mark.parametrize(
+    "wavelengths, red, nir",
+    [((0.83, 0.66), 1, 0), ((0.61, 0.64, 0.69, 0.76, 0.95, 0.86), 1, 5), ((0.45, 0.665, 0.71, 0.842, 1.6), 1, 3)],
+)
+def test_bands_are_picked_by_wavelength(lai, wavelengths, red, nir):
+    cube = reflectance(lai, wavelengths)
+    np.testing.assert_array_equal(
+        reflectance_ndvi(cube), indices.normalized_difference(cube.values[nir], cube.values[red])
+    )
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        (lambda cube: cube.isel(band=[0, 2]), r"no red band between 0\.6 and 0\.7 um: the raster has 0\.560, 0\.830"),
+        (lambda cube: cube.isel(band=[1, 3]), "no near infrared band"),
+        (lambda cube: cube.drop_vars("wavelength"), "no coordinate 'wavelength'"),
+        (lambda cube: cube.isel(band=1), "along band"),
+        (lambda cube: cube.assign_attrs(units="K"), "units 'K'"),
+    ],
+)
+def test_raster_without_the_bands_is_refused(lai, change, message):
+    with pytest.raises(ValueError, match=message):
+        reflectance_ndvi(change(reflectance(lai)))
+
+
+def test_water_indices_have_the_signs_of_their_authors():
+    """Open water is dark in the near infrared, wet leaves in the shortwave infrared."""
+    for name, wet in (("NDWI", [0.05, 0.08, 0.04, 0.02, 0.01]), ("NDMI", [0.03, 0.06, 0.04, 0.45, 0.15])):
+        cube = xr.DataArray(np.reshape(wet, (5, 1, 1)) * np.ones((5, 2, 2)), dims=("band", "y", "x"))
+        cube = cube.assign_coords(wavelength=("band", [0.48, 0.56, 0.66, 0.83, 1.65]))
+        cube = grids.place(cube, fifesim.grid_at("EPSG:26914", 705000, 4334000, 60, 60, 30))
+        assert (reflectance_index(cube, name) > 0.3).all()
+
+
+@pytest.mark.parametrize("name", ["TM", "ETM+", "OLI", "MSI", "MODIS"])
+def test_instruments_have_the_bands_of_every_index(name):
+    """The broad bands of their makers: the coastal blue, the red edge and 1.24 um are none of them."""
+    bands = instrument(name).bands
+    wavelengths = [band.wavelength for band in bands]
+    picked = {window.name: bands[nearest_band(wavelengths, window)].name for _, ws in INDICES.values() for window in ws}
+    expected = {
+        "TM": "TM1 TM2 TM3 TM4 TM5",
+        "ETM+": "ETM1 ETM2 ETM3 ETM4 ETM5",
+        "OLI": "OLI2 OLI3 OLI4 OLI5 OLI6",
+        "MSI": "MSI2 MSI3 MSI4 MSI8 MSI11",
+        "MODIS": "MODIS3 MODIS4 MODIS1 MODIS2 MODIS6",
+    }
+    order = ("blue", "green", "red", "near infrared", "shortwave infrared")
+    assert [picked[each] for each in order] == expected[name].split()
+
+
+def test_index_that_is_none_or_lacks_a_band_is_named(lai):
+    with pytest.raises(ValueError, match="there is no index 'GNDVI': type one of NDVI, EVI, EVI2"):
+        reflectance_index(reflectance(lai), "GNDVI")
+    with pytest.raises(ValueError, match=r"no blue band between 0\.45 and 0\.52 um"):
+        reflectance_index(reflectance(lai), "EVI")
+    assert reflectance_index(reflectance(lai), "evi2").name == "evi2"
+
+
+# ------------------------------------------------------------------------------------------ composites
+
 
 DATES = np.array(["1987-06-06T16:35", "1987-07-08T16:35", "1987-08-09T16:34"], "datetime64[ns]")
 
@@ -33,6 +124,8 @@ def test_composite_of_ndvi_is_the_largest_with_its_date_and_sun(stack):
     np.testing.assert_array_equal(found["date"].values[kept], DATES[chosen[kept]])
     np.testing.assert_array_equal(found["sza"].values[kept], np.array([28.0, 30.0, 35.0])[chosen[kept]])
     assert found.attrs["composite"] == "maximum-value" and "composite" in found.attrs["history"]
+    assert found["date"].attrs == {"long_name": "date of the selected image"}
+    assert found["sza"].attrs["standard_name"] == "solar_zenith_angle" and "history" not in found["sza"].attrs
 
 
 @pytest.mark.parametrize("chunks", [ODD_CHUNKS, ODD_CHUNKS | {"time": 1}])
@@ -66,7 +159,7 @@ def test_images_are_composed_by_their_ndvi_or_by_what_is_given(stack):
         (
             lambda ndvi: ndvi.fillna(0).astype(np.uint8),
             {},
-            r"the sun of each date: convert them with \.fifesim\.to_reflectance",
+            r"sun of each date: convert them with \.fifesim\.to_reflect",
         ),
         (lambda ndvi: ndvi.isel(time=0), {}, "images along time, got dimensions"),
         (lambda ndvi: ndvi, {"method": "median"}, "method must be one of maximum-value, got 'median'"),
@@ -125,19 +218,3 @@ def test_a_composite_comes_back_from_netcdf_and_zarr(stack, tmp_path, kind, chun
         again = xr.open_zarr(path, decode_coords="all", consolidated=False)
     with again:
         xr.testing.assert_identical(again["ndvi"].load(), found.compute())
-
-
-def test_the_date_of_a_composite_has_its_own_attributes(stack):
-    found = fifesim.composite(stack)
-    assert found["date"].attrs == {"long_name": "date of the selected image"}
-    assert found["sza"].attrs["standard_name"] == "solar_zenith_angle" and "history" not in found["sza"].attrs
-
-
-def test_a_composite_with_angles_of_its_cells_goes_to_netcdf_as_the_warning_says(stack, tmp_path):
-    found = fifesim.composite(stack)
-    with pytest.warns(UserWarning, match="lacks sza, .* or write a netCDF with"):
-        again = fifesim.open_image(found.fifesim.to_geotiff(tmp_path / "composite.tif"))
-    xr.testing.assert_identical(again, found.drop_vars("sza"))
-    found.to_netcdf(tmp_path / "composite.nc")
-    with xr.open_dataset(tmp_path / "composite.nc", decode_coords="all") as opened:
-        xr.testing.assert_identical(opened["ndvi"].load(), found)

@@ -1,0 +1,205 @@
+"""Regression of labelled rasters: pairs of pixels, relative equivalent noise, and inverted maps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import CHUNKS, ODD_CHUNKS, in_chunks
+from scipy import stats
+
+import fifesim
+from fifesim.analysis.regression_labels import matched, origins, sound_cells
+from fifesim.grids import grid as grids
+
+
+def test_regression_agrees_with_scipy(pair):
+    fitted, theirs = fifesim.regress(*pair), stats.linregress(pair[1].values.ravel(), pair[0].values.ravel())
+    assert fitted.slope == pytest.approx(theirs.slope, rel=1e-10)
+    assert fitted.intercept == pytest.approx(theirs.intercept, rel=1e-10)
+    assert fitted.r2 == pytest.approx(theirs.rvalue**2, rel=1e-10)
+
+
+def test_regression_has_the_same_bits_in_any_chunks(pair):
+    y, x = pair
+    y[3:5, 2] = np.nan
+    whole = fifesim.regress(y, x)
+    for one, other in [(CHUNKS, CHUNKS), (ODD_CHUNKS, CHUNKS), (ODD_CHUNKS, {}), ({}, {"y": 1, "x": 54})]:
+        assert fifesim.regress(in_chunks(y, one), in_chunks(x, other)) == whole
+
+
+def test_regression_works_where_the_first_row_is_empty(pair):
+    y, x = pair
+    y[0], x[0] = np.nan, np.nan
+    assert fifesim.regress(y, x).n == 44 * 54
+
+
+# ------------------------------------------------------------------------------------------ pairs
+
+
+CELL = 30 / 9
+
+
+def test_pairs_lie_in_the_same_place(pair):
+    """Rasters that cover other ground are cut to what they share."""
+    y, x = pair
+    cut = fifesim.regress(y[3:40, :50], x[:, 7:])
+    assert cut == fifesim.regress(y[3:40, 7:50], x[3:40, 7:50])
+
+
+def test_pairs_may_be_matched_by_row_and_column(pair):
+    y, x = pair
+    moved = grids.place(x, fifesim.fife_site(CELL, window=((91, 136), (180, 234))))
+    assert fifesim.regress(y, moved, pair="index") == fifesim.regress(y, x)
+    assert fifesim.regress(y, moved).r2 < 0.5
+    assert fifesim.regress(y, moved).n == 44 * 54
+
+
+def test_unmatched_rasters_are_refused(pair):
+    y, x = pair
+    with pytest.raises(ValueError, match=r"different lattices.*pair=\"index\""):
+        fifesim.regress(y, fifesim.aggregate(x, 30.0))
+    with pytest.raises(ValueError, match="do not overlap"):
+        fifesim.regress(y[:10], x[20:])
+    with pytest.raises(ValueError, match="pair must be 'coordinates' or 'index', got 'place'"):
+        fifesim.regress(y, x, pair="place")
+    with pytest.raises(ValueError, match="select one band first"):
+        fifesim.regress(y.expand_dims(band=["a"]), x)
+
+
+def test_rasters_are_cut_to_their_common_ground(lai):
+    """Whichever of the two begins first, along each axis."""
+    one, other = matched(lai[5:40, :30], lai[:20, 11:])
+    np.testing.assert_array_equal(one, lai[5:20, 11:30])
+    np.testing.assert_array_equal(other, one)
+    one, other = matched(lai[5:40, :30], lai[:20, 11:], pair="index")
+    np.testing.assert_array_equal(one, lai[5:25, :30])
+    np.testing.assert_array_equal(other, lai[:20, 11:41])
+
+
+def test_origins_are_means_of_first_rows_where_there_is_one(lai):
+    gap, empty = lai.copy(), lai.copy()
+    gap[0, 3], empty[0] = np.inf, np.nan
+    expected = [lai.values[0].mean(), np.delete(lai.values[0], 3).mean(), 0.0]
+    np.testing.assert_allclose(origins(lai, gap, in_chunks(empty, ODD_CHUNKS)), expected, rtol=1e-14)
+
+
+def test_digital_numbers_are_refused(lai):
+    with pytest.raises(ValueError, match="lai holds digital numbers, whose 0 is no data: convert it with"):
+        sound_cells(lai.assign_coords(gain=1.0))
+
+
+# ------------------------------------------------------------------------------------------ noise
+
+
+def test_noise_on_a_line_is_its_deviation_over_slope_and_value(scattered):
+    """Closed form, with the share of the slope within an increment; 900 pairs each know a deviation to 2.4 %."""
+    lai, ndvi = scattered
+    found = fifesim.relative_equivalent_noise(lai, ndvi, 0.02)
+    expected = np.hypot(0.03, 0.3 * 0.02 / np.sqrt(12)) / (0.3 * found["increment"])
+    np.testing.assert_allclose(found["ren"], expected, rtol=0.12)
+    assert found.attrs["slope"] == pytest.approx(0.3, rel=0.01)
+    assert int(found["count"].sum()) == lai.size
+
+
+def test_noise_agrees_with_groups_of_pandas(scattered):
+    lai, ndvi = scattered
+    lai = lai.where(lai < 2)
+    found = fifesim.relative_equivalent_noise(lai, ndvi, 0.25, slope=0.3)
+    table = xr.Dataset({"lai": lai, "ndvi": ndvi}).to_dataframe()[["lai", "ndvi"]].dropna()
+    groups = table.groupby(np.floor(table["lai"] / 0.25))
+    np.testing.assert_array_equal(found["count"], groups.size())
+    np.testing.assert_allclose(found["ren"], groups["ndvi"].std() / 0.3 / groups["lai"].mean(), rtol=1e-10)
+
+
+def test_noise_has_the_same_bits_in_any_chunks(scattered):
+    lai, ndvi = scattered
+    whole = fifesim.relative_equivalent_noise(lai, ndvi)
+    xr.testing.assert_identical(
+        fifesim.relative_equivalent_noise(in_chunks(lai, {"y": 77, "x": 50}), in_chunks(ndvi, ODD_CHUNKS)), whole
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"increment": 0.0}, "increment must be positive, got 0"),
+        ({"increment": 1e-6}, "take a larger one"),
+        ({"min_count": 1}, "at least 2, got 1"),
+    ],
+)
+def test_impossible_increments_are_refused(scattered, options, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.relative_equivalent_noise(*scattered, **options)
+    with pytest.raises(ValueError, match="needs finite values"):
+        fifesim.relative_equivalent_noise(scattered[0] * np.nan, scattered[1], slope=0.4)
+
+
+# ------------------------------------------------------------------------------------------ inversion
+
+
+@pytest.mark.filterwarnings("ignore:inversion_error is deprecated:FutureWarning")
+def test_inversion_holds_its_share_and_has_the_residual_as_error(scattered):
+    """On the pixels that it was fitted to: no bias, and the residual deviation but for n - 2; 95 % within 4 errors."""
+    lai, ndvi = scattered[0] + 1.0, scattered[1]  # so that no value is clipped
+    fit = fifesim.regress(lai, ndvi)
+    estimate = fifesim.invert(ndvi, fit)
+    error = fifesim.inversion_error(estimate, lai)
+    assert float(error["bias"]) == pytest.approx(0, abs=1e-10)
+    assert float(error["rmse"]) == pytest.approx(fit.residual_deviation * np.sqrt((fit.n - 2) / fit.n), rel=1e-9)
+    assert float(error["coverage"]) == pytest.approx(0.95, abs=0.02)
+    assert int(error["n"]) == lai.size
+    lazy = fifesim.invert(in_chunks(ndvi, {"y": 50, "x": 77}), fit)
+    assert lazy.fifesim.inversion_error(in_chunks(lai, {"x": 60})).identical(error)
+    alone = fifesim.inversion_error(lai + 0.25, lai)
+    assert (float(alone["bias"]), float(alone["rmse"])) == pytest.approx((0.25, 0.25), rel=1e-12)
+    assert "coverage" not in alone
+    for wrong in (estimate[["lai"]], estimate[["low", "high"]], estimate.assign(other=estimate["lai"])):
+        with pytest.raises(ValueError, match="one variable with low and high"):
+            fifesim.inversion_error(wrong, lai)
+    with pytest.raises(ValueError, match="no pixel has both"):
+        fifesim.inversion_error(lai * np.nan, lai)
+
+
+def test_map_is_lazy_labelled_and_as_the_line_says(scattered):
+    lai, ndvi = scattered[0] + 1.0, scattered[1]  # so that no value is clipped
+    fit = fifesim.regress(lai, ndvi)
+    lazy = fifesim.invert(in_chunks(ndvi, ODD_CHUNKS | {"y": 100, "x": 99}), fit, level=0.5)
+    assert lazy["low"].chunks is not None
+    np.testing.assert_array_equal(lazy["lai"], fit.predict(ndvi.values))
+    np.testing.assert_array_equal(lazy["high"], fit.prediction_interval(ndvi.values, 0.5)[1])
+    assert lazy["lai"].attrs["standard_name"] == "leaf_area_index"
+    assert "standard_name" not in lazy["low"].attrs
+    assert lazy["lai"].rio.crs.to_epsg() == 26914
+
+
+def test_values_outside_the_physical_range_are_clipped_and_flagged(scattered):
+    """NDVI on a line through LAI 0.2 to 2.2, with a mean of 0.46 and a standard deviation of 0.18."""
+    lai, ndvi = scattered
+    fit = fifesim.regress(lai, ndvi)
+    odd = ndvi.copy(deep=True)
+    odd[0, :6] = [-0.4, 0.97, 12.0, np.nan, 0.46, 1.02]
+    for index in (odd, in_chunks(odd, ODD_CHUNKS | {"y": 100, "x": 99})):
+        estimate = fifesim.invert(index, fit)
+        np.testing.assert_array_equal(estimate["flag"][0, :6], [2, 0, 3, -1, 0, 1])
+        np.testing.assert_array_equal(estimate["lai"][0, [0, 2, 3]], [0.0, 20.0, np.nan])
+        np.testing.assert_array_equal(estimate["lai"][0, 4:6], fit.predict(odd.values[0, 4:6]))
+        np.testing.assert_array_equal(estimate["low"][0, :4], [0.0, fit.prediction_interval(0.97)[0], 20.0, np.nan])
+        assert (estimate["low"] >= 0).sum() == (estimate["lai"] <= estimate["high"]).sum() == lai.size - 1
+        assert estimate["flag"].dtype == np.int8 and estimate["flag"].chunks == index.chunks
+    attrs = estimate["flag"].attrs
+    meanings = dict(zip(attrs["flag_values"], attrs["flag_meanings"].split(), strict=True))
+    assert meanings[2] == "clipped_to_minimum" and meanings[1] == "extrapolated"
+    fpar = fifesim.invert(odd, replace(fit, y_name=""), "fpar")["fpar"]
+    assert float(fpar.min()) == 0.0 and float(fpar.max()) == 1.0
+    clipped = estimate["lai"][1:].fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    assert np.isfinite(clipped).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [({"quantity": "ndvi"}, "quantity must be 'lai' or 'fpar'"), ({"level": 95}, "level must be between 0 and 1")],
+)
+def test_impossible_inversion_is_refused(scattered, options, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.invert(scattered[1], fifesim.regress(*scattered), **options)
