@@ -33,6 +33,8 @@ from .ground.landscape.classes import Field as Field
 from .ground.canopy.description import Canopy as Canopy
 from .ground.canopy.prospect import Leaf as Leaf
 from .ground.canopy.spectra import Background as Background
+from .base.surface_kernels import RossLi as RossLi
+from .base.surface_kernels import RPV as RPV
 from .chain.steps import surface_reflectance as surface_reflectance  # method, of a Dataset too
 from .chain.spectra import canopy_spectra as canopy_spectra
 from .chain.absorbed_light import fpar as fpar  # method, of a Dataset too
@@ -106,6 +108,8 @@ from .analysis.scaling_labels import autocovariance as autocovariance  # method
 from .analysis.scaling_labels import variogram as variogram  # method
 from .analysis.scaling_labels import regularized_variance as regularized_variance  # method
 from .chain.steps import index as index  # method
+from .chain.corrections import topographic_correction as topographic_correction  # method, of a Dataset too
+from .chain.corrections import brdf_normalise as brdf_normalise  # method, of a Dataset too
 
 # Retrieval
 from .retrieval.training import train as train

@@ -103,6 +103,8 @@ QUANTITIES = {
         lowest=0, highest=1, colours="gray_r"),
     "kt": Quantity("1", "", "topographic correction factor", "irradiance on the slope over that on level ground",
         label="Kt", lowest=0, colours="RdBu_r", middle=1),
+    "topographic_c": Quantity("1", "", "constant of the C correction", "intercept over slope of reflectance on cos i"),
+    "topographic_k": Quantity("1", "", "exponent of the Minnaert correction"),
     "toa_reflectance": Quantity("1", "toa_bidirectional_reflectance",
         "apparent reflectance at the top of the atmosphere", "the cosine of the solar zenith angle is divided out",
         label="reflectance", lowest=0, colours="gray"),

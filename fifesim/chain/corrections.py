@@ -1,0 +1,278 @@
+"""Corrections of labelled reflectance for slopes and view angles, as users apply them to images."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+
+from fifesim.analysis import corrections
+from fifesim.atmosphere.engines import LARGEST_ZENITH
+from fifesim.atmosphere.models import Atmosphere
+from fifesim.base.annotations import NumberByBand, Time
+from fifesim.base.geometry import ANGLES, relative_azimuth
+from fifesim.base.messages import warn
+from fifesim.base.surface_kernels import RossLi, ross_li
+from fifesim.chain.steps import air_bands_and_geometry, as_bands_of, planetary_reflectance, sunlight
+from fifesim.grids import cf, chunks, directions, swaths
+from fifesim.grids.dates import by_date
+from fifesim.grids.directions import Directions
+from fifesim.grids.inputs import Horizon, RasterOrDataset
+from fifesim.ground.terrain import labels as terrain_labels
+from fifesim.ground.terrain.lit_slopes import slope_light
+from fifesim.sensor.description.instrument_file import InstrumentLike
+
+_REFERENCES = {
+    "cosine": "Teillet et al. (1982), doi:10.1080/07038992.1982.10855028",
+    "c": "Teillet et al. (1982), doi:10.1080/07038992.1982.10855028",
+    "scs": "Gu and Gillespie (1998), doi:10.1016/S0034-4257(97)00177-6",
+    "scs+c": "Soenen et al. (2005), doi:10.1109/TGRS.2005.852480",
+    "minnaert": "Minnaert (1941), doi:10.1086/144279",
+    "kt": "Dubayah (1992), doi:10.1029/91WR02671",
+}
+
+_ROY = "Roy et al. (2016), doi:10.1016/j.rse.2016.01.023"
+
+# The surroundings in Kt are as bright as the result: each round leaves at most their share of the light. [1]
+_ROUNDS = 4
+
+
+@by_date
+def topographic_correction(
+    reflectance: RasterOrDataset,
+    dem: xr.DataArray,
+    method: Literal["cosine", "c", "scs", "scs+c", "minnaert", "kt"] = "scs+c",
+    *,
+    c: NumberByBand | None = None,
+    k: NumberByBand | None = None,
+    horizon: Horizon | None = None,
+    upwelling: bool = True,
+    atmosphere: Atmosphere | None = None,
+    geometry: Directions | None = None,
+    time: Time | None = None,
+    instrument: InstrumentLike | None = None,
+) -> xr.DataArray:
+    """
+    Reflectance of level ground, estimated from the reflectance of slopes.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x), or xarray.Dataset of bands
+        Surface or planetary reflectance; digital numbers and radiance are converted first. [1]
+    dem : xarray.DataArray, dims (y, x)
+        Elevation on the cells of the reflectance, or on a larger area. [m]
+    method : {"cosine", "c", "scs", "scs+c", "minnaert", "kt"}, optional
+        Correction. "kt" divides by Kt (Eq. 4), which needs surface reflectance and the atmosphere.
+    c : number or sequence, optional
+        Constant of "c" and "scs+c", one for each band; by default from the regression of the scene on illumination. [1]
+    k : number or sequence, optional
+        Exponent of "minnaert", likewise. [1]
+    horizon : xarray.DataArray, dims (direction, y, x), optional
+        Horizon, as in `surface_reflectance`. [degree]
+    upwelling : bool, optional
+        Whether "kt" also divides by the cosine factor of the view (Eq. 5), as `surface_reflectance` applies it.
+    atmosphere, geometry, time, instrument : optional
+        As in `to_toa`; the atmosphere has an effect on "kt" only.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        NaN in shadow, except for "kt". Coordinates along band hold the constant ``c`` or the exponent ``k``. Lazy if an
+        input is. [1]
+
+    Raises
+    ------
+    ValueError
+        If the sun varies from cell to cell, or the dem does not cover the reflectance.
+
+    See Also
+    --------
+    fifesim.analysis.corrections
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> dem, lai = fifesim.flint_hills(grid, seed=7), fifesim.lai_scene(grid, seed=7)
+    >>> level, hilly = (lai.fifesim.surface_reflectance("TM", bands=["TM4"], dem=each) for each in (None, dem))
+    >>> corrected = hilly.fifesim.topographic_correction(dem, "kt")
+    >>> bool(abs(corrected - level).max() < 1e-6)
+    True
+    """
+    image = as_bands_of(planetary_reflectance(reflectance), instrument, "toa_reflectance").transpose("band", "y", "x")
+    if method == "kt":
+        cf.check_quantity(image, "surface_reflectance")
+        air = air_bands_and_geometry(image, atmosphere, geometry, instrument, time)
+        geometry = air[-1]
+        light = sunlight(dem, horizon, *air, "topographic_correction")  # type: ignore[call-arg]
+        out, found = _over_kt(image, light, upwelling), {}
+    else:
+        known = directions.given_geometry(geometry, image, time)
+        geometry = directions.uniform_geometry(known, "topographic_correction")
+        out, found = _corrected(image, method, _slopes(image, dem, horizon, geometry), geometry.sza, c, k)
+    out = directions.with_geometry(swaths.placed_as(out, image, found), geometry)
+    history = f"topographic_correction: {method}, sza {geometry.sza:.2f}, saa {geometry.saa:.2f}"
+    return cf.label(out, _quantity(image), source=image, history=history, references=_REFERENCES[method])
+
+
+def _quantity(image):
+    """Name of the quantity of an image: reflectance at the top of the atmosphere, or of the surface."""
+    at_top = image.attrs.get("standard_name") == cf.QUANTITIES["toa_reflectance"].standard_name
+    return "toa_reflectance" if at_top else "surface_reflectance"
+
+
+def _slopes(image, dem, horizon, geometry):
+    """Slope [degree], illumination and view factor [1] of the cells of an image, a raster over (3, y, x)."""
+
+    def kernel(elevation, sky, cell, seen, _):
+        light = slope_light(elevation, sky, cell, seen)
+        return np.stack([np.degrees(np.arccos(np.minimum(light.cosine, 1))), light.mu_s_local, light.upwelling])
+
+    one = image.isel(band=0, drop=True)
+    data = terrain_labels.on_slopes(_last_first(kernel), dem, horizon, geometry, one, leading=(3,))
+    return chunks.along_first(data)
+
+
+def _last_first(kernel):
+    """Kernel for `on_slopes`, which passes the cells of the raster first."""
+    return lambda cells, *light: kernel(*light, cells)
+
+
+def _corrected(image, method, slopes, sza, c, k):
+    """Corrected reflectance, and the constant or exponent of each band by name."""
+    slope, cos_i, _ = (image.isel(band=0, drop=True).copy(data=each).variable for each in slopes)
+    kernels = {
+        "cosine": corrections.cosine_correction,
+        "c": corrections.c_correction,
+        "scs": corrections.scs_correction,
+        "scs+c": corrections.scs_c_correction,
+        "minnaert": corrections.minnaert_correction,
+    }
+    arguments, found = [cos_i, xr.Variable((), sza)], {}
+    if method.startswith("scs"):
+        arguments.append(slope)
+    if method in ("c", "scs+c", "minnaert"):
+        name, given = ("k", k) if method == "minnaert" else ("c", c)
+        estimate = corrections.minnaert_exponent if name == "k" else corrections.regression_constant
+        values = estimate(image.data, cos_i.data) if given is None else _per_band(given, image, name)
+        found[name] = xr.Variable("band", values, cf.attributes(f"topographic_{name}"))
+        arguments.append(found[name])
+    return chunks.pointwise(kernels[method], image, *arguments), found
+
+
+def _per_band(given, image, name):
+    """Numbers of the bands of an image, shape (band,)."""
+    names = image["band"].values.tolist() if "band" in image.coords else []
+    values = [given[each] for each in names] if isinstance(given, Mapping) else np.atleast_1d(np.asarray(given, float))
+    if len(values) not in (1, image.sizes["band"]):
+        raise ValueError(f"{name} must be a number, or one for each of {image.sizes['band']} bands, got {len(values)}")
+    return np.broadcast_to(np.asarray(values, float), image.sizes["band"])
+
+
+def _over_kt(image, light, upwelling):
+    """Reflectance of level ground whose slopes reflect as given, by repeated division by Kt."""
+    view = _slopes(image, light.dem, light.horizon, light.geometry)[2]
+    seen = image.copy(data=image.data / view) if upwelling else image
+    level = seen
+    for _ in range(_ROUNDS):
+        level = image.copy(data=seen.data / terrain_labels.kt_on_slopes(level, light).data)
+    return level
+
+
+@by_date
+def brdf_normalise(
+    reflectance: RasterOrDataset,
+    surface: RossLi,
+    *,
+    to: Directions | None = None,
+    geometry: Directions | None = None,
+    time: Time | None = None,
+) -> xr.DataArray:
+    """
+    Reflectance in another view, by default at nadir, by the c-factor of the Ross-Li kernels.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x), or xarray.Dataset of bands
+        Surface reflectance. [1]
+    surface : RossLi
+        Weights of the kernels: numbers, or one for each band.
+    to : Geometry or xarray.Dataset, optional
+        Directions of the result; by default the sun of each cell and a nadir view.
+    geometry : Geometry or xarray.Dataset, optional
+        Directions of the reflectance; by default from its coordinates.
+    time : str or datetime, optional
+        Time for the position of the sun, instead of ``geometry``.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Multiplied by the ratio of the modelled reflectances. Lazy if an input is. [1]
+
+    Raises
+    ------
+    ValueError
+        If the model is not positive in a direction.
+
+    Warns
+    -----
+    UserWarning
+        If sun or view are beyond 75 degrees, where the kernels are not valid.
+
+    References
+    ----------
+    [Roy2016]_
+
+    See Also
+    --------
+    fifesim.base.surface_kernels.ross_li, fifesim.analysis.corrections.c_factor
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> slant = fifesim.Geometry(sza=30, saa=117, vza=30, vaa=117)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM4"], geometry=slant)
+    >>> nadir = rho.fifesim.brdf_normalise(fifesim.RossLi(0.3, 0.15, 0.03))
+    >>> float(nadir.vza), bool((nadir < rho).all())
+    (0.0, True)
+    """
+    image = as_bands_of(reflectance, None, "surface_reflectance").transpose("band", "y", "x")
+    cf.check_quantity(image, "surface_reflectance")
+    geometry = directions.given_geometry(geometry, image, time)
+    to = directions.checked_geometry(_at_nadir(geometry) if to is None else to)
+    weights = [xr.Variable("band", _per_band(getattr(surface, name), image, name)) for name in ("iso", "vol", "geo")]
+    angles = [*directions.angles(geometry), *directions.angles(to)]
+    plain = image.drop_vars(["band", *ANGLES], errors="ignore")
+    out = chunks.pointwise(_normalised, plain, *weights, *angles)
+    names = {"band": image.coords["band"]} if "band" in image.coords else {}
+    out = directions.with_geometry(swaths.placed_as(out, image, names), to)
+    history = "brdf_normalise: c-factor of Ross-Li kernels"
+    return cf.label(out, "surface_reflectance", source=image, history=history, references=_ROY)
+
+
+def _at_nadir(geometry):
+    """Directions with the same sun and a nadir view."""
+    if isinstance(geometry, xr.Dataset):
+        return geometry.assign(vza=0.0, vaa=0.0)
+    return replace(geometry, vza=0.0, vaa=0.0)
+
+
+def _normalised(reflectance, iso, vol, geo, sza, saa, vza, vaa, to_sza, to_saa, to_vza, to_vaa):
+    """Reflectance of cells in other directions. [1]"""
+    if np.nanmax([np.nanmax(each, initial=0) for each in (sza, vza, to_sza, to_vza)]) > LARGEST_ZENITH:
+        warn(f"the Ross-Li kernels are not valid beyond {LARGEST_ZENITH:g} degrees of sun or view")
+    before = ross_li(iso, vol, geo, sza=sza, vza=vza, raa=relative_azimuth(saa, vaa))
+    after = ross_li(iso, vol, geo, sza=to_sza, vza=to_vza, raa=relative_azimuth(to_saa, to_vaa))
+    for model, zeniths in ((before, (sza, vza)), (after, (to_sza, to_vza))):
+        if (model <= 0).any():
+            at = " and ".join(f"{np.nanmax(each):g}" for each in zeniths)
+            raise ValueError(
+                f"the weights reflect {np.nanmin(model):.3g} for sun and view at up to {at} degrees: the c-factor "
+                "needs a positive reflectance; check the order iso, vol, geo"
+            )
+    return reflectance * corrections.c_factor(before, after)

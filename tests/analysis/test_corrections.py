@@ -1,0 +1,123 @@
+"""Kernels of reflectance and corrections against values computed in 40 digits, and corrections of simulated slopes."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from lazy import no_compute
+
+import fifesim
+from fifesim.analysis import corrections
+from fifesim.base.surface_kernels import check_surface, li_sparse, ross_li, ross_thick, rpv
+
+DATA = Path(__file__).parents[1] / "data"
+GRID = fifesim.fife_site(10.0, window=((0, 300), (0, 300)))
+DEM = fifesim.flint_hills(GRID, seed=7)
+LAI = fifesim.lai_scene(GRID, seed=7)
+BANDS = ["TM3", "TM4"]
+
+
+def table(name):
+    return pd.read_csv(DATA / name, comment="#")
+
+
+def scene(dem=None, lai=LAI):
+    return lai.fifesim.surface_reflectance("TM", bands=BANDS, dem=dem)
+
+
+def test_ross_li_kernels():
+    t = table("ross_li.csv")
+    np.testing.assert_allclose(ross_thick(t.sza, t.vza, t.raa), t.volume, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(li_sparse(t.sza, t.vza, t.raa), t.geometric, rtol=0, atol=1e-9)
+    weights = t.f_iso, t.f_vol, t.f_geo
+    seen, nadir = (ross_li(*weights, sza=t.sza, vza=vza, raa=t.raa) for vza in (t.vza, 0 * t.vza))
+    np.testing.assert_allclose(seen, t.reflectance, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(corrections.c_factor(seen, nadir), t.c_factor, rtol=1e-9)
+
+
+def test_topographic_corrections():
+    t = table("topographic_correction.csv")
+    cos_i = corrections.illumination_cosine(t.sza, t.saa, t.slope, t.aspect)
+    rho = t.reflectance, cos_i, t.sza
+    found = {
+        "cos_i": cos_i,
+        "cosine": corrections.cosine_correction(*rho),
+        "c_correction": corrections.c_correction(*rho, t.c),
+        "scs": corrections.scs_correction(*rho, t.slope),
+        "scs_c": corrections.scs_c_correction(*rho, t.slope, t.c),
+        "minnaert": corrections.minnaert_correction(*rho, t.k),
+    }
+    for name, values in found.items():
+        np.testing.assert_allclose(values, t[name], rtol=0, atol=1e-9, err_msg=name)
+
+
+def test_kernels_are_reciprocal():
+    angles = {"sza": 20.0, "vza": 55.0, "raa": 70.0}, {"sza": 55.0, "vza": 20.0, "raa": 70.0}
+    for kernel, weights in ((ross_li, (0.3, 0.1, 0.05)), (rpv, (0.1, 0.7, -0.1, 0.3))):
+        there, back = (kernel(*weights, **each) for each in angles)
+        assert there == pytest.approx(back, rel=1e-14)
+
+
+def test_illumination_of_the_kernel_is_the_terrain_s():
+    sun = fifesim.Geometry(sza=50.0, saa=117.0)
+    cos_i = corrections.illumination_cosine(sun.sza, sun.saa, DEM.fifesim.slope(), DEM.fifesim.aspect())
+    lit = DEM.fifesim.illumination(sun)
+    # The aspect is from true north at each cell, the illumination takes the convergence at the middle of the grid.
+    np.testing.assert_allclose(cos_i, lit.where(lit > 0, cos_i), rtol=0, atol=1e-4)
+
+
+def test_kt_gives_level_ground_back():
+    level = scene()
+    found = scene(DEM).fifesim.topographic_correction(DEM, "kt")
+    np.testing.assert_allclose(found, level, rtol=1e-6)
+
+
+def test_estimates_of_the_scene_are_least_squares():
+    hilly = scene(DEM)
+    cos_i = DEM.fifesim.illumination(fifesim.fife_geometry()).values
+    found = hilly.fifesim.topographic_correction(DEM, "c")
+    for band in BANDS:
+        m, b = np.polyfit(cos_i.ravel(), hilly.sel(band=band).values.ravel(), 1)
+        assert float(found.c.sel(band=band)) == pytest.approx(b / m, rel=1e-6)
+    found = hilly.fifesim.topographic_correction(DEM, "minnaert")
+    k, _ = np.polyfit(np.log(cos_i.ravel()), np.log(hilly.sel(band="TM4").values.ravel()), 1)
+    assert float(found.k.sel(band="TM4")) == pytest.approx(k, rel=1e-6)
+
+
+@pytest.mark.parametrize("method", ["cosine", "c", "scs", "scs+c", "minnaert", "kt"])
+def test_corrections_are_lazy_and_level_ground_is_kept(method):
+    whole = scene(DEM).fifesim.topographic_correction(DEM, method)
+    with no_compute():
+        lazy = scene(DEM.chunk(y=70, x=300), LAI.chunk(y=70, x=90)).fifesim.topographic_correction(DEM, method)
+    assert lazy.chunks is not None
+    np.testing.assert_allclose(lazy.compute(), whole, rtol=1e-12)
+    assert whole.rio.crs == DEM.rio.crs and list(whole.band.values) == BANDS
+    given = {"c": 0.5} if method in ("c", "scs+c") else {"k": 0.5} if method == "minnaert" else {}
+    flat = scene().fifesim.topographic_correction(0 * DEM + 400.0, method, **given)
+    np.testing.assert_allclose(flat, scene(), rtol=1e-12)
+
+
+def test_brdf_normalise_takes_one_view_to_another():
+    land = fifesim.RossLi([0.1, 0.3], [0.05, 0.15], [0.01, 0.03])
+    slant = fifesim.Geometry(sza=40.0, saa=120.0, vza=35.0, vaa=300.0)
+    nadir = fifesim.Geometry(sza=40.0, saa=120.0)
+    level = scene().drop_vars(["sza", "saa", "vza", "vaa"])
+    seen = level.copy(data=np.broadcast_to(land.reflectance(40.0, 35.0, 180.0)[:, None, None], level.shape))
+    found = seen.fifesim.brdf_normalise(land, geometry=slant)
+    np.testing.assert_allclose(found[:, 0, 0], land.reflectance(40.0, 0.0, 0.0), rtol=1e-12)
+    assert float(found.vza) == 0
+    np.testing.assert_allclose(found.fifesim.brdf_normalise(land, geometry=nadir, to=slant), seen, rtol=1e-12)
+
+
+def test_refusals_name_the_direction():
+    with pytest.raises(ValueError, match=r"sza .* vza .* raa"):
+        check_surface(fifesim.RossLi(0.05, 0.19, 0.06))
+    with pytest.raises(ValueError, match="more than it receives"):
+        check_surface(fifesim.RossLi(1.1, 0.0, 0.0))
+    check_surface(fifesim.RossLi([0.1, 0.3], 0.05, 0.01))
+    with pytest.raises(ValueError, match="c must be a number"):
+        scene(DEM).fifesim.topographic_correction(DEM, "c", c=[0.1, 0.2, 0.3])
+    with pytest.warns(UserWarning, match="75 degrees"):
+        far = fifesim.Geometry(sza=40.0, saa=120.0, vza=80.0, vaa=300.0)
+        scene().fifesim.brdf_normalise(fifesim.RossLi(0.3, 0.1, 0.01), geometry=far)
