@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 
 import numpy as np
-import pytest
 import xarray as xr
 
 import fifesim
@@ -16,11 +15,10 @@ from fifesim.accessor import PUBLIC
 METHODS = {name: getattr(fifesim, name) for name, found in PUBLIC.items() if "DataArray" in found.methods_of}
 
 
-@pytest.mark.parametrize("name", METHODS)
-def test_method_is_the_function(lai, name):
-    method = getattr(lai.fifesim, name)
-    assert method.__func__ is METHODS[name]
-    assert method.__self__ is lai
+def test_methods_are_the_functions(lai):
+    for name, function in METHODS.items():
+        method = getattr(lai.fifesim, name)
+        assert method.__func__ is function and method.__self__ is lai, name
 
 
 def test_every_line_of_the_table_is_read():

@@ -3,13 +3,12 @@
 import re
 
 import pandas as pd
-import pytest
 
 from fifesim.base import files
 
 DATA = files.path("lai_distributions.csv").parent
 TABLES = sorted(path for path in DATA.rglob("*") if path.suffix in (".csv", ".toml"))
-NAMES = [path.relative_to(DATA).as_posix() for path in TABLES]
+SCRIPTS = {path.name for path in DATA.glob("make_*.py")}
 
 
 def header(path):
@@ -19,36 +18,30 @@ def header(path):
     return "\n".join(lines[:first])
 
 
-def test_there_are_tables():
-    assert len(TABLES) >= 9
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_readme_names_the_table(name):
-    """By its path, or in the table of a folder by its name."""
-    readme = (DATA / "README.md").read_text(encoding="utf-8")
+def is_named(name, readme):
+    """Whether the README names a table by its path, or in the table of a folder by its name."""
     folder, _, file = name.rpartition("/")
     _, _, table = readme.partition(f"| file in `{folder}/` |")
-    assert name in readme or f"`{file}`" in table.partition("\n\n")[0]
+    return name in readme or f"`{file}`" in table.partition("\n\n")[0]
 
 
-@pytest.mark.parametrize("path", TABLES, ids=NAMES)
-def test_header_says_the_source(path):
-    """A publication, the script in this folder that made the table, or what the numbers were calibrated with."""
-    text = header(path)
-    assert re.search(r"Source|\[sources\]|by make_\w+\.py|Calibrated", text)
-    scripts = re.findall(r"\bmake_\w+\.py", text)
-    assert all((DATA / script).is_file() for script in scripts)
-
-
-@pytest.mark.parametrize("path", [path for path in TABLES if path.suffix == ".csv"], ids=lambda path: path.name)
-def test_header_says_the_units_and_the_table_is_whole(path):
-    assert re.search(r"\[[^\]]+\]", header(path))
-    table = pd.read_csv(path, comment="#")
-    assert len(table) > 0
-    assert not table.isna().any(axis=None)
+def test_tables_are_named_and_have_sources_and_units():
+    """A source is a publication, the script that made the table, or what the numbers were calibrated with."""
+    readme, breaches = (DATA / "README.md").read_text(encoding="utf-8"), []
+    for path in TABLES:
+        name, text = path.relative_to(DATA).as_posix(), header(path)
+        breaches += [] if is_named(name, readme) else [f"{name} is not in README.md"]
+        breaches += [] if re.search(r"Source|\[sources\]|by make_\w+\.py|Calibrated", text) else [f"{name}: no source"]
+        breaches += [
+            f"{each} is missing" for each in re.findall(r"\bmake_\w+\.py", text) if not (DATA / each).is_file()
+        ]
+        if path.suffix == ".csv":
+            table = pd.read_csv(path, comment="#")
+            breaches += [] if re.search(r"\[[^\]]+\]", text) else [f"{name}: no units"]
+            breaches += [f"{name} has gaps"] if table.empty or table.isna().any(axis=None) else []
+    assert len(TABLES) >= 9 and breaches == []
 
 
 def test_everything_in_the_folder_is_a_table_or_makes_one():
     extra = {path.name for path in DATA.rglob("*") if path.is_file() and path not in TABLES}
-    assert all(name == "README.md" or re.fullmatch(r"make_\w+\.py", name) for name in extra), extra
+    assert [name for name in extra if name != "README.md" and not re.fullmatch(r"make_\w+\.py", name)] == []

@@ -27,6 +27,10 @@ SENTENCES = {
 STATED = {"0.05", "0.15", "0.24", "3.33", "4.778", "0.1", "1.0"}
 
 
+TABLE, TEXT = "fitted to Table 2", "fitted to the text"
+ASSUMED = {"shape of the densities", "elevation", "hour and view"}
+
+
 @pytest.fixture
 def make_paper(monkeypatch):
     monkeypatch.syspath_prepend(str(DOCS))
@@ -53,56 +57,49 @@ def test_no_number_of_the_page_is_typed_by_hand():
     assert set(re.findall(r"(?<![\w.])\d+\.\d+", text)) <= STATED
 
 
-@pytest.mark.parametrize("name", ["native", "aligned"])
-def test_r2_rises_with_the_length_scale(name):
-    assert (np.diff(nine(reading(name), "r2"), axis=1) > 0).all()
-
-
-def test_pixels_on_the_blocks_do_not_make_the_scatter_of_the_paper():
-    one = reading("aligned")
-    assert (nine(one, "r2") > nine(one, "paper_r2") + 0.1).all()
-    hills = reading("aligned", "flint-hills")
-    assert (nine(hills, "r2")[0] > nine(hills, "paper_r2")[0] + 0.1).all()
-
-
-def test_a_shift_makes_r2_and_slopes_like_the_paper_and_the_drift_does_better():
-    """Within the limits that were wanted; the constant shift misses that of slopes."""
-    drift, shift = reading("native"), reading("offset")
-    assert drift["lai_r2_rms"] < shift["lai_r2_rms"] < 0.06
-    assert drift["lai_slope_largest"] < 0.15 < shift["lai_slope_largest"] < 0.2
-    for name in READINGS.keys() - {"native", "offset"}:
-        assert reading(name)["lai_r2_rms"] > 0.08 and reading(name)["lai_slope_largest"] > 0.2
-
-
-def test_narrower_spread_makes_a_part_of_the_scatter():
-    assert 0.1 < reading("narrow")["lai_r2_rms"] < reading("aligned")["lai_r2_rms"] / 2
-    assert reading("narrow")["lai_r2_largest_long"] > 0.15
-
-
-def test_slopes_tell_blur_from_drift():
-    """By how they grow with arp, which brighter soil does not help: in deviations of samples of 200 pixels."""
-    paper, deviation = reading("native")["paper_growth"], NUMBERS["growth_deviation"]
-    assert abs(reading("native")["growth"] - paper) < deviation
-    for name in ("blur-40.8", "blur-48.6"):
-        assert (nine(reading(name), "slope") > nine(reading(name), "paper_slope")).all()
-        assert reading(name)["growth"] < paper - 2 * deviation
-    assert NUMBERS["deviations"]["blur"]["growth"] < reading("blur-48.6")["growth"]
-
-
-def test_what_was_fitted_hardly_moves_r2():
-    assert max(abs(one["lai_r2"]) for one in NUMBERS["sensitivity"]) < 0.02
-    assert max(abs(one["lai_slope"]) for one in NUMBERS["sensitivity"]) > 0.03
-
-
-def test_hills_and_drift_are_not_both_in_the_paper():
-    one = reading("native", "flint-hills")
-    assert one["r2 burned-ungrazed 0.05"] < one["paper_r2 burned-ungrazed 0.05"] - 0.1
-
-
-def test_hills_alone_give_one_row_like_the_paper_and_not_the_others():
-    one = reading("aligned", "flint-hills")
-    assert one["r2 burned-ungrazed 0.05"] == pytest.approx(one["paper_r2 burned-ungrazed 0.05"], abs=0.03)
-    assert (np.delete(nine(one, "r2") - nine(one, "paper_r2"), 3) > 0.15).all()
+def test_numbers_bear_the_statements_of_the_page(make_paper):
+    """The numbers are made anew with each change of the model, and the words of the template stay."""
+    drift, shift, aligned, narrow = map(reading, ("native", "offset", "aligned", "narrow"))
+    hills, both = reading("aligned", "flint-hills"), reading("native", "flint-hills")
+    blurred = [reading("blur-40.8"), reading("blur-48.6")]
+    others = [reading(name) for name in READINGS.keys() - {"native", "offset"}]
+    excess, on_hills = (nine(one, "r2") - nine(one, "paper_r2") for one in (aligned, hills))
+    growth, deviation = drift["paper_growth"], NUMBERS["growth_deviation"]
+    sensitivity, origins = NUMBERS["sensitivity"], {row["name"]: row["origin"] for row in NUMBERS["origins"]}
+    lengths = [one["there"] for one in NUMBERS["deviations"]["lengths"]]
+    noise = make_paper.noise(NUMBERS)
+    statements = {
+        "R2 rises with the length scale": all((np.diff(nine(one, "r2"), axis=1) > 0).all() for one in (drift, aligned)),
+        "aligned pixels lack the scatter of the paper": (excess > 0.1).all() and (on_hills[0] > 0.1).all(),
+        "the drift has the paper's R2, and a shift too": drift["lai_r2_rms"] < shift["lai_r2_rms"] < 0.06,
+        "a shift misses the slopes": drift["lai_slope_largest"] < 0.15 < shift["lai_slope_largest"] < 0.2,
+        "other readings miss R2": min(one["lai_r2_rms"] for one in others) > 0.08,
+        "other readings miss the slopes": min(one["lai_slope_largest"] for one in others) > 0.2,
+        "a narrow spread makes some scatter": 0.1 < narrow["lai_r2_rms"] < aligned["lai_r2_rms"] / 2,
+        "a narrow spread misses long scales": narrow["lai_r2_largest_long"] > 0.15,
+        "slopes grow with arp as in the paper": abs(drift["growth"] - growth) < deviation,
+        "blurred slopes are too large": all((nine(one, "slope") > nine(one, "paper_slope")).all() for one in blurred),
+        "blurred slopes grow too little": max(one["growth"] for one in blurred) < growth - 2 * deviation,
+        "soil does not help": NUMBERS["deviations"]["blur"]["growth"] < blurred[1]["growth"],
+        "fitted values hardly move R2": max(abs(one["lai_r2"]) for one in sensitivity) < 0.02,
+        "fitted values move slopes": max(abs(one["lai_slope"]) for one in sensitivity) > 0.03,
+        "hills and drift are not both in the paper": (nine(both, "r2") - nine(both, "paper_r2"))[1, 0] < -0.1,
+        "hills alone give one row of the paper": abs(on_hills[1, 0]) <= 0.03 and (np.delete(on_hills, 3) > 0.15).all(),
+        "choices in view of the table": origins["reading of Table 1"] == origins["size of the scenes"] == TABLE,
+        "choices in view of the text": origins["form of the random field"] == origins["bounds of LAI"] == TEXT,
+        "assumptions": {name for name, origin in origins.items() if origin == "assumed"} == ASSUMED,
+        "no threshold gives the paper's lengths": max(lengths) > 10 * min(lengths),
+        "NDVI of the mean is lower": all(one["bias"] < 0 for one in NUMBERS["scaling"]),
+        "the criterion of scaling is not met": all(abs(one["correlation"]) > 0.3 for one in NUMBERS["scaling"]),
+        "limits are met": all(one["met"] for one in NUMBERS["limits"]),
+        "noise follows from R2": all(0.8 < each["native"]["estimate"] / each["native"]["value"] < 1 for each in noise),
+        "aligned noise is half the paper's": all(2 * each["aligned"]["value"] < each["paper"] for each in noise),
+        "its estimate is lower": all(each["aligned"]["estimate"] < each["aligned"]["value"] for each in noise),
+        "another spread misses it": all(
+            each["native"]["by_other"] < 0.75 * each["paper"] for each in noise if each["variable"] == "lai"
+        ),
+    }
+    assert [words for words, holds in statements.items() if not holds] == []
 
 
 def in_a_line(path):
@@ -192,15 +189,6 @@ def test_estimate_of_noise_is_that_of_a_normal_pair(make_paper):
     assert make_paper.expected_noise(r2, lai.std() / lai.mean()) == pytest.approx(expected, rel=1e-9)
 
 
-def test_noise_follows_from_r2_and_the_spread(make_paper):
-    """Of drifting pixels within a fifth, of all pixels from below; aligned pixels have less than half the paper's."""
-    for row in make_paper.noise(NUMBERS):
-        assert 0.8 < row["native"]["estimate"] / row["native"]["value"] < 1
-        assert row["aligned"]["estimate"] < row["aligned"]["value"] < row["paper"] / 2
-        if row["variable"] == "lai":
-            assert row["native"]["by_other"] < 0.75 * row["paper"]
-
-
 def test_noise_and_spread_are_those_of_this_program(make_paper):
     """Of three realisations, within four standard errors. Else run ``python docs/make_paper.py --only scenes``."""
     seeds = range(make_paper.SEED + 100, make_paper.SEED + 103)
@@ -234,30 +222,6 @@ def test_pixels_keep_more_of_the_range_than_the_papers():
     assert said in in_a_line(DOCS / "paper.md")
     one = native["lai", 0.24]
     assert one["value"] > one["paper"] + 3 * one["deviation"]
-
-
-def test_every_choice_made_in_view_of_the_paper_is_called_fitted():
-    origins = {row["name"]: row["origin"] for row in NUMBERS["origins"]}
-    assert origins["reading of Table 1"] == origins["size of the scenes"] == "fitted to Table 2"
-    assert origins["form of the random field"] == origins["bounds of LAI"] == "fitted to the text"
-    assert {name for name, origin in origins.items() if origin == "assumed"} == {
-        "shape of the densities",
-        "elevation",
-        "hour and view",
-    }
-
-
-def test_no_threshold_gives_the_lengths_of_the_paper():
-    there = [one["there"] for one in NUMBERS["deviations"]["lengths"]]
-    assert max(there) > 10 * min(there)
-
-
-def test_ndvi_of_the_mean_is_the_lower_and_the_criterion_is_not_met():
-    assert all(one["bias"] < 0 and abs(one["correlation"]) > 0.3 for one in NUMBERS["scaling"])
-
-
-def test_limits_are_met():
-    assert all(one["met"] for one in NUMBERS["limits"])
 
 
 @pytest.mark.slow
