@@ -1,20 +1,36 @@
-"""Grids: where the FIFE site lies, what a raster's grid is, and which grids are refused."""
+"""Grids: their place, coordinates and CRS, how rasters carry them, and which are refused."""
 
+import json
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 
 import netCDF4
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
+import pyproj
 import pytest
 import xarray as xr
 from affine import Affine
-from lazy import check_place
+from lazy import ODD_CHUNKS, check_place, in_chunks, no_compute
 from odc.geo.geobox import GeoBox
+from odc.geo.xr import xr_coords
 
 import fifesim
 from fifesim.grids import grid as grids
 from fifesim.grids import sites
+from fifesim.grids.grid import (
+    along_axis,
+    as_carried,
+    centres_of,
+    check_axes,
+    crs_fields,
+    exact_cell,
+    geozarr_attributes,
+    north_up,
+    reference_of,
+    regular_geobox,
+    with_crs_of,
+)
 
 CELL = 30 / 9
 
@@ -254,3 +270,223 @@ def test_threads_may_place_rasters_on_many_grids():
     with ThreadPoolExecutor(8) as pool:
         found = list(pool.map(lambda grid: grids.geobox(grids.place(values, grid)), known))
     assert found == known
+
+
+def test_rows_from_the_south_are_turned(lai):
+    turned = lai.isel(y=slice(None, None, -1))
+    xr.testing.assert_identical(north_up(turned), lai)
+    assert north_up(lai) is lai
+    np.testing.assert_array_equal(turned.fifesim.surface_reflectance(), lai.fifesim.surface_reflectance())
+
+
+@pytest.mark.parametrize(
+    ("dims", "said"),
+    [
+        (("latitude", "longitude"), r"rename\(latitude='y', longitude='x'\)\.rio\.write_crs\(4326\)\.rio\.reproject"),
+        (("lat", "lon"), r"rename\(lat='y', lon='x'\)\.rio\.write_crs"),
+        (("northing", "easting"), r"type \.rename\(northing='y', easting='x'\)$"),
+        (("row", "sample"), r"got \('row', 'sample'\): rename or select"),
+    ],
+)
+def test_other_names_of_dimensions_say_what_to_type(dims, said):
+    with pytest.raises(ValueError, match=said):
+        check_axes(xr.DataArray(np.ones((2, 3)), dims=dims))
+    with pytest.raises(ValueError, match=said):
+        fifesim.to_toa(xr.DataArray(np.ones((2, 3)), dims=dims))
+
+
+def test_what_is_no_raster_is_refused():
+    with pytest.raises(TypeError, match=r"a raster is an xarray\.DataArray, got ndarray"):
+        check_axes(np.ones((2, 3)))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_grid_is_carried_as_a_raster_tells_it(seed):
+    """Origins that are no multiples of cells, and cells that no binary number is."""
+    draw = np.random.default_rng(seed)
+    cell = draw.choice([10 / 3, 30.0, 0.7, draw.uniform(0.5, 50)], 2)
+    west, north = 708000 + cell[1] * draw.integers(0, 900), 4331000 - draw.uniform(0, 5000)
+    rows, columns = draw.integers(1, 300, 2)
+    grid = grids.grid_at("EPSG:26914", west, north, columns * cell[1] + 1e-6, rows * cell[0] + 1e-6, tuple(cell))
+    for each in (grid, grid.pad(1)):
+        raster = grids.place(xr.DataArray(np.zeros(each.shape), dims=("y", "x")), each)
+        found, expected = as_carried(each), grids.geobox(raster)
+        assert found.shape == expected.shape and found.crs == expected.crs
+        assert tuple(found.affine) == tuple(expected.affine)
+
+
+def test_centres_are_the_coordinates():
+    grid = grids.grid_at("EPSG:26914", 708000.1, 4331000.7, 300, 200, 10 / 3)
+    for axis, values in zip(("y", "x"), centres_of(grid), strict=True):
+        np.testing.assert_array_equal(values, grids.coordinates(grid)[axis])
+
+
+TM34 = ["TM3", "TM4"]
+
+
+def lost(raster):
+    """What `xr.where` leaves of a raster: the same numbers and places, the CRS gone."""
+    out = xr.where(np.isfinite(raster), raster.drop_vars("spatial_ref"), np.nan)
+    assert out.odc.crs is None
+    return out
+
+
+def test_gets_the_crs_of_its_cells(lai, site):
+    found = with_crs_of(lost(lai), lai)
+    assert grids.same_grid(grids.geobox(found), site)
+    np.testing.assert_array_equal(found, lai)
+    assert with_crs_of(lai, lost(lai)) is lai
+    emptied = xr.where(lai > 1.5, 0.1, 0.3)  # the coordinate stays, without what it said
+    assert "spatial_ref" in emptied.coords and grids.same_grid(grids.geobox(with_crs_of(emptied, lai)), site)
+
+
+@pytest.mark.parametrize("change", ["shifted", "smaller", "without coordinates"])
+def test_other_cells_stay_without(lai, change):
+    other = lost(lai)
+    other = {
+        "shifted": other.assign_coords(x=other["x"] + 1),
+        "smaller": other.isel(x=slice(5)),
+        "without coordinates": other.drop_vars(["x", "y"]),
+    }[change]
+    assert with_crs_of(other, lai) is other
+    with pytest.raises(ValueError, match=r"no CRS.*xr\.where drops it"):
+        lai.fifesim.surface_reflectance(bands=TM34, canopy=fifesim.Canopy(background=other * 0.01))
+
+
+def test_every_combination_of_rasters_takes_one(lai):
+    """Background, elevation, angles, surroundings and pairs; to the bit as with the CRS."""
+    soil, dem = (lai * 0.01).clip(0, 1), lai * 20 + 300
+    rho = lai.fifesim.surface_reflectance(bands=TM34)
+
+    def steps(of):
+        sza = of(30 + lai.drop_attrs(deep=False))
+        yield lai.fifesim.surface_reflectance(bands=TM34, canopy=fifesim.Canopy(background=of(soil)))
+        yield lai.fifesim.surface_reflectance(bands=TM34, dem=of(dem.drop_attrs(deep=False)))
+        yield lai.fifesim.surface_reflectance(bands=TM34, geometry=xr.Dataset({"sza": sza, "saa": 100.0}))
+        yield rho.fifesim.kt(of(dem.drop_attrs(deep=False)))
+        yield rho.fifesim.to_toa(elevation=of(dem.drop_attrs(deep=False)))
+        yield rho.fifesim.to_toa(adjacency=True, surroundings=of(rho.drop_attrs(deep=False)))
+        yield xr.DataArray(fifesim.regress(lai, of(soil)).slope)
+        yield xr.DataArray(fifesim.regress(of(soil), lai).slope)
+
+    for kept, without in zip(steps(lambda raster: raster), steps(lost), strict=True):
+        xr.testing.assert_equal(without, kept)
+        if kept.ndim:
+            assert grids.same_grid(grids.geobox(without), grids.geobox(kept))
+
+
+def test_stays_lazy(lai):
+    soil = in_chunks(lost(lai * 0.01), ODD_CHUNKS)
+    with no_compute():
+        found = in_chunks(lai, ODD_CHUNKS).fifesim.surface_reflectance(
+            bands=TM34, canopy=fifesim.Canopy(background=soil)
+        )
+    whole = lai.fifesim.surface_reflectance(bands=TM34, canopy=fifesim.Canopy(background=lai * 0.01))
+    xr.testing.assert_equal(found.compute(), whole)
+
+
+GRID = fifesim.fife_site(cell=10, window=((0, 60), (0, 60)))
+WINDOW = fifesim.fife_site(cell=10, window=((10, 40), (10, 40)))
+
+
+def axis(values):
+    return xr.DataArray(np.zeros(len(values)), dims="x", coords={"x": values})
+
+
+def test_edge_and_cell_are_those_of_all_coordinates():
+    assert along_axis(axis([5.0, 15.0, 25.0]), "x", 0.0, 9.0) == (0.0, 10.0)
+    assert along_axis(axis([5.0]), "x", 1.0, 4.0) == (3.0, 4.0)
+    assert along_axis(axis([5.0]).drop_vars("x"), "x", 1.0, 4.0) == (1.0, 4.0)
+    with pytest.raises(ValueError, match="x is not evenly spaced"):
+        along_axis(axis([5.0, 15.0, 26.0]), "x", 0.0, 10.0)
+
+
+def test_a_transform_that_agrees_keeps_its_digits():
+    third = axis([1.0, 2.0]).assign_coords(spatial_ref=0)
+    third["spatial_ref"].attrs["GeoTransform"] = f"0 {10 / 3!r} 0 0 0 {-10 / 3!r}"
+    assert exact_cell(third, 3.333333, -3.333333) == (10 / 3, -10 / 3)
+    assert exact_cell(third, 3.4, -3.4) == (3.4, -3.4)
+
+
+def with_coordinates(raster, axis, change):
+    values = raster[axis].values.copy()
+    return raster.assign_coords({axis: change(values)})
+
+
+def one_missing(values):
+    values[5] = np.nan
+    return values
+
+
+UNEVEN = {
+    "gap": lambda raster, axis: raster.isel({axis: [*range(20), *range(30, 60)]}),
+    "overlap": lambda raster, axis: raster.isel({axis: [*range(30), *range(25, 60)]}),
+    "shuffled": lambda raster, axis: raster.isel({axis: [0, *np.random.default_rng(0).permutation(58) + 1, 59]}),
+    "missing": lambda raster, axis: with_coordinates(raster, axis, one_missing),
+    "changing": lambda raster, axis: with_coordinates(
+        raster, axis, lambda values: values + 15 * np.sin(np.linspace(0, np.pi, values.size))
+    ),
+}
+SOURCES = {
+    "open_lai": lambda raster: fifesim.open_lai(raster.rename("lai"), WINDOW),
+    "fine_dem": lambda raster: fifesim.fine_dem(300 + raster, WINDOW),
+    "source_dem": lambda raster: fifesim.source_dem(300 + raster, WINDOW, margin=0.0),
+    "moisture": lambda raster: fifesim.landscape(WINDOW, moisture=raster / 10),
+    "cover": lambda raster: fifesim.landscape(
+        WINDOW, cover=raster.astype(int), classes=[fifesim.CoverClass(str(i), lai=1.0, code=i) for i in range(10)]
+    ),
+}
+
+
+@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize("change", UNEVEN)
+def test_sources_with_unevenly_spaced_coordinates_are_refused(change, axis, source):
+    """odc-geo takes the grid from the first and last coordinates, and would shift the cells between them."""
+    raster = fifesim.lai_scene(GRID, seed=7).drop_attrs(deep=False)
+    SOURCES[source](raster)
+    with pytest.raises(ValueError, match=rf"{axis} is not evenly spaced.*\.interp"):
+        SOURCES[source](UNEVEN[change](raster, axis))
+
+
+def test_coordinates_in_single_precision_are_evenly_spaced():
+    """Half a metre of a northing of 4e6 m is lost then, which matters for cells of 1 m but not of 10 m."""
+    raster = fifesim.lai_scene(GRID, seed=7)
+    single = with_coordinates(raster, "y", lambda values: values.astype(np.float32))
+    assert regular_geobox(single).shape == GRID.shape
+    fine = with_coordinates(raster, "y", lambda values: (values[0] - 1.3 * np.arange(60)).astype(np.float32))
+    with pytest.raises(ValueError, match="y is not evenly spaced"):
+        regular_geobox(fine)
+
+
+def test_a_reference_is_that_of_its_grid_and_nobody_else_s():
+    grids = sites.fife_site(30.0), sites.fife_site(30.0)[5:, 7:]
+    for grid in grids:
+        assert reference_of(grid).identical(xr_coords(grid)["spatial_ref"])
+    reference_of(grids[0]).attrs.clear()
+    assert reference_of(grids[0]).attrs == xr_coords(grids[0])["spatial_ref"].attrs
+
+
+def test_a_group_says_its_crs_and_its_transform():
+    found = geozarr_attributes(fifesim.grid_at("EPSG:32735", 600000, 7200000, 900, 600, (20, 30)))
+    assert found["proj:code"] == "EPSG:32735" and "proj:wkt2" not in found
+    assert found["spatial:transform"] == [30.0, 0.0, 600000.0, 0.0, -20.0, 7200000.0]
+    assert (found["spatial:shape"], found["spatial:dimensions"]) == ([30, 30], ["y", "x"])
+    assert found["spatial:bbox"] == [600000.0, 7199400.0, 600900.0, 7200000.0]
+    assert json.loads(json.dumps(found)) == found
+
+
+def test_both_conventions_are_registered():
+    """By the identifiers of their README files, which a reader looks for."""
+    found = {each["name"]: each["uuid"] for each in geozarr_attributes(fifesim.fife_site(30))["zarr_conventions"]}
+    assert found == {
+        "proj": "f17cb550-5864-4468-aeb7-f3180cfb622f",
+        "spatial": "689b58e2-cf7b-45e0-9fff-9cfc0883d6b4",
+    }
+
+
+def test_a_crs_without_a_code_is_written_out():
+    own = pyproj.CRS.from_proj4("+proj=laea +lat_0=39 +lon_0=-96.5 +datum=WGS84 +units=m")
+    (name, text), *others = crs_fields(own).items()
+    assert name == "proj:wkt2" and not others
+    assert pyproj.CRS.from_wkt(text).equals(own)

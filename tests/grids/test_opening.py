@@ -1,19 +1,25 @@
-"""Only files of this machine, of known formats, are opened; whatever else is refused in one line."""
+"""Files that are opened: known formats of this machine, with numbers and a place on the Earth."""
 
+import math
 import os
+import re
 import socket
 import threading
+import warnings
 import zipfile
 
 import numpy as np
+import pyproj
 import pytest
 import rasterio
 import rasterio.shutil
 import rasterio.vrt
 from affine import Affine
+from rasterio.control import GroundControlPoint
 
 import fifesim
 from fifesim.grids import opening
+from fifesim.grids.opening import covering_grid
 
 GRID = fifesim.grid_at("EPSG:26914", 708000.0, 4332000.0, 240.0, 200.0, 10.0)
 
@@ -193,3 +199,189 @@ def test_a_file_that_may_not_be_read_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr(opening, "open", refuse, raising=False)
     with pytest.raises(ValueError, match=r"cannot read .*secret\.tif as a raster: Permission denied"):
         opening.raster_file(path)
+
+
+# ruff: noqa: E501
+ATTACKS = {
+    "subClass": '<VRTDataset subClass="VRTWarpedDataset"/>',
+    "raw": '<VRTDataset><VRTRasterBand subClass="VRTRawRasterBand"><SourceFilename>a.tif</SourceFilename></VRTRasterBand></VRTDataset>',
+    "python": '<VRTDataset><VRTRasterBand subClass="VRTDerivedRasterBand"><PixelFunctionLanguage>Python</PixelFunctionLanguage></VRTRasterBand></VRTDataset>',
+    "other case": "<VRTDataset><sourcefilename>a.tif</sourcefilename></VRTDataset>",
+    "options": '<VRTDataset><OpenOptions><OOI key="a">b</OOI></OpenOptions></VRTDataset>',
+    "overviews": '<VRTDataset><Metadata domain="OVERVIEWS"><MDI key="overview_file">/etc/a</MDI></Metadata></VRTDataset>',
+    "entity": '<!DOCTYPE a [<!ENTITY b "c">]><VRTDataset><SourceFilename>&b;</SourceFilename></VRTDataset>',
+    "inline": "<VRTDataset><SourceFilename>&lt;VRTDataset/&gt;</SourceFilename></VRTDataset>",
+    "blanks": "<VRTDataset><SourceFilename> a.tif</SourceFilename></VRTDataset>",
+    "address": "<VRTDataset><SourceFilename>http://localhost/a.tif</SourceFilename></VRTDataset>",
+    "twice": '<VRTDataset><SourceFilename relativeToVRT="1" relativetovrt="0">a.tif</SourceFilename></VRTDataset>',
+    "neither": '<VRTDataset><SourceFilename relativeToVRT="yes">a.tif</SourceFilename></VRTDataset>',
+    "missing": '<VRTDataset><SourceFilename relativeToVRT="1">b.tif</SourceFilename></VRTDataset>',
+    "broken": "<VRTDataset><",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", ATTACKS.values(), ids=ATTACKS)
+def test_what_may_lead_elsewhere_is_refused(tmp_path, text):
+    (tmp_path / "a.tif").touch()
+    (tmp_path / "a.vrt").write_text(text)
+    assert opening.is_mosaic(tmp_path / "a.vrt")
+    with pytest.raises(ValueError, match=r"^(with|of|whose) "):
+        opening.mosaic_sources(tmp_path / "a.vrt")
+
+
+def test_files_are_named_once(tmp_path):
+    (tmp_path / "a.tif").touch()
+    one = '<SimpleSource><SourceFilename relativeToVRT="1">a.tif</SourceFilename></SimpleSource>'
+    (tmp_path / "a.vrt").write_text(f'<VRTDataset><VRTRasterBand band="1">{one}{one}</VRTRasterBand></VRTDataset>')
+    assert opening.mosaic_sources(tmp_path / "a.vrt") == [str(tmp_path / "a.tif")]
+
+
+def test_descriptions_are_known_by_their_first_character(tmp_path):
+    for text, expected in (("\n <GDAL_WMS/>", True), ('{"type":"Feature"}', True), ("ncols 3", False), ("", False)):
+        (tmp_path / "a").write_text(text)
+        assert opening.is_description(tmp_path / "a") == expected
+
+
+SOUNDNESS_GRID = fifesim.grid_at("EPSG:26914", 708000.0, 4332000.0, 240.0, 200.0, 10.0)
+PLACED = Affine(10, 0, 707900, 0, -10, 4332100)
+LOCAL = 'LOCAL_CS["bench",UNIT["metre",1]]'
+
+
+def soundness_write(path, *, scale=1.0, offset=0.0, gcps=None, **other):
+    profile = {"driver": "GTiff", "width": 60, "height": 60, "count": 1, "dtype": "float32", "crs": "EPSG:26914"}
+    profile |= {"transform": PLACED} | other
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with rasterio.open(path, "w", **profile) as sink:
+            sink.write(np.full((1, 60, 60), 3, profile["dtype"]))
+            sink.scales, sink.offsets = [scale], [offset]
+            if gcps:
+                sink.gcps = gcps, rasterio.crs.CRS.from_epsg(26914)
+    return path
+
+
+def refused_everywhere(path, reason):
+    for door in (
+        fifesim.open_image,
+        lambda each: fifesim.open_lai(each, SOUNDNESS_GRID),
+        lambda each: fifesim.fine_dem(each, SOUNDNESS_GRID),
+    ):
+        with pytest.raises(ValueError, match=reason) as said:
+            door(path)
+        assert path.name in str(said.value) and len(str(said.value)) <= 500
+
+
+@pytest.mark.parametrize(
+    ("profile", "reason"),
+    [
+        ({"dtype": "complex64"}, "complex numbers.*real part"),
+        ({"scale": 0.0}, "scale of 0"),
+        ({"scale": math.nan}, "scale of nan"),
+        ({"offset": math.inf}, "offset of inf"),
+        ({"transform": Affine(0, 0, 707900, 0, 0, 4332100)}, "no place on the Earth.*a_ullr"),
+        ({"transform": Affine(10, 10, 707900, 10, 10, 4332100)}, "no place on the Earth"),
+        ({"transform": Affine(1e300, 0, 707900, 0, -1e300, 4332100)}, "no place on the Earth"),
+        ({"transform": Affine(10, 0, math.nan, 0, -10, 4332100)}, "no place on the Earth"),
+        ({"transform": Affine(1e-9, 0, 707900, 0, -1e-9, 4332100)}, "no place on the Earth"),
+        ({"transform": None}, "has no geotransform.*gdalwarp"),
+        ({"crs": None}, "has no CRS.*a_srs"),
+        ({"crs": LOCAL}, "no projected nor geographic one"),
+        ({"crs": "EPSG:4978"}, "no projected nor geographic one"),
+    ],
+)
+def test_what_is_no_raster_on_the_earth_is_refused(tmp_path, profile, reason):
+    refused_everywhere(soundness_write(tmp_path / "odd.tif", **profile), reason)
+
+
+def test_control_points_alone_are_refused(tmp_path):
+    points = [GroundControlPoint(row, row**2, 708000 + row, 4332000 - row) for row in range(4)]
+    path = soundness_write(tmp_path / "points.tif", transform=None, crs=None, gcps=points)
+    refused_everywhere(path, "control points only.*gdalwarp")
+
+
+@pytest.mark.parametrize("angle", [90, 180, 20])
+def test_a_turned_image_is_refused(tmp_path, angle):
+    turned = Affine.translation(708000, 4332000) @ Affine.rotation(angle) @ Affine.scale(10, -10)
+    with pytest.raises(ValueError, match=r"turned\.tif is rotated or not north up.*gdalwarp"):
+        fifesim.open_image(soundness_write(tmp_path / "turned.tif", transform=turned))
+
+
+def test_heights_take_no_part_in_places(tmp_path):
+    plain, compound = (
+        soundness_write(tmp_path / "plain.tif"),
+        soundness_write(tmp_path / "compound.tif", crs="EPSG:26914+5703"),
+    )
+    image = fifesim.open_image(compound)
+    assert image.rio.crs == "EPSG:26914" and image.equals(fifesim.open_image(plain))
+    np.testing.assert_array_equal(fifesim.open_lai(compound, SOUNDNESS_GRID), fifesim.open_lai(plain, SOUNDNESS_GRID))
+
+
+@pytest.mark.slow
+def test_a_small_file_of_huge_size_is_read_by_parts_only(tmp_path):
+    path = tmp_path / "huge.tif"
+    profile = {"driver": "GTiff", "width": 1_000_000, "height": 1_000_000, "count": 1, "dtype": "uint8"}
+    profile |= {"tiled": True, "blockxsize": 8192, "blockysize": 8192, "sparse_ok": True, "bigtiff": "yes"}
+    with rasterio.open(path, "w", **profile, crs="EPSG:26914", transform=PLACED * Affine.scale(0.005)):
+        pass
+    assert path.stat().st_size < 1_000_000
+    with pytest.raises(ValueError, match=r"huge\.tif takes 1e\+03 GB of memory.*chunks='auto'"):
+        fifesim.open_image(path)
+    lazy = fifesim.open_image(path, chunks=1000)
+    assert float(lazy[0, :5, :5].sum()) == 0
+
+
+def test_no_data_beyond_the_type_mark_nothing(tmp_path):
+    """A mark that no cell can hold, which GDAL takes from a mosaic."""
+    soundness_write(tmp_path / "cells.tif", dtype="uint8")
+    rasterio.shutil.copy(tmp_path / "cells.tif", tmp_path / "marked.vrt", driver="VRT")
+    text = (tmp_path / "marked.vrt").read_text()
+    band = re.search("<VRTRasterBand[^>]*>", text)[0]
+    (tmp_path / "marked.vrt").write_text(text.replace(band, f"{band}<NoDataValue>-9999</NoDataValue>"))
+    assert (fifesim.open_image(tmp_path / "marked.vrt") == 3).all()
+
+
+def test_memory_is_asked_for_first():
+    opening.check_memory(10, 8, "it", "leave it")
+    with pytest.raises(ValueError, match=r"it takes 8e\+09 GB of memory, .* GB are free: leave it"):
+        opening.check_memory(1e18, 8, "it", "leave it")
+
+
+IN_DEGREES = Affine(0.0002, 0, -96.6, 0, -0.0002, 39.12)
+IN_METRES = Affine(10, 0, 709003, 0, -10, 4332001)
+
+
+def file(path, affine, crs):
+    profile = {"driver": "GTiff", "height": 77, "width": 91, "count": 1, "dtype": "uint8"}
+    with rasterio.open(path, "w", **profile, crs=crs, transform=affine):
+        pass
+    return path
+
+
+@pytest.mark.parametrize(
+    ("affine", "own", "asked", "epsg"),
+    [
+        (IN_DEGREES, 4326, None, 32614),
+        (IN_METRES, 26914, None, 26914),
+        (IN_METRES, 26914, "EPSG:26914", 26914),
+        (IN_METRES, 26914, "EPSG:5070", 5070),
+        (IN_DEGREES, 4326, "EPSG:32615", 32615),
+    ],
+)
+def test_covering_grid_covers_the_file_in_whole_pixels(tmp_path, affine, own, asked, epsg):
+    grid = covering_grid(file(tmp_path / "lai.tif", affine, own), 10 / 3, 30.0, asked)
+    a, box = grid.affine, grid.boundingbox
+    assert grid.crs.epsg == epsg
+    assert a.c % 30 == 0 and a.f % 30 == 0 and grid.shape.x % 9 == 0 and grid.shape.y % 9 == 0
+    corners = np.array([affine * corner for corner in [(0, 0), (91, 0), (0, 77), (91, 77)]])
+    x, y = pyproj.Transformer.from_crs(own, epsg, always_xy=True).transform(*corners.T)
+    assert box.left <= x.min() < box.left + 31 and box.right - 31 < x.max() <= box.right
+    assert box.bottom <= y.min() < box.bottom + 31 and box.top - 31 < y.max() <= box.top
+
+
+@pytest.mark.parametrize(
+    ("crs", "said"), [("EPSG:4326", "must be projected"), ("EPSG:2193", "EPSG:2193"), ("EPSG:3857", "the scale of")]
+)
+def test_a_reference_system_in_which_no_map_is_made_is_refused(tmp_path, crs, said):
+    with pytest.raises(ValueError, match=said) as caught:
+        covering_grid(file(tmp_path / "lai.tif", IN_METRES, 26914), 10.0, 30.0, crs)
+    assert len(str(caught.value)) < 500 and "\n" not in str(caught.value)

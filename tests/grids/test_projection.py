@@ -1,12 +1,14 @@
-"""Coordinate operations of known accuracy."""
+"""Coordinate operations of known accuracy, and objects of PROJ, one for each thread."""
 
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
 import pyproj
 import pytest
 
+import fifesim
 from fifesim.grids import projection, sites
 from fifesim.grids.grid import check_grid, grid_at
 
@@ -129,3 +131,58 @@ def test_a_scale_beyond_a_percent_is_told_once_for_a_place():
         grid_at(west=28.2e5 * 1.113 + 30, north=-1.2e6, **mercator)
         check_grid(grid)
         grid_at(west=28.2e5 * 1.113, north=-0.5e6, **mercator)
+
+
+UTM = "EPSG:26914"
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: projection.transformer(UTM, 4326),
+        lambda: projection.projection_of(UTM),
+        lambda: projection.from_own_meridian(UTM),
+    ],
+)
+def test_a_thread_makes_an_object_once_and_shares_it_with_no_other(make):
+    mine = make()
+    with ThreadPoolExecutor(1) as pool:
+        other, again = (pool.submit(make).result() for _ in range(2))
+    assert make() is mine and other is again and other is not mine
+
+
+def test_objects_are_what_proj_makes():
+    place = 708000.0, 4331000.0
+    expected = pyproj.Transformer.from_crs(UTM, 4326, always_xy=True).transform(*place)
+    assert projection.transformer(UTM, 4326).transform(*place) == expected
+    found, expected = (each.get_factors(-96.5, 39.1) for each in (projection.projection_of(UTM), pyproj.Proj(UTM)))
+    assert (found.meridian_convergence, found.meridional_scale) == (
+        expected.meridian_convergence,
+        expected.meridional_scale,
+    )
+
+
+def test_longitudes_count_from_the_meridian_of_the_crs():
+    """That of Paris: NTF has its origin there."""
+    assert "+pm" in pyproj.Proj("EPSG:27572").srs
+    assert "+pm" not in projection.from_own_meridian("EPSG:27572").srs
+
+
+def test_few_are_kept(monkeypatch):
+    monkeypatch.setattr(projection, "_MOST", 2)
+    with ThreadPoolExecutor(1) as pool:
+        first, _, _, again = (
+            pool.submit(projection.projection_of, f"EPSG:{code}").result() for code in (32601, 32602, 32603, 32601)
+        )
+    assert again is not first
+
+
+def test_middle_of_the_site():
+    """The paper's place, to a hundredth of a degree."""
+    assert projection.middle(fifesim.fife_site(30)) == pytest.approx((-96.54, 39.06), abs=0.02)
+
+
+def test_grid_in_words_has_its_crs_and_degrees():
+    grid = fifesim.grid_at("EPSG:32735", 620000.0, 7220000.0, 300.0, 200.0, 10.0)
+    said = "620000 to 620300 E and 7219800 to 7220000 N in EPSG:32735 (latitude -25.13, longitude 28.19)"
+    assert projection.lies_in_words(grid.affine, grid.shape, grid.crs) == said

@@ -1,7 +1,8 @@
-"""Rasters as people have them, and what is not taken for a reflectance in silence."""
+"""Rasters of users: what is taken for a reflectance, and units, scales and names of bands."""
 
 import warnings
 
+import dask.array as da
 import numpy as np
 import pytest
 import rasterio
@@ -11,7 +12,7 @@ from lazy import in_chunks, no_compute
 
 import fifesim
 from fifesim.grids import grid as grids
-from fifesim.grids.inputs import check_reflectance, in_micrometres, incoming
+from fifesim.grids.inputs import check_reflectance, in_micrometres, incoming, unpacked
 
 AIR, TIME = fifesim.Atmosphere(), "2022-06-03T17:10Z"
 
@@ -220,3 +221,23 @@ def test_bands_of_another_instrument_are_no_silent_assumption(lai):
     with pytest.warns(UserWarning, match="are taken for TM3, TM4"):
         as_tm = rho.fifesim.to_toa(instrument="TM")
     assert as_tm["band"].values.tolist() == ["TM3", "TM4"] and as_tm.attrs["instrument"] == "TM"
+
+
+CELLS = np.array([[0, 35], [255, 100]], np.uint8)
+
+
+def test_scale_offset_and_fill_are_undone_and_forgotten():
+    packed = xr.DataArray(CELLS, dims=("y", "x"), name="Lai_500m")
+    packed.attrs = {"scale_factor": 0.1, "add_offset": 1.0, "_FillValue": 255, "units": "m2/m2"}
+    found = unpacked(packed)
+    np.testing.assert_allclose(found, [[1.0, 4.5], [np.nan, 11.0]], rtol=1e-15)
+    assert (found.attrs, found.name, packed.attrs["scale_factor"]) == ({"units": "m2/m2"}, "Lai_500m", 0.1)
+    with no_compute():
+        lazy = unpacked(packed.chunk())
+    assert isinstance(lazy.data, da.Array)
+    np.testing.assert_array_equal(lazy, found)
+
+
+def test_what_is_not_packed_passes_as_it_is():
+    plain = xr.DataArray(CELLS.astype(np.float32), dims=("y", "x"), attrs={"_FillValue": np.nan, "scale_factor": 1})
+    assert unpacked(plain) is plain
