@@ -61,26 +61,32 @@ def test_provenance_and_history_carry_on():
     after = cf.label(raster(), "fpar", source=source, history="two", references="Tanre", arp=0.2)
     assert after.attrs["history"] == "one\ntwo"
     assert after.attrs["references"] == "Friedl; Tanre"
+    again = cf.label(raster(), "toa_reflectance", source=after, history="to_toa", references="Tanre")
+    assert again.attrs["references"] == "Friedl; Tanre"
     assert after.attrs["arp"] == 0.2
     assert "something" not in after.attrs
 
 
-def test_reference_is_not_said_twice():
-    source = raster(references="Friedl; Tanre")
-    after = cf.label(raster(), "toa_reflectance", source=source, history="to_toa", references="Tanre")
-    assert after.attrs["references"] == "Friedl; Tanre"
-
-
-@pytest.mark.parametrize("units", ["1", "", "m2 m-2", " 1 ", "dimensionless", None])
-def test_right_or_missing_units_pass(units):
-    cf.check_units(raster(**({} if units is None else {"units": units})), "lai")
-
-
 def test_wrong_units_are_named_with_the_right_ones():
-    with pytest.raises(ValueError, match=r"mine has units 'percent', toa_reflectance needs '1' or 'W m-2 sr-1 um-1'"):
-        cf.check_units(raster(units="percent"), "toa_reflectance", "toa_radiance")
-    with pytest.raises(ValueError, match="'1'"):
-        cf.check_units(raster(units="1"), "toa_radiance")
+    for units in ("1", "", "m2 m-2", " 1 ", "dimensionless"):
+        cf.check_units(raster(units=units), "lai")
+    cf.check_units(raster(), "lai")
+    # rioxarray gives the units of bands as a tuple.
+    radiance = xr.DataArray(np.zeros((3, 2, 2)), attrs={"units": ("W m-2 sr-1 um-1",) * 3})
+    cf.check_units(radiance, "toa_radiance")
+    percent, fraction = raster(units="percent"), raster(units="1")
+    refused = {
+        r"mine has units 'percent', toa_reflectance needs '1' or 'W m-2 sr-1 um-1'": (
+            percent,
+            "toa_reflectance",
+            "toa_radiance",
+        ),
+        "'1'": (fraction, "toa_radiance"),
+        r"has units 'W m-2 sr-1 um-1', toa_reflectance needs '1'": (radiance, "toa_reflectance"),
+    }
+    for message, (given, *names) in refused.items():
+        with pytest.raises(ValueError, match=message):
+            cf.check_units(given, *names)
 
 
 def test_numbers_along_band_have_units():
@@ -118,11 +124,3 @@ def test_a_raster_of_another_quantity_is_refused(step, said, cure):
     with pytest.raises(ValueError, match=f"{said}.*{cure}") as caught:
         step(lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]))
     assert len(str(caught.value)) <= 500
-
-
-def test_units_listed_by_band_are_named_once():
-    """rioxarray gives the units of bands as a tuple."""
-    listed = xr.DataArray(np.zeros((3, 2, 2)), attrs={"units": ("W m-2 sr-1 um-1",) * 3})
-    with pytest.raises(ValueError, match=r"has units 'W m-2 sr-1 um-1', toa_reflectance needs '1'"):
-        cf.check_units(listed, "toa_reflectance")
-    cf.check_units(listed, "toa_radiance")

@@ -32,42 +32,24 @@ def test_kernel_sees_numbers_and_the_result_keeps_the_grid(array_type):
     one, two = array_type(raster(seed=1)), array_type(raster(seed=2))
     with no_compute():
         out = chunks.pointwise(lambda a, b, power: a + b**power, one, two, power=2)
+        counts = chunks.pointwise(lambda a: (a * 9).astype(np.uint8), one, dtype=np.uint8)
     np.testing.assert_array_equal(out, one.values + two.values**2)
     assert grids.same_grid(grids.geobox(out), GRID)
-
-
-def test_values_along_band_meet_rasters(array_type):
-    cube = array_type(raster(bands=3))
-    with no_compute():
-        out = chunks.pointwise(np.multiply, cube, BANDS)
-    assert out.dims == ("band", "y", "x")
-    np.testing.assert_array_equal(out, cube.values * BANDS.values[:, None, None])
-
-
-def test_kernel_may_make_bands(array_type):
-    plain = array_type(raster())
-    with no_compute():
-        out = chunks.pointwise(lambda a: np.stack([a, 2 * a]), plain, bands=2)
-    assert out.dims == ("band", "y", "x")
-    np.testing.assert_array_equal(out, np.stack([plain.values, 2 * plain.values]))
+    assert counts.dtype == np.uint8 == counts.compute().dtype
 
 
 @pytest.mark.parametrize("pieces", [{}, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}])
-def test_kernel_that_makes_bands_gets_those_of_its_inputs_together(pieces):
-    """A file opened lazily has one band a chunk."""
-    plain, cube = in_chunks(raster(), pieces), in_chunks(raster(seed=1, bands=3), pieces)
+@pytest.mark.parametrize("plain_pieces", [{}, ODD_CHUNKS])
+def test_kernels_meet_bands_and_make_them(pieces, plain_pieces):
+    """In memory or lazy; a file opened lazily has one band a chunk."""
+    plain, cube = in_chunks(raster(), plain_pieces), in_chunks(raster(seed=1, bands=3), pieces)
     with no_compute():
-        out = chunks.pointwise(lambda a, b: np.moveaxis(a[..., None] - b, -1, 0), plain, cube, bands=3)
-    np.testing.assert_array_equal(out, plain.values - cube.values)
-
-
-@pytest.mark.parametrize("pieces", [ODD_CHUNKS, ODD_CHUNKS | {"band": 1}])
-def test_what_is_in_memory_meets_what_is_lazy(pieces):
-    plain, cube = raster(), in_chunks(raster(seed=1, bands=3), pieces)
-    with no_compute():
+        made = chunks.pointwise(lambda a: np.stack([a, 2 * a]), plain, bands=2)
         sums = chunks.pointwise(lambda a, b, c: a + b * c, cube, plain, BANDS)
-        made = chunks.pointwise(lambda a, b, c: np.moveaxis(a + b[..., None] * c, -1, 0), cube, plain, BANDS, bands=3)
-    for out in (sums, made):
+        both = chunks.pointwise(lambda a, b, c: np.moveaxis(a + b[..., None] * c, -1, 0), cube, plain, BANDS, bands=3)
+    np.testing.assert_array_equal(made, np.stack([plain.values, 2 * plain.values]))
+    for out in (sums, both):
+        assert out.dims == ("band", "y", "x")
         np.testing.assert_array_equal(out, cube.values + plain.values * BANDS.values[:, None, None])
 
 
@@ -91,11 +73,6 @@ def test_blocks_along_bands_are_not_copied():
     dask.compute(out, entries, scheduler="synchronous")
     assert len(seen) == 2 * cube.data.npartitions
     assert all(any(np.shares_memory(block, each) for each in made) for block in seen)
-
-
-def test_dtype_is_known_before_anything_is_computed():
-    out = chunks.pointwise(lambda a: (a * 9).astype(np.uint8), in_chunks(raster(), ODD_CHUNKS), dtype=np.uint8)
-    assert out.dtype == np.uint8 == out.compute().dtype
 
 
 def test_rasters_on_other_grids_are_refused():
@@ -203,11 +180,6 @@ def test_second_pass_begins_when_the_first_is_over():
     assert sorted(order[:2]) == sorted(order[2:]) == [(0, 0), (1, 0)]
 
 
-def test_what_lies_in_memory_is_not_made_again():
-    array = xr.DataArray(VALUES, dims=("band", "y", "x"))
-    assert chunks.second_pass(array, VALUES) is array
-
-
 def counted(calls):
     """A lazy array that notes each of its blocks when it is made."""
 
@@ -226,10 +198,14 @@ def rechunked():
 
 
 @pytest.mark.parametrize("scheduler", ["synchronous", "threads", "processes"])
-def test_values_are_those_of_the_array(scheduler):
-    array = rechunked()
-    found = apart(array)
-    assert (found.shape, found.dtype, found.numblocks) == (array.shape, array.dtype, (1, 1))
+@pytest.mark.parametrize("dtype", [float, np.float32, np.int16])
+def test_values_are_those_of_the_array(scheduler, dtype):
+    """And no task is shared with it."""
+    array = rechunked().astype(dtype)
+    with no_compute():
+        found = apart(array)
+    assert (found.shape, found.dtype, found.numblocks) == (array.shape, dtype, (1, 1))
+    assert not set(found.__dask_graph__()) & set(array.__dask_graph__())
     workers = {"num_workers": 1} if scheduler == "processes" else {}
     np.testing.assert_array_equal(found.compute(scheduler=scheduler, **workers), array.compute())
 
@@ -251,19 +227,6 @@ def test_one_task_keeps_to_its_thread():
         assert client.compute(apart(blocks).sum()).result(timeout=20) == 4800
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.int16, bool])
-def test_kind_of_number_is_kept(dtype):
-    array = da.ones((4, 6), chunks=3, dtype=dtype)
-    assert apart(array).dtype == dtype and apart(array).compute().dtype == dtype
-
-
-def test_nothing_is_computed_early():
-    calls = []
-    with no_compute():
-        lazy = apart(counted(calls))[::2] + 1
-    assert lazy.shape == (30, 80) and not calls
-
-
 def test_blocks_are_made_for_the_sample_and_again_for_what_uses_them():
     """Else each would wait in memory for the last: the sample is of all, and what uses it has them one by one."""
     calls = []
@@ -275,20 +238,19 @@ def test_blocks_are_made_for_the_sample_and_again_for_what_uses_them():
     np.testing.assert_allclose(found, (whole - whole[::4, ::4].sum()).sum(axis=1), rtol=1e-12)
 
 
-def test_no_task_is_shared_with_the_array():
-    array = rechunked()
-    assert not set(apart(array).__dask_graph__()) & set(array.__dask_graph__())
-
-
-def test_the_same_array_has_the_same_key_and_is_computed_once():
+def test_the_same_array_has_the_same_key_and_shared_parts_are_computed_once():
     """Bits of a graph that are the same are one task, and other arrays are others."""
     calls = []
     array = counted(calls)
     one, other = apart(array), apart(array)
     assert one.name == other.name and one.name != apart(array + 1).name
+    assert apart(rechunked()).name == apart(rechunked()).name
     dask.compute(one, other, scheduler="synchronous")
     assert len(calls) == 9
-    assert apart(rechunked()).name == apart(rechunked()).name
+    found = dask.compute(*all_apart([array[::4, ::4], array.sum(axis=0)]), scheduler="synchronous")
+    assert len(calls) == 18
+    np.testing.assert_array_equal(found[0], array.compute()[::4, ::4])
+    np.testing.assert_array_equal(found[1], array.compute().sum(axis=0))
 
 
 def test_what_fails_in_it_is_told():
@@ -298,15 +260,6 @@ def test_what_fails_in_it_is_told():
     array = da.ones((4, 4), chunks=2).map_blocks(refuse, dtype=float, meta=np.empty((0, 0)))
     with pytest.raises(ValueError, match="brightness must be in"):
         apart(array).compute()
-
-
-def test_what_several_need_is_made_once():
-    calls = []
-    array = counted(calls)
-    found = dask.compute(*all_apart([array[::4, ::4], array.sum(axis=0)]), scheduler="synchronous")
-    assert len(calls) == 9
-    np.testing.assert_array_equal(found[0], array.compute()[::4, ::4])
-    np.testing.assert_array_equal(found[1], array.compute().sum(axis=0))
 
 
 def test_samples_of_samples_are_made_once_by_all_threads():
@@ -337,12 +290,9 @@ def test_numbers_fill_layers_and_order_stays(lai):
     np.testing.assert_array_equal(out[0], np.full(lai.shape, 0.5))
     np.testing.assert_array_equal(out[1], lai)
     assert out.rio.crs == lai.rio.crs
-
-
-def test_stays_lazy(lai):
     with no_compute():
         lazy = by_band({"b": 0.5, "a": in_chunks(lai, ODD_CHUNKS)}, lai)
-    xr.testing.assert_equal(lazy.compute(), by_band({"b": 0.5, "a": lai}, lai))
+    xr.testing.assert_equal(lazy.compute(), out)
 
 
 def test_layers_by_name_or_one_for_all(lai):

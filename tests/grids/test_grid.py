@@ -128,10 +128,8 @@ def test_rasters_without_a_usable_grid_are_refused():
         "x is not evenly spaced": raster.isel(x=[0, 1, 3]),
         "north up": raster[::-1],
         "the raster has no cells, ": raster[:, :0],
+        "regular grid: one row tells no cell": raster[:1].drop_vars("spatial_ref").rio.write_crs(32614),
     }
-    refused[r"regular grid: one row tells no cell, .*write_transform"] = (
-        raster[2:3].drop_vars("spatial_ref").rio.write_crs(26914)
-    )
     for message, each in refused.items():
         with pytest.raises(ValueError, match=message):
             grids.geobox(each)

@@ -46,10 +46,6 @@ def test_operation_runs_in_both_directions():
     np.testing.assert_allclose(again, (705000.0, 4334000.0), rtol=0, atol=1e-3)
 
 
-def test_same_crs_needs_no_operation():
-    assert projection.operation("EPSG:26914", pyproj.CRS("EPSG:26914").to_wkt()) == (None, 0.0)
-
-
 def test_convergence_of_a_utm_zone_is_positive_east_of_its_meridian():
     """Sine of the latitude times the distance from the central meridian."""
     expected = np.sin(np.radians(39.06)) * (99 - 96.54)
@@ -76,49 +72,44 @@ def test_convergence_of_a_polar_grid_is_where_true_north_is(crs, latitude):
     assert projection.convergence(grid) == pytest.approx(-east_of_grid_north, abs=0.01)
 
 
-@pytest.mark.parametrize(
-    ("crs", "west", "north", "said"),
-    [
-        ("EPSG:3031", 0.0, 3.5e6, "scale of EPSG:3031 is 1.050 .* such as EPSG:32731"),
-        ("EPSG:3413", 0.0, -3.5e6, "scale of EPSG:3413 is 1.047 .* such as EPSG:32623"),
-        ("EPSG:3857", -10.75e6, 4.7e6, "scale of EPSG:3857 is 1.284 .* such as EPSG:32614"),
-        ("EPSG:3857", 17e6, -4.7e6, "such as EPSG:32756"),
-        ("EPSG:6933", -9.26e6, 4.6e6, "scale of EPSG:6933 is 1.1"),
-        ("EPSG:3857", 1e8, 0.0, r"west = 100000000, north = 0: the grid is outside .* -20037508 to 20037508 E"),
-        ("EPSG:26914", float("nan"), 4e6, "outside the area of EPSG:26914"),
-        ("EPSG:2053", 0.0, 0.0, "axes of the CRS must point east and north, the axes of EPSG:2053 point"),
-        ("EPSG:2277", 0.0, 0.0, "must be in metres, EPSG:2277 is in US survey foot"),
-        ("EPSG:4978", 0.0, 0.0, "must be projected, EPSG:4978 is not"),
-        ("EPSG:5703", 0.0, 0.0, "must be projected"),
-        ("", 0.0, 0.0, "crs = '': PROJ knows no such"),
-        ("[" * 10_000, 0.0, 0.0, "PROJ knows no such"),
-        (None, 0.0, 0.0, "crs = None: PROJ knows no such"),
-    ],
-)
+NO_METRES = [
+    ("EPSG:3031", 0.0, 3.5e6, "scale of EPSG:3031 is 1.050 .* such as EPSG:32731"),
+    ("EPSG:3413", 0.0, -3.5e6, "scale of EPSG:3413 is 1.047 .* such as EPSG:32623"),
+    ("EPSG:3857", -10.75e6, 4.7e6, "scale of EPSG:3857 is 1.284 .* such as EPSG:32614"),
+    ("EPSG:3857", 17e6, -4.7e6, "such as EPSG:32756"),
+    ("EPSG:6933", -9.26e6, 4.6e6, "scale of EPSG:6933 is 1.1"),
+    ("EPSG:3857", 1e8, 0.0, r"west = 100000000, north = 0: the grid is outside .* -20037508 to 20037508 E"),
+    ("EPSG:26914", float("nan"), 4e6, "outside the area of EPSG:26914"),
+    ("EPSG:2053", 0.0, 0.0, "axes of the CRS must point east and north, the axes of EPSG:2053 point"),
+    ("EPSG:2277", 0.0, 0.0, "must be in metres, EPSG:2277 is in US survey foot"),
+    ("EPSG:4978", 0.0, 0.0, "must be projected, EPSG:4978 is not"),
+    ("EPSG:5703", 0.0, 0.0, "must be projected"),
+    ("", 0.0, 0.0, "crs = '': PROJ knows no such"),
+    ("[" * 10_000, 0.0, 0.0, "PROJ knows no such"),
+    (None, 0.0, 0.0, "crs = None: PROJ knows no such"),
+]
+
+
+@pytest.mark.parametrize(("crs", "west", "north", "said"), NO_METRES)
 def test_coordinates_that_are_no_metres_on_the_ground_are_refused(crs, west, north, said):
     with pytest.raises(ValueError, match=said) as caught:
         grid_at(crs, west, north, 90.0, 90.0, 10.0)
     assert len(str(caught.value)) < 300 and str(caught.value).isprintable()
 
 
-@pytest.mark.parametrize(
-    ("crs", "west", "north"),
-    [
-        *(("EPSG:3031", 0.0, 0.0), ("EPSG:3413", 0.0, -2e6), ("EPSG:5042", 2e6, 2e6), ("EPSG:32661", 2e6, 2e6)),
-        *(("EPSG:3857", -10.75e6, 0.0), ("EPSG:3035", 4.3e6, 3.2e6), ("EPSG:2193", 1.6e6, 5.2e6)),
+def test_projections_that_keep_distances_are_taken_without_heights():
+    taken = [
+        ("EPSG:3031", 0, 0), ("EPSG:3413", 0, -2e6), ("EPSG:5042", 2e6, 2e6), ("EPSG:32661", 2e6, 2e6),
+        ("EPSG:3857", -10.75e6, 0), ("EPSG:3035", 4.3e6, 3.2e6), ("EPSG:2193", 1.6e6, 5.2e6),
         # Longitude from Paris and from Ferro.
-        *(("EPSG:27572", 6e5, 2.2e6), ("EPSG:31281", 12674.0, 5206730.0)),
-    ],
-)
-def test_any_projection_that_keeps_distances_is_taken(crs, west, north):
-    grid = grid_at(crs, west, north, 90.0, 90.0, 10.0)
-    assert (grid.affine.c, grid.affine.f) == (west, north)
-
-
-def test_heights_are_left_out():
-    assert projection.horizontal("EPSG:26914+5703") == "EPSG:26914"
+        ("EPSG:27572", 6e5, 2.2e6), ("EPSG:31281", 12674, 5206730),
+    ]  # fmt: skip
+    for crs, west, north in taken:
+        affine = grid_at(crs, west, north, 90.0, 90.0, 10.0).affine
+        assert (affine.c, affine.f) == (west, north)
+    assert projection.horizontal("EPSG:26914+5703") == projection.horizontal("EPSG:26914") == "EPSG:26914"
     assert projection.horizontal(pyproj.CRS("EPSG:7415").to_wkt()) == "EPSG:28992"
-    assert projection.horizontal("EPSG:26914") == "EPSG:26914"
+    assert projection.operation("EPSG:26914", pyproj.CRS("EPSG:26914").to_wkt()) == (None, 0.0)
 
 
 def test_a_scale_beyond_a_percent_is_told_once_for_a_place():
@@ -133,33 +124,16 @@ def test_a_scale_beyond_a_percent_is_told_once_for_a_place():
         grid_at(west=28.2e5 * 1.113, north=-0.5e6, **mercator)
 
 
-UTM = "EPSG:26914"
+@pytest.mark.parametrize("name", ["transformer", "projection_of", "from_own_meridian"])
+def test_a_thread_makes_an_object_once_and_shares_it_with_no_other(name, monkeypatch):
+    def make(code):
+        return getattr(projection, name)(f"EPSG:{code}", *[4326] * (name == "transformer"))
 
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: projection.transformer(UTM, 4326),
-        lambda: projection.projection_of(UTM),
-        lambda: projection.from_own_meridian(UTM),
-    ],
-)
-def test_a_thread_makes_an_object_once_and_shares_it_with_no_other(make):
-    mine = make()
+    monkeypatch.setattr(projection, "_MOST", 2)
+    mine, codes = make(26914), (26914, 26914, 32601, 32602, 26914)
     with ThreadPoolExecutor(1) as pool:
-        other, again = (pool.submit(make).result() for _ in range(2))
-    assert make() is mine and other is again and other is not mine
-
-
-def test_objects_are_what_proj_makes():
-    place = 708000.0, 4331000.0
-    expected = pyproj.Transformer.from_crs(UTM, 4326, always_xy=True).transform(*place)
-    assert projection.transformer(UTM, 4326).transform(*place) == expected
-    found, expected = (each.get_factors(-96.5, 39.1) for each in (projection.projection_of(UTM), pyproj.Proj(UTM)))
-    assert (found.meridian_convergence, found.meridional_scale) == (
-        expected.meridian_convergence,
-        expected.meridional_scale,
-    )
+        other, again, _, _, anew = (pool.submit(make, code).result() for code in codes)
+    assert make(26914) is mine and other is again and other is not mine and anew is not other
 
 
 def test_longitudes_count_from_the_meridian_of_the_crs():
@@ -168,21 +142,9 @@ def test_longitudes_count_from_the_meridian_of_the_crs():
     assert "+pm" not in projection.from_own_meridian("EPSG:27572").srs
 
 
-def test_few_are_kept(monkeypatch):
-    monkeypatch.setattr(projection, "_MOST", 2)
-    with ThreadPoolExecutor(1) as pool:
-        first, _, _, again = (
-            pool.submit(projection.projection_of, f"EPSG:{code}").result() for code in (32601, 32602, 32603, 32601)
-        )
-    assert again is not first
-
-
-def test_middle_of_the_site():
-    """The paper's place, to a hundredth of a degree."""
-    assert projection.middle(fifesim.fife_site(30)) == pytest.approx((-96.54, 39.06), abs=0.02)
-
-
 def test_grid_in_words_has_its_crs_and_degrees():
     grid = fifesim.grid_at("EPSG:32735", 620000.0, 7220000.0, 300.0, 200.0, 10.0)
     said = "620000 to 620300 E and 7219800 to 7220000 N in EPSG:32735 (latitude -25.13, longitude 28.19)"
     assert projection.lies_in_words(grid.affine, grid.shape, grid.crs) == said
+    # The paper's place.
+    assert projection.middle(sites.fife_site(30)) == pytest.approx((-96.54, 39.06), abs=0.02)

@@ -17,8 +17,6 @@ from fifesim.grids import reductions
 from fifesim.grids.reductions import (
     areas,
     combined,
-    computed,
-    extremes,
     operators,
     regularized,
     resample,
@@ -69,17 +67,6 @@ def test_blocks_are_added_in_their_order():
     assert data.sum() != 0
 
 
-def test_limits_leave_out_what_is_missing():
-    gap = RASTER.where(RASTER > 3)
-    assert extremes(in_chunks(gap, ODD_CHUNKS)) == extremes(gap) == (VALUES[VALUES > 3].min(), VALUES.max())
-
-
-def test_arrays_come_into_memory():
-    lazy, plain = computed(in_chunks(RASTER, ODD_CHUNKS), VALUES)
-    assert lazy.chunks is None and plain is VALUES
-    np.testing.assert_array_equal(lazy, VALUES)
-
-
 CELLS = fifesim.grid_at("EPSG:26914", 705600.0, 4334000.0, 120.0, 90.0, 3.0)
 # Off the lattice of the cells, and higher than wide.
 PIXELS = fifesim.grid_at("EPSG:26914", 705604.0, 4333991.5, 96.0, 75.0, (25.0, 16.0))
@@ -103,6 +90,10 @@ def test_means_over_areas_are_sums_of_overlaps(cells):
     rows = overlaps(3.0 * np.arange(31), 8.5 + 25.0 * np.arange(4))
     columns = overlaps(3.0 * np.arange(41), 4.0 + 16.0 * np.arange(7))
     found = regularized(cells, areas(PIXELS), PIXELS, min_valid=0.98)
+    with no_compute():
+        lazy = regularized(in_chunks(cells.rename(None), ODD_CHUNKS), areas(PIXELS), PIXELS, min_valid=0.98)
+    assert lazy.name is None
+    xr.testing.assert_identical(lazy.compute().rename("cells"), found)
     np.testing.assert_allclose(found, rows @ cells.values @ columns.T, rtol=1e-12)
     assert grids.same_grid(grids.geobox(found), PIXELS) and found.name == "cells" and found.attrs == {"units": "1"}
 
@@ -123,12 +114,6 @@ def test_spreads_stand_down_and_across():
     rows, columns = operators((Boxcar(9.0), Boxcar(30.0)), CELLS, PIXELS)
     assert len(rows) == 3 and len(columns) == 6
     assert rows.count.max() == 4 and columns.count.max() == 11
-
-
-def test_chunks_change_no_bit(cells):
-    with no_compute():
-        lazy = regularized(in_chunks(cells, ODD_CHUNKS), areas(PIXELS), PIXELS, min_valid=0.5)
-    xr.testing.assert_identical(lazy.compute(), regularized(cells, areas(PIXELS), PIXELS, min_valid=0.5))
 
 
 def raster(seed=0, bands=None):
@@ -160,6 +145,10 @@ def test_resampling_gives_the_same_bits_in_any_chunks(pixels, bands):
             lazy = resample(rows, columns, in_chunks(scene, pieces), pixels)
         assert lazy.chunks is not None
         xr.testing.assert_identical(lazy.compute(), whole)
+    # Lazy arrays promise a dtype before they are computed.
+    single = scene.astype(np.float32)
+    lazy, eager = (resample(rows, columns, each, pixels) for each in (in_chunks(single, ODD_CHUNKS), single))
+    assert lazy.dtype == lazy.compute().dtype == eager.dtype
 
 
 def test_output_chunks_read_only_the_cells_that_they_need():
@@ -179,25 +168,11 @@ def test_output_chunks_read_only_the_cells_that_they_need():
         image[0, 0].compute()
 
 
-def test_single_precision_stays_what_is_promised():
-    """Lazy arrays promise a dtype before they are computed."""
-    rows, columns = operators((Boxcar(30.0), Boxcar(30.0)), SITE, ANYWHERE[0])
-    scene = raster().astype(np.float32)
-    eager = resample(rows, columns, scene, ANYWHERE[0])
-    lazy = resample(rows, columns, in_chunks(scene, ODD_CHUNKS), ANYWHERE[0])
-    assert lazy.dtype == lazy.compute().dtype == eager.dtype
-
-
 def test_grid_without_pixels_in_the_scene_is_all_missing():
     far = GeoBox((3, 4), SITE.affine * SITE.affine.translation(900, 900), SITE.crs)
     rows, columns = operators((Boxcar(30.0), Boxcar(30.0)), SITE, far)
     for scene in (raster(), in_chunks(raster(), ODD_CHUNKS)):
         assert np.isnan(resample(rows, columns, scene, far)).all()
-
-
-def test_raster_without_a_name_gets_none_of_dasks():
-    lazy = regularized(in_chunks(raster().rename(None), ODD_CHUNKS), areas(ANYWHERE[0]), ANYWHERE[0], min_valid=0.5)
-    assert lazy.name is None
 
 
 WEIGHTS = np.array([[0.5, 0.25, 0.0, 0.0, 0.25], [0.0, 0.0, 2.0, -1.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0]])

@@ -14,45 +14,27 @@ from fifesim.grids.sites import is_fife, made_on_site, on_fife_site
 CELL = 30 / 9
 
 
-def test_site_is_15_km_of_cells_from_its_corner():
+def test_site_is_15_km_of_whole_cells_from_its_corner():
     grid = fifesim.fife_site(CELL)
-    assert tuple(grid.shape) == (4500, 4500)
-    assert grid.crs.epsg == 26914
-    box = grid.boundingbox
-    np.testing.assert_allclose(
-        (box.left, box.top, box.right, box.bottom), (704970, 4334220, 719970, 4319220), rtol=0, atol=1e-6
-    )
-
-
-def test_site_corner_lies_on_the_30_m_lattice():
-    corner = fifesim.fife_site(30).affine
-    assert corner.c % 30 == 0 and corner.f % 30 == 0
-
-
-def test_site_in_its_own_datum():
-    grid = fifesim.fife_site(30, datum="NAD27")
-    assert grid.crs.epsg == 26714
-    assert (grid.affine.c, grid.affine.f) == (705000.0, 4334000.0)
-
-
-def test_only_whole_cells_are_kept():
+    assert tuple(grid.shape) == (4500, 4500) and grid.crs.epsg == 26914
+    np.testing.assert_allclose(grid.boundingbox.bbox, (704970, 4319220, 719970, 4334220), rtol=0, atol=1e-6)
+    own = fifesim.fife_site(30, datum="NAD27")
+    assert own.crs.epsg == 26714 and (own.affine.c, own.affine.f) == (705000.0, 4334000.0)
     assert tuple(fifesim.fife_site(29).shape) == (517, 517)
     assert tuple(fifesim.grid_at("EPSG:32614", 0, 1e6, 100, 70, 30).shape) == (2, 3)
 
 
-@pytest.mark.parametrize(
-    "options, message",
-    [
-        ({"cell": 0}, r"cell must be in \(0, 15000\] m, got 0"),
-        ({"cell": 30, "datum": "WGS84"}, "datum must be one of NAD83, NAD27, got 'WGS84'"),
-        ({"cell": 30, "window": ((0, 10), (0, 501))}, "within 500 rows and 500 columns"),
-        ({"cell": 30, "window": ((5, 5), (0, 10))}, "within 500 rows"),
-        ({"cell": 30, "window": 10}, "window must be"),
-    ],
-)
-def test_site_refuses_what_makes_no_grid(options, message):
-    with pytest.raises(ValueError, match=message):
-        fifesim.fife_site(**options)
+def test_site_refuses_what_makes_no_grid():
+    refused = {
+        r"cell must be in \(0, 15000\] m, got 0": {"cell": 0},
+        "datum must be one of NAD83, NAD27, got 'WGS84'": {"cell": 30, "datum": "WGS84"},
+        "within 500 rows and 500 columns": {"cell": 30, "window": ((0, 10), (0, 501))},
+        "within 500 rows": {"cell": 30, "window": ((5, 5), (0, 10))},
+        "window must be": {"cell": 30, "window": 10},
+    }
+    for message, options in refused.items():
+        with pytest.raises(ValueError, match=message):
+            fifesim.fife_site(**options)
 
 
 @pytest.mark.parametrize(
@@ -97,19 +79,31 @@ def test_season_is_each_date_by_itself():
             assert float(season[name][number]) == pytest.approx(getattr(alone, name), abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    "times",
-    [
+def test_times_of_any_kind():
+    expected = fifesim.sun_position(DATES[0], **FIFE).sza
+    kinds = (
         pd.to_datetime(DATES[:1]),
         np.array(["1987-06-06T16:35"], "datetime64[m]"),
         [datetime.datetime(1987, 6, 6, 16, 35, tzinfo=datetime.UTC)],
         xr.DataArray(np.array(["1987-06-06T16:35"], "datetime64[ns]"), dims="time"),
-    ],
-    ids=["index", "numpy", "datetime", "DataArray"],
-)
-def test_times_of_any_kind(times):
-    season = fifesim.sun_position(times, **FIFE)
-    assert float(season["sza"][0]) == pytest.approx(fifesim.sun_position(DATES[0], **FIFE).sza, abs=1e-9)
+    )
+    for times in kinds:
+        assert float(fifesim.sun_position(times, **FIFE)["sza"][0]) == pytest.approx(expected, abs=1e-9)
+
+
+def test_what_is_no_time_or_place_is_one_line():
+    two = {"latitude": [1.0, 2.0], "longitude": 3.0}
+    refused = [
+        (["noon"], FIFE, r"time must be a date and time such as .*, got 'noon'"),
+        ([], FIFE, r"time must be one time, or a list .* got a list of 0"),
+        (np.ones((2, 2)), FIFE, "time must be one time, or a list"),
+        (None, FIFE, r"time must be a date and time .* got None"),
+        (DATES, two, r"one for each of 3 times, got \(2,\) and \(\) and \(\)"),
+        ("1987-06-06T06:00Z", FIFE, "the sun is below the horizon"),
+    ]
+    for time, place, message in refused:
+        with pytest.raises(ValueError, match=message):
+            fifesim.sun_position(time, **place)
 
 
 def test_a_place_for_each_time_and_a_time_for_many_places():
@@ -118,19 +112,3 @@ def test_a_place_for_each_time_and_a_time_for_many_places():
     assert float(both["sza"][1]) > 90  # night in Australia: told, not refused
     many = fifesim.sun_position(DATES[0], latitude=[39.06, 0.0, 39.06], longitude=-96.54)
     assert many.sizes == {"time": 3} and float(many["sza"][0]) == float(many["sza"][2]) != float(many["sza"][1])
-
-
-@pytest.mark.parametrize(
-    ("time", "place", "message"),
-    [
-        (["noon"], FIFE, r"time must be a date and time such as .*, got 'noon'"),
-        ([], FIFE, r"time must be one time, or a list .* got a list of 0"),
-        (np.ones((2, 2)), FIFE, "time must be one time, or a list"),
-        (None, FIFE, r"time must be a date and time .* got None"),
-        (DATES, {"latitude": [1.0, 2.0], "longitude": 3.0}, r"one for each of 3 times, got \(2,\) and \(\) and \(\)"),
-        ("1987-06-06T06:00Z", FIFE, "the sun is below the horizon"),
-    ],
-)
-def test_what_is_no_time_or_place_is_one_line(time, place, message):
-    with pytest.raises(ValueError, match=message):
-        fifesim.sun_position(time, **place)

@@ -14,7 +14,7 @@ from lazy import no_compute
 import fifesim
 from fifesim.grids import grid as grids
 from fifesim.grids import windows
-from fifesim.grids.windows import _ORIGINS, array_by_place, array_from_windows, gather, held, made_of, origin_of, slices
+from fifesim.grids.windows import _ORIGINS, array_by_place, array_from_windows, gather, held, made_of, origin_of
 
 CELLS = np.arange(11.0 * 13).reshape(11, 13)
 
@@ -64,24 +64,6 @@ def test_little_of_a_chunk_is_cut_out_of_it_first(columns, cut):
     assert found.compute().sum() == 10 * columns
 
 
-def test_the_kernel_is_told_its_place():
-    found = array_from_windows(
-        lambda row, column: np.full((2, 3), 10.0 * row + column),
-        [],
-        ((2, 2), (3, 3)),
-        lambda rows, columns: ((rows.start, columns.start), []),
-        token="place",
-    )
-    np.testing.assert_array_equal(found.compute()[::2, ::3], [[0, 3], [20, 23]])
-
-
-def test_cells_by_place_are_those_of_one_call():
-    def kernel(row, column, shape):
-        return CELLS[row : row + shape[0], column : column + shape[1]]
-
-    np.testing.assert_array_equal(array_by_place(kernel, ((4, 7), (6, 6, 1)), token="cells").compute(), CELLS)
-
-
 def test_what_lies_beside_a_chunk_by_place_is_made_with_the_block():
     """As a task of its own, dask may put it off, and the chunk waits for it."""
     cells = array_by_place(
@@ -93,10 +75,6 @@ def test_what_lies_beside_a_chunk_by_place_is_made_with_the_block():
     for column in (0, 1):
         needed = get_dependencies(tasks, (found.name, 0, column))
         assert {key for key in needed if isinstance(key, tuple)} == {(cells.name, 0, column)}
-
-
-def test_slices_follow_each_other():
-    assert slices((2, 3)) == [slice(0, 2), slice(2, 5)]
 
 
 def test_a_gathered_window_is_missing_beyond_the_array():
@@ -146,6 +124,8 @@ def test_tiles_are_made_by_their_place(pieces):
         out = windows.tiles(cells_that_tell_their_place, GRID, pieces, tile=8)
     assert (out.chunks is None) == (pieces is None)
     np.testing.assert_array_equal(out, cells_that_tell_their_place(0, 0, tuple(GRID.shape)))
+    with pytest.raises(ValueError, match="chunks name the dimensions y and x, got band"):
+        windows.tiles(cells_that_tell_their_place, GRID, {"band": 1}, tile=8)
 
 
 def test_automatic_chunks_end_where_tiles_end():
@@ -154,11 +134,6 @@ def test_automatic_chunks_end_where_tiles_end():
     for first, sizes in zip(grids.lattice_position(GRID), out.chunks, strict=True):
         ends = first + np.cumsum(sizes)[:-1]
         assert (ends % 16 == 0).all() and len(ends) > 1
-
-
-def test_unknown_dimension_of_chunks_is_named():
-    with pytest.raises(ValueError, match="chunks name the dimensions y and x, got band"):
-        windows.tiles(cells_that_tell_their_place, GRID, {"band": 1}, tile=8)
 
 
 @pytest.mark.parametrize("tile", [8, 1008])
@@ -198,13 +173,9 @@ def raster(chunks):
 
 def test_an_origin_stays_with_the_values():
     made = made_of(raster(2), "leaves")
-    assert origin_of(made) == "leaves"
+    assert origin_of(made) == "leaves" and origin_of(made.compute()) is None
     assert origin_of(made.assign_coords(sza=30.0).rename("other")) == "leaves"
     assert origin_of(made + 1) is None and origin_of(made[1:]) is None and origin_of(made.persist()) is None
-
-
-def test_rasters_in_memory_have_none():
-    assert origin_of(xr.DataArray(np.zeros((4, 6)), dims=("y", "x"))) is None
 
 
 def test_an_origin_does_not_travel():
