@@ -60,6 +60,8 @@ from .atmosphere.aerosol_labels import read_aerosol as read_aerosol
 from .atmosphere.aerosol_labels import aerosol_tables as aerosol_tables
 from .chain.steps import to_toa as to_toa  # method, of a Dataset too
 from .chain.steps import to_surface as to_surface  # method, of a Dataset too
+from .atmosphere.clouds.labels import cloud_field as cloud_field
+from .atmosphere.clouds.labels import cast_clouds as cast_clouds  # method
 from .chain.comparison import compare_engines as compare_engines
 
 # Sensor

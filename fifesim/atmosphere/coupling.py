@@ -457,6 +457,13 @@ def _one_band(scattering, nodes, atmosphere, band, sza, vza):
     )
 
 
+def band_gas_transmittance(atmosphere, band, geometry, names):
+    """Mean transmittance of some gases in a band, from the sun to the ground and to the sensor. [1]"""
+    wavelength, _ = _steps(band.limits, band.name)
+    air_mass = 1 / geometry.mu_s + 1 / geometry.mu_v
+    return float(_quadrature(band).mean(gases.gas_transmittance(wavelength, atmosphere, air_mass, gases=names)))
+
+
 @cached(256, "weights of a band over the gas table")
 def _quadrature(band):
     """Weights of a band mean of spectra on its `_steps`."""

@@ -11,7 +11,7 @@ from fifesim.atmosphere.gases import DEPOLARIZATION, rayleigh_anisotropy, raylei
 from fifesim.base.caches import cached
 from fifesim.base.geometry import scattering_angle_cosine
 
-MOST_ORDERS = 1000
+MOST_ORDERS = 4000
 ONE_THREAD = 2**18  # products of so many terms or fewer are not worth a second thread to BLAS
 
 

@@ -3,7 +3,8 @@ Unbounded lattice of cells, and random numbers by seed and place on it.
 
 Each stage draws from separate streams, so that one seed serves them all: 1 is the periodic field, 2 the library of
 spectra, 3 to 6 the parameters and landscapes of the chips of a study, 16 and up the synthetic hills, 2**40 and up the
-bands of a sensor, 2**50 and up the seeds of the fields of a landscape. The streaming field has a separate generator.
+bands of a sensor, 2**45 the clouds, 2**50 and up the seeds of the fields of a landscape. The streaming field has a
+separate generator.
 
 Coordinates counted from this origin are identical to the bit in a window and in the whole. Coordinates summed from the
 origin of each grid would differ by 1e-10 m, and xarray aligns exactly. A value computed by tile is the same in every

@@ -10,6 +10,7 @@ import xarray as xr
 from fifesim.analysis import index_labels
 from fifesim.atmosphere import engines
 from fifesim.atmosphere import labels as atmosphere_labels
+from fifesim.atmosphere.clouds.labels import with_clouds
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.annotations import Names, Surroundings, Time
 from fifesim.base.arguments import Kind, described
@@ -422,6 +423,7 @@ def to_toa(
     elevation: xr.DataArray | None = None,
     adjacency: bool = False,
     surroundings: Surroundings | None = None,
+    clouds: xr.Dataset | None = None,
 ) -> xr.DataArray:
     """
     Apparent reflectance at the top of the atmosphere.
@@ -449,6 +451,9 @@ def to_toa(
     surroundings : number, sequence or xarray.DataArray, optional
         Reflectance around the scene for `adjacency`: a number, one number per band, or a raster on a larger grid; by
         default the scene mean. [1]
+    clouds : xarray.Dataset, dims (y, x), optional
+        Clouds from `cast_clouds`, or from `cloud_field`, which are then cast onto the level ground or ``elevation``.
+        They need one direction of sun and sensor.
 
     Returns
     -------
@@ -466,13 +471,16 @@ def to_toa(
     Without ``elevation`` the whole scene is at the altitude of the atmosphere. A height difference of 100 m changes the
     molecular optical depth by 1 %, and the reflectance by 0.001 in the blue and less at longer wavelengths.
 
+    Clouds lie above the atmosphere except for its ozone; shadows keep the skylight. Light that leaves the sides of
+    clouds is not simulated.
+
     References
     ----------
     [Tanre1990]_
 
     See Also
     --------
-    fifesim.atmosphere.coupling.apparent_reflectance
+    fifesim.atmosphere.coupling.apparent_reflectance, fifesim.atmosphere.clouds.layer.clouded_reflectance, cast_clouds
 
     Examples
     --------
@@ -491,6 +499,8 @@ def to_toa(
         directions.dated(reflectance, time), *air,
         elevation=elevation, adjacency=adjacency, surroundings=surroundings, made=seen_through_air(reflectance),
     )  # fmt: skip
+    if clouds is not None:
+        toa = with_clouds(toa, clouds, *air, elevation=elevation)
     return _of(instrument, toa)
 
 

@@ -1,0 +1,1 @@
+"""Clouds: their field, their light and their shadows."""

@@ -1,0 +1,394 @@
+"""Clouds on labelled rasters: the field of a sky, and its cells toward the sensor, the sun and the zenith."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import xarray as xr
+from odc.geo.geobox import GeoBox
+
+from fifesim.atmosphere import coupling, engines
+from fifesim.atmosphere.clouds import layer
+from fifesim.atmosphere.clouds.field import LONGEST, SHORTEST, CloudCover, cloud_displacement, cloud_thickness
+from fifesim.atmosphere.models import Atmosphere
+from fifesim.base.annotations import Chunks, Pair, Time, Times, WholeNumber
+from fifesim.base.arguments import Kind
+from fifesim.base.geometry import ANGLES
+from fifesim.base.lattice import check_seed
+from fifesim.base.messages import warn
+from fifesim.base.times import utc
+from fifesim.grids import cf, chunks, directions, windows
+from fifesim.grids import grid as grids
+from fifesim.grids.dates import by_date, joined
+from fifesim.grids.directions import Directions
+from fifesim.grids.grid import with_crs_of
+
+HIGHEST_CLOUD = 20_000.0  # of clouds [m]
+LOWEST_SUN = 85.0  # zenith angle beyond which shadows have no end [degree]
+LEAST = 0.1  # optical thickness from which a cell counts as cloud; sensors miss thinner clouds [1]
+_DEEPEST = 500.0  # ground below the altitude of the atmosphere that the margin of relief allows for [m]
+_TILE = 1008
+
+COLUMNS = ("optical_thickness", "shadow_thickness", "overhead_thickness")
+"""Variables of `cast_clouds` that `to_toa` reads: clouds toward the sensor, toward the sun and overhead."""
+
+
+def cloud_field(
+    grid: GeoBox,
+    cover: float = 0.4,
+    *,
+    thickness: Pair = 8.0,
+    length: float = 2000.0,
+    height: Pair = 1500.0,
+    seed: WholeNumber = 0,
+    drift: Annotated[Pair, Kind("two speeds, eastward and northward, such as (5.0, 0.0)")] = (0.0, 0.0),
+    time: Annotated[
+        Times | float | None, Kind("a time such as '1987-06-06T16:35Z', a list of times, or seconds")
+    ] = None,
+    margin: float = 0.0,
+    chunks: Chunks | None = None,
+) -> xr.Dataset:
+    """
+    Simulate a field of water clouds as a function of seed and place.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+        Grid of the ground cells, in a projected CRS.
+    cover : float, optional
+        Cloud cover, 0 to 1. It holds exactly on each square of 100 km, after which the field repeats. [1]
+    thickness : float or (float, float), optional
+        Mean optical thickness within clouds, or mean and standard deviation; by default the standard deviation equals
+        the mean, as in broken clouds. Clouds thicker than 100 are cut to 100. [1]
+    length : float, optional
+        Distance at which the correlation has fallen to 0.05, 100 to 20000. [m]
+    height : float or (float, float), optional
+        Height of the clouds above the ground, or of base and top, up to 20000. Relief is measured from the altitude of
+        the atmosphere. [m]
+    seed : int, optional
+        Seed, in [0, 2**63).
+    drift : (float, float), optional
+        Speed of the clouds eastward and northward. [m s-1]
+    time : str, datetime, sequence or float, optional
+        Time by which the clouds have drifted: seconds, or dates and times. Each date in UTC has an independent sky that
+        drifts from midnight on. A list adds the dimension time.
+    margin : float, optional
+        Distance by which the field extends beyond the grid on every side, for clouds whose shadow or image falls on the
+        grid: height times the sum of the tangents of the zenith angles of sun and sensor. [m]
+    chunks : mapping or int or "auto", optional
+        Chunks of a lazy field.
+
+    Returns
+    -------
+    clouds : xarray.Dataset, dims (y, x)
+        ``optical_thickness`` [1], lognormal within clouds and 0 between them, and the numbers ``base`` and ``top`` [m].
+        Identical for any chunks, window and cell size. A Dataset of the same variables from other sources serves as
+        well.
+
+    Raises
+    ------
+    ValueError
+        If cover, thickness, length, height or seed is out of range, or the base is above the top.
+
+    References
+    ----------
+    [Cahalan1989]_, spectrum; [Barker1996]_, distribution of thickness
+
+    See Also
+    --------
+    cast_clouds, to_toa, fifesim.atmosphere.clouds.field.cloud_thickness
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.grid_at("EPSG:26914", 700000, 4330000, width=100000, height=100000, cell=500)
+    >>> sky = fifesim.cloud_field(grid, cover=0.3, seed=7)
+    >>> round(float((sky.optical_thickness > 0).mean()), 2)
+    0.3
+    """
+    if np.ndim(time):
+        options = {"thickness": thickness, "length": length, "height": height, "seed": seed, "drift": drift}
+        each = [cloud_field(grid, cover, **options, time=one, margin=margin, chunks=chunks) for one in time]
+        return each[0].assign(optical_thickness=joined([one["optical_thickness"] for one in each]))
+    grid = grids.check_grid(grid)
+    base, top = _base_and_top(height)
+    mean, deviation = _pair(thickness, lambda single: (single, single))
+    _check_range("cover", cover, 0, 1, "")
+    _check_range("length", length, SHORTEST, LONGEST, " m")
+    _check_range("margin", margin, 0, 200_000, " m")
+    if not (0 < mean <= layer.THICKEST and deviation > 0):
+        raise ValueError(
+            f"thickness must be a mean from 0 to {layer.THICKEST:g} and a standard deviation above 0, got {thickness}"
+        )
+    day, seconds = _day_and_seconds(time)
+    sky = CloudCover(float(cover), (mean, deviation), float(length), check_seed(seed), day)
+    around = [int(np.ceil(margin / size - 1e-9)) for size in grids.cell_size(grid)]
+    grid = grids.on_lattice(grid.pad(around[1], around[0]))
+    moved = [round(float(speed) * seconds * 1000) for speed in drift]
+    northing, easting = (np.round(each * 1000).astype(np.int64) for each in grids.centres_of(grid))
+    kernel = partial(_cells, sky, northing, easting, moved)
+    cells = windows.tiles(kernel, grid, chunks, tile=_TILE)
+    text = f"cloud_field: cover {cover:g}, thickness {mean:g} ({deviation:g}), length {length:g} m, seed {seed}"
+    cells = cf.label(cells, "optical_thickness", history=text, rng_seed=str(seed))
+    numbers = {name: ((), each, cf.attributes(f"cloud_{name}")) for name, each in (("base", base), ("top", top))}
+    clouds = xr.Dataset({"optical_thickness": cells, **numbers})
+    return clouds if time is None or isinstance(time, int | float) else directions.dated(clouds, time)
+
+
+def _cells(sky, northing, easting, moved, row, column, shape):
+    """Optical thickness of the cells of a window, shape (rows, columns). [1]"""
+    rows, columns = northing[row : row + shape[0]], easting[column : column + shape[1]]
+    return cloud_thickness(sky, rows - moved[1], columns - moved[0], layer.THICKEST)
+
+
+def _day_and_seconds(time):
+    """Number of the date and seconds from its midnight in UTC; seconds alone belong to day 0."""
+    if time is None or isinstance(time, int | float | np.number):
+        return 0, float(time or 0)
+    stamp = utc(time)[0]
+    return stamp.normalize().toordinal(), (stamp - stamp.normalize()).total_seconds()
+
+
+def _pair(value, doubled):
+    return tuple(map(float, value)) if np.ndim(value) else doubled(float(value))
+
+
+def _base_and_top(height):
+    base, top = _pair(height, lambda single: (single, single))
+    _check_range("base", base, 0, HIGHEST_CLOUD, " m above the ground")
+    _check_range("top", top, 0, HIGHEST_CLOUD, " m above the ground")
+    if base > top:
+        raise ValueError(f"the base of clouds must not be above their top, got {base:g} and {top:g} m: swap them")
+    return base, top
+
+
+def _check_range(name, value, low, high, unit):
+    if not low <= value <= high:
+        raise ValueError(f"{name} must be from {low:g} to {high:g}{unit}, got {value:g}")
+
+
+@by_date
+def cast_clouds(
+    scene: xr.DataArray,
+    clouds: xr.Dataset,
+    *,
+    dem: xr.DataArray | None = None,
+    altitude: float | None = None,
+    geometry: Directions | None = None,
+    time: Time | None = None,
+    least: float = LEAST,
+) -> xr.Dataset:
+    """
+    Find the clouds toward the sensor, toward the sun and overhead of each ground cell.
+
+    Parameters
+    ----------
+    scene : xarray.DataArray, dims (..., y, x)
+        Raster on the cells of the ground, such as leaf area or reflectance.
+    clouds : xarray.Dataset, dims (y, x)
+        ``optical_thickness`` [1] of clouds, without NaN beyond the known area, and the numbers ``base`` and ``top``
+        [m], from `cloud_field` or other sources. Its grid has the cells of the scene and may be larger.
+    dem : xarray.DataArray, dims (y, x), optional
+        Elevation, onto which images and shadows of the clouds fall; by default the ground is level. [m]
+    altitude : float, optional
+        Altitude from which the height of the clouds is measured above relief; by default the altitude of the atmosphere
+        of the scene, or 0.4. [km]
+    geometry, time : optional
+        Directions of sun and sensor, as in `to_toa`; one direction for the scene.
+    least : float, optional
+        Optical thickness from which a cell counts as cloud or shadow. [1]
+
+    Returns
+    -------
+    cells : xarray.Dataset, dims (y, x)
+        ``cloud`` and ``shadow``, 1 or 0; their means over pixels are fractions. ``optical_thickness``,
+        ``shadow_thickness`` and ``overhead_thickness`` of the clouds toward the sensor, toward the sun and overhead.
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If the clouds have other cells, base and top are invalid, the sun is lower than 5 degrees, or directions vary
+        within the scene.
+
+    Warns
+    -----
+    UserWarning
+        If clouds beyond the end of the field could shade or hide cells, with the missing distance.
+
+    Notes
+    -----
+    Clouds are a thin layer at the middle of base and top. The nearest cell of the field is read, so positions are right
+    to half a cell, and a cloud of n cells has a shadow of n cells on level ground.
+
+    See Also
+    --------
+    cloud_field, to_toa, fifesim.atmosphere.clouds.field.cloud_displacement
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30, window=((0, 100), (0, 100)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> sky = fifesim.cloud_field(grid, cover=0.4, seed=3, margin=2000)
+    >>> lai.fifesim.cast_clouds(sky).cloud.shape
+    (100, 100)
+    """
+    grids.check_axes(scene)
+    geometry = directions.uniform_geometry(directions.given_geometry(geometry, scene, time), "clouds")
+    if geometry.sza > LOWEST_SUN:
+        raise ValueError(
+            f"the sun must be at least 5 degrees above the horizon, got {90 - geometry.sza:.1f}: choose another time"
+        )
+    if altitude is None:
+        altitude = Atmosphere.parse(scene.attrs["atmosphere"]).altitude if "atmosphere" in scene.attrs else 0.4
+    grid = grids.geobox(scene)
+    thickness, height = _checked(clouds, scene)
+    ground = None if dem is None else with_crs_of(dem.transpose("y", "x"), scene)
+    sizes = _chunks_of(scene, thickness, ground)
+    turned = directions.from_grid_north(geometry, grid)
+    east, north, image_east, image_north = cloud_displacement(1.0, *(getattr(turned, name) for name in ANGLES))
+    down, across = grids.cell_size(grid)
+    ways = {name: (south / down, -west / across) for name, south, west in zip(
+        COLUMNS, (image_north, north, 0.0), (image_east, east, 0.0), strict=True)}  # fmt: skip
+    _warn_of_missing(thickness, grid, ways.values(), height)
+    found = {
+        name: _seen_along(way, thickness, grid, height, ground, 1000 * altitude, sizes) for name, way in ways.items()
+    }
+    seen, sunlit = found["optical_thickness"], found["shadow_thickness"]
+    masks = {"cloud": (seen >= least).where(seen.notnull()), "shadow": (sunlit >= least).where(sunlit.notnull())}
+    names = {"shadow": "cloud_shadow"}
+    text = f"cast_clouds: height {height:g} m, from optical thickness {least:g}"
+    made = {
+        name: cf.label(
+            grids.place(each.astype(float), grid), names.get(name, name), history=text, source=clouds[COLUMNS[0]]
+        )
+        for name, each in (masks | found).items()
+    }
+    return directions.with_geometry(xr.Dataset(made), geometry)
+
+
+def _checked(clouds, scene):
+    """Optical thickness of a cloud field, dims (y, x), and height of its layer [m]."""
+    if missing := [name for name in ("optical_thickness", "base", "top") if name not in clouds]:
+        raise ValueError(
+            f"clouds need the variables optical_thickness, base and top, {', '.join(missing)} is missing: see "
+            "fifesim.cloud_field"
+        )
+    if np.ndim(clouds["base"]) or np.ndim(clouds["top"]):
+        raise ValueError("base and top of clouds must be one number each [m]: cast layers of different height in turn")
+    base, top = _base_and_top((float(clouds["base"]), float(clouds["top"])))
+    thickness = clouds["optical_thickness"]
+    cf.check_units(thickness, "optical_thickness")
+    return with_crs_of(thickness.transpose("y", "x"), scene).astype(float), (base + top) / 2
+
+
+def _chunks_of(scene, *others):
+    """Chunks of the result, by rows and columns; None if all rasters are in memory."""
+    if not any(each is not None and each.chunks is not None for each in (scene, *others)):
+        return None
+    if scene.chunks is not None:
+        return scene.chunksizes["y"], scene.chunksizes["x"]
+    return windows.chunk_sizes(grids.geobox(scene), "auto", tile=_TILE)
+
+
+def _warn_of_missing(thickness, grid, ways, height):
+    """Warn if the field ends within reach of the images and shadows on a grid."""
+    field = grids.geobox(thickness)
+    missing = [0.0]
+    for first, cells, known, size, shifts in zip(
+        grids.lattice_offset(field, grid), grid.shape, field.shape, grids.cell_size(grid),
+        zip(*ways, strict=True), strict=True,
+    ):  # fmt: skip
+        ends = [first + np.rint(shift * height) for shift in shifts]
+        missing += [max(-min(ends), max(ends) + cells - known) * size]
+    if max(missing) > 0:
+        warn(
+            f"the clouds end {max(missing):.0f} m too early: beyond, the sky is taken as clear; give "
+            f"cloud_field(..., margin={max(missing):.0f}) or more, or a larger raster"
+        )
+
+
+class _Way(NamedTuple):
+    """Line of sight through a cloud field."""
+
+    shifts: tuple[float, float]  # southward and eastward per metre of height [cell m-1]
+    first: tuple[int, int]  # cell of the field at the first cell of the scene
+    shape: tuple[int, int]  # of the field
+    height: float  # of the clouds [m]
+    reference: float  # altitude from which it is measured [m]
+
+    def ends(self, relief):
+        """Smallest and largest offset of cells along rows and columns, from the scene into the field."""
+        heights = np.array([0.0, self.height + _DEEPEST] if relief else [self.height] * 2)
+        return [
+            first + np.sort(np.rint(shift * heights)).astype(int)
+            for first, shift in zip(self.first, self.shifts, strict=True)
+        ]
+
+
+def _seen_along(shifts, thickness, grid, height, ground, reference, sizes):
+    """Optical thickness of the clouds along a line of sight from each cell, dims (y, x)."""
+    field = grids.geobox(thickness)
+    way = _Way(shifts, grids.lattice_offset(field, grid), tuple(field.shape), height, reference)
+    cells = [np.arange(size) for size in grid.shape]
+    reach = [(at + low, at + high + 1) for at, (low, high) in zip(cells, way.ends(ground is not None), strict=True)]
+    reads = [chunks.Reads(thickness.data, *reach)]
+    if ground is not None:
+        offset = grids.lattice_offset(grids.geobox(ground), grid)
+        reads.append(chunks.margin_reads(ground.data, 0, offset=offset, shape=tuple(grid.shape)))
+    data = chunks.windows(partial(_along, way), reads, tuple(grid.shape), sizes)
+    return xr.DataArray(data, dims=("y", "x"))
+
+
+def _along(way, rows, columns, cells, elevation=None):
+    """Clouds along a line of sight from a block of cells, clear beyond the field, shape (rows, columns). [1]"""
+    relief = elevation is not None
+    starts = [block.start + low for block, (low, _) in zip((rows, columns), way.ends(relief), strict=True)]
+    at = np.arange(rows.stop - rows.start)[:, None], np.arange(columns.stop - columns.start)
+    if not relief:
+        row, column = (first + along for first, along in zip(starts, at, strict=True))
+        inside = (row >= 0) & (row < way.shape[0]) & (column >= 0) & (column < way.shape[1])
+        return np.where(inside, cells, 0.0)
+    above = way.height + way.reference - elevation
+    if (deep := np.nanmax(above, initial=0)) > way.height + _DEEPEST:
+        raise ValueError(
+            f"the ground lies {deep - way.height:.0f} m below {way.reference:g} m, from which the height of "
+            "clouds is measured: give altitude= [km]"
+        )
+    shift = [np.rint(each * np.nan_to_num(np.maximum(above, 0))).astype(int) for each in way.shifts]
+    row, column = (
+        block.start + along + first + each
+        for block, along, first, each in zip((rows, columns), at, way.first, shift, strict=True)
+    )
+    inside = (above > 0) & (row >= 0) & (row < way.shape[0]) & (column >= 0) & (column < way.shape[1])
+    row, column = (np.where(inside, each - start, 0) for each, start in zip((row, column), starts, strict=True))
+    return np.where(np.isnan(above), np.nan, np.where(inside, cells[row, column], 0.0))
+
+
+def with_clouds(toa, clouds, atmosphere, bands, geometry, *, elevation=None):
+    """Apparent reflectance of a scene with clouds, dims (band, y, x), from the reflectance without. [1]"""
+    geometry = directions.uniform_geometry(geometry, "to_toa with clouds")
+    if COLUMNS[1] not in clouds:
+        clouds = cast_clouds(toa, clouds, dem=elevation, altitude=atmosphere.altitude, geometry=geometry)
+    for name in ANGLES:
+        if name in clouds.coords and not np.isclose(float(clouds[name]), getattr(geometry, name)):
+            raise ValueError(
+                f"the clouds were cast with {name} {float(clouds[name]):g}, the reflectance has "
+                f"{getattr(geometry, name):g}: cast them again with cast_clouds"
+            )
+    terms = engines.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
+    columns = [clouds[name].drop_vars([*ANGLES, "earth_sun_distance"], errors="ignore") for name in COLUMNS]
+    sky = layer.sky_tables(
+        [layer.band_co_albedo(band) for band in bands],
+        terms.gas_transmittance * terms.path_reflectance,
+        terms.diffuse_fraction,
+        [coupling.band_gas_transmittance(atmosphere, band, geometry, ("o3",)) for band in bands],
+        geometry.sza, geometry.vza, geometry.raa,
+    )  # fmt: skip
+    plain = toa.drop_vars(["band", *ANGLES], errors="ignore")
+    out = chunks.pointwise(layer.under_clouds, plain, *columns, bands=len(bands), sky=sky).astype(toa.dtype, copy=False)
+    out = toa.copy(deep=False, data=out.transpose(*toa.dims).data)
+    return cf.label(out, "toa_reflectance", source=toa, history="to_toa: with clouds")

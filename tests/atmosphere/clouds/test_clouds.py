@@ -1,0 +1,260 @@
+"""Light of cloud layers, and the place of clouds, their images and their shadows."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import fifesim
+from fifesim.atmosphere.clouds import layer
+from fifesim.atmosphere.clouds.field import PERIOD, CloudCover, cloud_displacement, cloud_thickness
+from fifesim.atmosphere.clouds.layer import clouded_reflectance, layer_light, two_stream_reflectance
+from fifesim.atmosphere.successive_orders import flux_transmittance
+from fifesim.grids import grid as grids
+from tests.lazy import ODD_CHUNKS, in_chunks, no_compute
+
+DATA = Path(__file__).parents[2] / "data" / "clouds"
+
+
+def table(name):
+    return pd.read_csv(DATA / name, comment="#")
+
+
+def test_displacements_are_those_of_the_table():
+    """1e-6 m: the printed digits."""
+    known = table("cloud_geometry.csv")
+    found = cloud_displacement(*(known[name] for name in ("height", "sza", "saa", "vza", "vaa")))
+    expected = known[["shadow_east", "shadow_north", "image_east", "image_north"]].to_numpy().T
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
+
+
+def test_two_stream_formula_and_exact_albedo():
+    """1e-10: the printed digits. The exact albedo for the sun at the zenith differs by up to 0.042."""
+    known = table("cloud_two_stream.csv")
+    cloud = known["optical_depth"], known["asymmetry"]
+    np.testing.assert_allclose(two_stream_reflectance(*cloud), known["cloud_reflectance"], rtol=1e-10)
+    np.testing.assert_allclose(two_stream_reflectance(*cloud, known["ground"]), known["over_ground"], rtol=1e-10)
+    options = {"polarized": False, "layers": 200, "vertical": (0.0, 1.0), "tolerance": 1e-9}
+    for depth, asymmetry, expected in zip(*cloud, known["cloud_reflectance"], strict=True):
+        (through,), _ = flux_transmittance(0.0, depth, 1.0, asymmetry ** np.arange(33), [0.0], **options)
+        assert abs(1 - through - expected) < 0.042
+
+
+def disort(thickness, co_albedo, sza, raa, ground=0.0):
+    """Cosines and reflectance of the upward nodes of 64 streams with exact single scattering, and transmittance."""
+    pydisort = pytest.importorskip("PythonicDISORT.pydisort").pydisort
+    moments, mu_s, depth = layer.ASYMMETRY ** np.arange(300), np.cos(np.radians(sza)), np.array([thickness])
+    mu, _, down, _, radiance = pydisort(
+        depth, np.array([1 - max(co_albedo, 1e-9)]), 64, moments[None], mu_s, np.pi, np.pi, NLeg=64, NFourier=64,
+        f_arr=moments[64:65], NT_cor=True, BDRF_Fourier_modes=[ground] if ground else [],
+    )  # fmt: skip
+    return mu[:32], radiance(0.0, np.radians(raa))[:32] / mu_s, np.squeeze(sum(down(depth)) / (np.pi * mu_s))
+
+
+@pytest.mark.filterwarnings("ignore:Some delta-scaled single-scattering albedos")
+@pytest.mark.parametrize(
+    ("thickness", "co_albedo", "sza", "raa"),
+    [
+        (0.05, 0.0, 70.0, 180.0), (0.05, 0.005, 20.0, 60.0), (0.4, 0.0, 33.0, 111.0), (1.0, 0.03, 70.0, 0.0),
+        (3.3, 0.0, 47.0, 20.0), (7.0, 5e-5, 61.0, 140.0), (20.0, 0.005, 8.0, 90.0), (42.0, 0.0, 55.0, 170.0),
+        (60.0, 0.0, 70.0, 180.0), (60.0, 0.005, 28.0, 45.0),
+    ],
+)  # fmt: skip
+def test_layer_is_that_of_discrete_ordinates(thickness, co_albedo, sza, raa):
+    """0.5 % in all views to 70 degrees, and 0.002 of the transmittance."""
+    mu, expected, transmitted = disort(thickness, co_albedo, sza, raa)
+    for one, reflectance in zip(mu, expected, strict=True):
+        if one > np.cos(np.radians(70)):
+            light = layer_light(np.array([thickness]), co_albedo, sza, np.degrees(np.arccos(one)), raa)
+            np.testing.assert_allclose(light.reflectance, reflectance, rtol=5e-3)
+            np.testing.assert_allclose(light.transmittance_down, transmitted, atol=2e-3)
+
+
+@pytest.mark.filterwarnings("ignore:Some delta-scaled single-scattering albedos")
+@pytest.mark.parametrize(("thickness", "ground"), [(1.0, 0.3), (10.0, 0.8)])
+def test_overcast_above_lambertian_ground_is_that_of_discrete_ordinates(thickness, ground):
+    mu, expected, _ = disort(thickness, 0.0, 40.0, 70.0, ground)
+    index = int(np.argmin(np.abs(mu - 0.8)))
+    light = layer_light(np.array([thickness]), 0.0, 40.0, np.degrees(np.arccos(mu[index])), 70.0)
+    reflected, down, up, sky, albedo = (each.item() for each in light)
+    found = clouded_reflectance(ground, 0.0, 0.0, reflected, down, down, sky, up, albedo)
+    np.testing.assert_allclose(found, expected[index], rtol=5e-3)
+
+
+def test_white_ground_and_conservative_clouds_return_all_light():
+    """1e-3, of the fluxes; the albedo and the transmittance of isotropic light are independent results."""
+    thickness = np.array([0.3, 3.0, 30.0, 60.0, 100.0])
+    for sza in (0.0, 45.0, 70.0):
+        light = layer_light(thickness, 0.0, sza, 0.0, 0.0)
+        sent = light.transmittance_down * light.diffuse_transmittance / (1 - light.spherical_albedo)
+        np.testing.assert_allclose(1 - light.transmittance_down + sent, 1, atol=1e-3)
+
+
+@pytest.fixture(scope="module")
+def site():
+    return fifesim.fife_site(30, window=((0, 60), (0, 60)))
+
+
+@pytest.fixture(scope="module")
+def reflectance(site):
+    lai = fifesim.lai_scene(site, seed=7)
+    return lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+
+
+def clouds_of(thickness, grid, height=1500.0):
+    cells = grids.place(xr.DataArray(np.asarray(thickness, float), dims=("y", "x")), grid)
+    return xr.Dataset({"optical_thickness": cells, "base": height, "top": height})
+
+
+def test_thickness_zero_changes_nothing_and_a_missing_cell_stays_missing(site, reflectance):
+    thickness = np.zeros(site.shape)
+    clear = reflectance.fifesim.to_toa()
+    with pytest.warns(UserWarning, match="the clouds end .* m too early"):
+        none = reflectance.fifesim.to_toa(clouds=clouds_of(thickness, site))
+    np.testing.assert_array_equal(none.values, clear.values)
+    thickness[30, 20] = np.nan
+    some = reflectance.fifesim.to_toa(clouds=clouds_of(thickness, site, 0.1))
+    assert np.isnan(some.values).sum() == 2
+
+
+@pytest.mark.filterwarnings("ignore:the clouds end")
+def test_a_cloud_of_n_cells_hides_and_shades_n_cells(site, reflectance):
+    thickness = np.zeros(site.shape)
+    thickness[20:25, 30:37] = 20.0
+    geometry = fifesim.Geometry(40, 150, 30, 280)
+    level = reflectance.drop_vars(["sza", "saa", "vza", "vaa"])
+    cells = level.fifesim.cast_clouds(clouds_of(thickness, site, 500.0), geometry=geometry)
+    assert int(cells.cloud.sum()) == int(cells.shadow.sum()) == 35
+    turned = grids.projection.convergence(site)
+    moved = cloud_displacement(500.0, 40, 150 - turned, 30, 280 - turned)
+    for name, east, north in (("shadow", *moved[:2]), ("cloud", *moved[2:])):
+        rows, columns = np.nonzero(cells[name].values)
+        # The middle of the cloud, moved; half a cell by rounding.
+        assert abs(rows.mean() - (22 - north / 30)) <= 0.5
+        assert abs(columns.mean() - (33 + east / 30)) <= 0.5
+    both = reflectance.fifesim.to_toa(clouds=cells.drop_vars(["sza", "saa", "vza", "vaa"]))
+    clear, seen, shaded = reflectance.fifesim.to_toa(), cells.cloud > 0, (cells.shadow > 0) & (cells.cloud == 0)
+    assert bool((both > clear).where(seen, True).all()) and bool((both < clear).where(shaded, True).all())
+    untouched = ~seen & ~shaded & (cells.overhead_thickness == 0)
+    np.testing.assert_array_equal(both.where(untouched).values, clear.where(untouched).values)
+
+
+@pytest.mark.filterwarnings("ignore:the clouds end")
+def test_shadow_on_relief_is_that_of_steps_along_the_sunbeam(site, reflectance):
+    """Brute force: from each cell toward the sun in steps of 1 m, until the beam is at the height of the clouds."""
+    rng = np.random.default_rng(3)
+    thickness = np.where(rng.random(site.shape) < 0.2, 5.0, 0.0)
+    y, x = np.mgrid[:60, :60]
+    dem = grids.place(xr.DataArray(500 + 300 * np.sin(x / 9) * np.cos(y / 7), dims=("y", "x")), site)
+    geometry = fifesim.Geometry(50, 130)
+    clouds = clouds_of(thickness, site, 1000.0)
+    level = reflectance.drop_vars(["sza", "saa", "vza", "vaa"])
+    found = level.fifesim.cast_clouds(clouds, dem=dem, geometry=geometry).shadow_thickness.values
+    saa = np.radians(130 - grids.projection.convergence(site))
+    step = np.arange(0.0, 2000.0, 1.0)
+    expected, nearby = np.zeros(site.shape), np.zeros(site.shape, bool)
+    for i, j in np.ndindex(*site.shape):
+        rise = 400 + 1000 - dem.values[i, j]  # from the ground to the clouds, above 0.4 km
+        along = step[np.argmax(step / np.tan(np.radians(50)) >= rise)]
+        row, column = i - along * np.cos(saa) / 30, j + along * np.sin(saa) / 30
+        at = int(np.rint(row)), int(np.rint(column))
+        inside = 0 <= at[0] < 60 and 0 <= at[1] < 60
+        expected[i, j] = thickness[at] if inside else 0.0
+        # Within two metres of the edge of a cell, the steps are too coarse.
+        nearby[i, j] = max(abs(row - at[0]), abs(column - at[1])) > 0.5 - 2 / 30
+    np.testing.assert_array_equal(found[~nearby], expected[~nearby])
+    assert (~nearby).mean() > 0.6
+
+
+def test_cover_is_exact_over_100_km_and_thickness_is_lognormal():
+    """0.5 points of the cover, anywhere; mean and standard deviation to 5 %, of a sample cut at 0.1 %."""
+    place = np.arange(0, PERIOD, PERIOD // 1000) + 77_777_777
+    for cover, length in ((0.1, 500.0), (0.4, 2000.0), (0.85, 15_000.0)):
+        thickness = cloud_thickness(CloudCover(cover, (8.0, 6.0), length, 5), place, place)
+        assert abs((thickness > 0).mean() - cover) < 0.005
+        inside = thickness[thickness > 0]
+        assert abs(inside.mean() / 8 - 1) < 0.05 and abs(inside.std() / 6 - 1) < 0.05
+        logarithm = np.log(inside)
+        assert abs(((logarithm - logarithm.mean()) ** 3).mean() / logarithm.std() ** 3) < 0.05
+
+
+def test_correlation_falls_to_a_twentieth_at_the_length():
+    """Signs of a normal field about its median correlate by 2 / pi arcsin(0.05); 0.03 by sampling."""
+    place = np.arange(0, PERIOD, PERIOD // 1000)
+    sign = np.sign(cloud_thickness(CloudCover(0.5, (8.0, 6.0), 2000.0, 5), place, place) - 1e-9)
+    found = np.mean(sign * np.roll(sign, 20, axis=0)), np.mean(sign * np.roll(sign, 20, axis=1))
+    np.testing.assert_allclose(found, 2 / np.pi * np.arcsin(0.05), atol=0.03)
+
+
+def test_window_chunks_cell_size_and_drift_show_the_same_clouds(site):
+    sky = {"cover": 0.5, "seed": 11, "length": 800.0}
+    whole = fifesim.cloud_field(site, **sky).optical_thickness
+    window = fifesim.cloud_field(fifesim.fife_site(30, window=((13, 40), (7, 50))), **sky).optical_thickness
+    np.testing.assert_array_equal(window.values, whole.values[13:40, 7:50])
+    with no_compute():
+        lazy = fifesim.cloud_field(site, **sky, chunks={"y": 17, "x": 23})
+    np.testing.assert_array_equal(lazy.optical_thickness.values, whole.values)
+    # The middle cells of 3 x 3 small cells have the centres of large ones.
+    fine = fifesim.cloud_field(fifesim.fife_site(10, window=((0, 180), (0, 180))), **sky).optical_thickness
+    np.testing.assert_array_equal(fine.values[1::3, 1::3], whole.values)
+    # 6 m/s eastward and 3 m/s southward for 100 s are 20 and 10 cells.
+    later = fifesim.cloud_field(site, **sky, drift=(6.0, -3.0), time=100.0).optical_thickness
+    np.testing.assert_array_equal(later.values[10:, 20:], whole.values[:-10, :-20])
+    days = fifesim.cloud_field(site, **sky, drift=(6.0, 0.0), time=["1987-06-06T16:00", "1987-06-07T16:00"])
+    assert days.optical_thickness.dims == ("time", "y", "x")
+    assert not np.array_equal(*(days.optical_thickness.values > 0))
+
+
+def test_lazy_scene_has_the_bits_of_the_scene_in_memory(site, reflectance):
+    sky = fifesim.cloud_field(site, 0.5, seed=11, length=800.0, margin=1200)
+    whole = reflectance.fifesim.to_toa(clouds=sky)
+    with no_compute():
+        lazy = in_chunks(reflectance, ODD_CHUNKS).fifesim.to_toa(clouds=sky.chunk({"y": 31, "x": 19}))
+    xr.testing.assert_identical(lazy.compute(), whole)
+    cells = reflectance.fifesim.cast_clouds(sky)
+    xr.testing.assert_identical(reflectance.fifesim.to_toa(clouds=cells), whole)
+
+
+def test_dates_have_their_own_sun_and_sky(site):
+    dates = pd.to_datetime(["1987-05-01T16:35", "1987-06-06T16:35"])
+    lai = fifesim.lai_scene(site, seed=7) * xr.DataArray([1.0, 1.0], coords={"time": dates}, dims="time")
+    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    sky = fifesim.cloud_field(site, 0.4, seed=3, time=list(dates), margin=1500)
+    both = rho.fifesim.to_toa(clouds=sky)
+    last = rho.isel(time=1).fifesim.to_toa(clouds=sky.isel(time=1))
+    np.testing.assert_array_equal(both.isel(time=1).values, last.values)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"cover": 1.1}, "cover must be from 0 to 1, got 1.1"),
+        ({"height": (2000, 1000)}, "base of clouds must not be above their top, got 2000 and 1000"),
+        ({"height": 25_000}, "base must be from 0 to 20000 m above the ground, got 25000"),
+        ({"length": 30_000}, "length must be from 100 to 20000 m, got 30000"),
+        ({"thickness": 0}, "thickness must be a mean from 0 to 100"),
+    ],
+)
+def test_impossible_skies_are_refused(site, change, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.cloud_field(site, **change)
+
+
+def test_impossible_casts_are_refused(site, reflectance):
+    other = fifesim.cloud_field(fifesim.fife_site(20), 0.4)
+    with pytest.raises(ValueError, match="different lattices"):
+        reflectance.fifesim.to_toa(clouds=other)
+    sky = fifesim.cloud_field(site, 0.4, margin=3000)
+    with pytest.raises(ValueError, match=r"sun must be at least 5 degrees above the horizon, got 4\.0"):
+        reflectance.fifesim.cast_clouds(sky, geometry=fifesim.Geometry(86, 100))
+    with pytest.raises(ValueError, match="optical_thickness must be from 0 to 100, got -1"):
+        reflectance.fifesim.to_toa(clouds=sky.assign(optical_thickness=sky.optical_thickness - 1))
+    cells = reflectance.drop_vars(["sza", "saa", "vza", "vaa"]).fifesim.cast_clouds(
+        sky, geometry=fifesim.Geometry(30, 100)
+    )
+    with pytest.raises(ValueError, match="clouds were cast with sza 30"):
+        reflectance.fifesim.to_toa(clouds=cells)
+    with pytest.raises(ValueError, match="base is missing"):
+        reflectance.fifesim.to_toa(clouds=sky.drop_vars("base"))
