@@ -173,11 +173,11 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
     >>> bool(terms.path_reflectance[0] > terms.path_reflectance[1])
     True
     """
+    if atmosphere.engine != "6S":
+        return _band_terms(atmosphere, tuple(bands), float(sza), float(vza), float(raa))
     check_zenith("sza", sza)
     check_zenith("vza", vza)
-    if atmosphere.engine == "6S":
-        return six_s.sixs_band_terms(atmosphere, bands, sza, vza, raa, each=each)
-    return _band_terms(atmosphere, tuple(bands), float(sza), float(vza), float(raa))
+    return six_s.sixs_band_terms(atmosphere, bands, sza, vza, raa, each=each)
 
 
 def light_at_ground(atmosphere, bands, sza, photons=True):
@@ -267,6 +267,8 @@ def scattering(atmosphere, wavelength, sza, vza, raa):
 
 @cached(256, "terms of the atmosphere for a geometry")
 def _band_terms(atmosphere, bands, sza, vza, raa):
+    check_zenith("sza", sza)
+    check_zenith("vza", vza)
     found = terms_at(atmosphere, bands, sza, np.array([vza]), np.array([raa]))
     terms = BandTerms(*(values.squeeze((0, 1)) for values in found))
     for values in terms:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Self
 
 import numpy as np
@@ -175,7 +176,7 @@ class Atmosphere:
     def __str__(self):
         return atmosphere_in_words(self)
 
-    @property
+    @cached_property
     def text(self) -> str:
         """Complete description in one line, for `parse`."""
         by_aot = self.visibility is None

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache, wraps
+from itertools import chain
 from operator import attrgetter
 from types import MethodType, NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -287,7 +288,7 @@ def _rasters(value):
         # Classes of pydantic have checked their fields.
         plain = is_dataclass(type(value)) and not hasattr(value, "__pydantic_validator__")
         parts = [getattr(value, each.name) for each in fields(value)] if plain else ()
-    return [raster for part in parts for raster in _rasters(part)]
+    return list(chain.from_iterable(map(_rasters, parts)))
 
 
 def _cure(value, kind):

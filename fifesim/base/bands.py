@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -135,8 +136,9 @@ class Band:
     """
 
     name: str
-    wavelength: Sequence[float] = field(repr=False)
-    response: Sequence[float] = field(repr=False)
+    # Bands are keys of caches: hashing thousands of numbers takes longer than most look-ups.
+    wavelength: Sequence[float] = field(repr=False, hash=False)
+    response: Sequence[float] = field(repr=False, hash=False)
 
     def __post_init__(self):
         if not isinstance(self.name, str):
@@ -154,10 +156,10 @@ class Band:
         object.__setattr__(self, "wavelength", wavelength)
         object.__setattr__(self, "response", response)
 
-    @property
+    @cached_property
     def center(self) -> float:
         """Response-weighted mean wavelength [um]."""
-        return _center(self)
+        return float(self.mean(self.wavelength, self.wavelength))
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -226,11 +228,6 @@ class Band:
         own = [w for w in self.wavelength if low <= w <= high]
         nodes = np.union1d(inside, own)
         return nodes, np.interp(nodes, self.wavelength, self.response)
-
-
-@cached(1024, "central wavelength of a band")
-def _center(band):
-    return float(band.mean(band.wavelength, band.wavelength))
 
 
 def _numbers(band, name):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -84,7 +85,7 @@ class Geometry:
             )
         warn_of_radians(self.sza, self.saa)
 
-    @property
+    @cached_property
     def raa(self) -> float:
         """Relative azimuth folded to [0, 180]; 0 has sun and sensor on the same side. [degree]"""
         return float(relative_azimuth(self.saa, self.vaa))

@@ -25,7 +25,6 @@ from fifesim.grids.grid import north_up
 from fifesim.grids.inputs import MASKS_TOO, Raster
 from fifesim.grids.windows import origin_of
 from fifesim.ground.canopy import optics_labels
-from fifesim.ground.canopy.description import is_raster
 from fifesim.ground.canopy.interpolation import RUN, table_places, value_at
 from fifesim.ground.canopy.labels import BandCanopy, EvenCanopy
 from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS, check_map
@@ -48,7 +47,7 @@ _CURES = {
 def stands_of(classes, canopy, cells=MappingProxyType({})):
     """Canopies of a scene by class code; the code is None without classes."""
     if not classes:
-        return {None: canopy.replace(**cells)}
+        return {None: canopy.replace(**cells) if cells else canopy}
     return {kind.code: kind.canopy.over(canopy).replace(**cells) for kind in classes}
 
 
@@ -57,7 +56,7 @@ def warn_of_tallgrass(scene, classes, canopy, cells=MappingProxyType({})):
     bare = {kind.code for kind in classes if isinstance(kind.lai, Number) and kind.lai == 0}
     taken = set()
     for code, stand in stands_of(classes, canopy, cells).items():
-        dead = is_raster(stand.brown) or stand.brown != 0
+        dead = isinstance(stand.brown, xr.DataArray) or stand.brown != 0
         needed = {"background": True, "leaf_optics": code not in bare, "brown_leaf": dead and code not in bare}
         taken |= {name for name, is_needed in needed.items() if is_needed and getattr(stand, name) is None}
     if taken:
@@ -156,16 +155,16 @@ def canopies_of(land, responses, canopy, exact=False):
     for code, stand in stands_of(land.classes, canopy, land.cells).items():
         leaf, dead, changed = once("leaf_optics", leaf_optics, stand.leaf_optics), None, None
         below = once("background", optics_labels.background, stand.background)
-        if is_raster(stand.brown) or stand.brown != 0:
+        if isinstance(stand.brown, xr.DataArray) or stand.brown != 0:
             dead = once("leaf_optics", leaf_optics, DEAD_LEAF if stand.brown_leaf is None else stand.brown_leaf)
-        soil, moisture = optics_labels.changes_of(stand)
-        if is_raster(soil) or is_raster(moisture):
-            key = "soil", id(soil), id(moisture)
+        changes = optics_labels.changes_of(stand)
+        if xr.DataArray in map(type, changes.values()):
+            key = *changes, *map(id, changes.values())
             if key not in known:
-                known[key] = optics_labels.soil_kernel(responses, land.lai, soil, moisture)
+                known[key] = optics_labels.soil_kernel(responses, land.lai, **changes)
             changed = known[key]
-        else:
-            below = optics_labels.as_it_lies(responses, below, land.lai, soil, moisture)
+        elif changes:
+            below = optics_labels.as_it_lies(responses, below, land.lai, **changes)
         found[code] = BandCanopy(stand, leaf, dead, below, changed)
     return found
 

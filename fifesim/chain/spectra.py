@@ -13,7 +13,6 @@ from fifesim.base.messages import closest
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.description import TALLGRASS, Canopy, is_raster
-from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.leaf_area import LARGEST_LAI, check_lai
 from fifesim.ground.canopy.optics import check_background
 from fifesim.ground.canopy.properties import NUMERIC_PROPERTIES
@@ -153,7 +152,7 @@ class _Model:
         if any(map(is_raster, vars(canopy).values())):
             raise ValueError("canopy must not have rasters: give what varies in canopies=, such as {'brown': [0, 0.3]}")
         self.bands, self.canopy = bands, canopy
-        self.leaf_angles = leaf_angle_classes(canopy.leaf_angles)
+        self.leaf_angles = canopy.leaf_angle_distribution
         self.leaf = canopy.leaf_optics or Leaf()
         if by_contents and not isinstance(self.leaf, Leaf):
             raise ValueError("leaf contents need leaf_optics of the canopy to be a fifesim.Leaf, or not given")

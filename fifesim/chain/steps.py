@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import Annotated, Literal
 
 import numpy as np
@@ -392,9 +393,11 @@ def surface_reflectance(
     lai = north_up(land.lai)
     description = given_instrument(instrument, lai)
     geometry = directions.given_geometry(geometry, lai, time)
-    atmosphere, lai = air_of(atmosphere, lai), directions.dated(lai, time)
+    atmosphere = air_of(atmosphere, lai)
+    if time is not None:
+        lai = directions.dated(lai, time)
     selected = description.select(bands)
-    responses = tuple(band.response for band in selected)
+    responses = tuple(map(attrgetter("response"), selected))
     land, canopy = land._replace(lai=lai), canopy or TALLGRASS
     if not is_fife(lai):
         warn_of_tallgrass(lai.name or "the raster", land.classes, canopy, land.cells)

@@ -2,9 +2,12 @@
 
 import re
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import xarray as xr
+
+from fifesim.base.caches import cached
 
 
 @dataclass(frozen=True)
@@ -207,19 +210,24 @@ _STEPS = {
 }
 
 
+@cached(256, "CF attributes")
 def attributes(name):
-    """CF attributes of a quantity."""
+    """CF attributes of a quantity, read-only."""
     quantity, keys = QUANTITIES[name], ("standard_name", "long_name", "units", "comment")
-    return {key: getattr(quantity, key) for key in keys if getattr(quantity, key)}
+    return MappingProxyType({key: getattr(quantity, key) for key in keys if getattr(quantity, key)})
 
 
 def label(array, name, *, history, source=None, **provenance):
     """Name an array and replace its attributes; provenance and history of `source` are kept."""
-    attrs = attributes(name)
     before = source.attrs if source is not None else {}
+    attrs = dict(attributes(name))
+    for key in PROVENANCE:
+        if key in before:
+            attrs[key] = before[key]
+    attrs |= provenance
     # An instrument description must belong to the instrument of the array.
-    other = {"instrument_description"} if "instrument" in provenance else set()
-    attrs |= {key: before[key] for key in PROVENANCE if key in before and key not in other} | provenance
+    if "instrument" in provenance and "instrument_description" not in provenance:
+        attrs.pop("instrument_description", None)
     cited = [*before.get("references", "").split("; "), *provenance.get("references", "").split("; ")]
     attrs |= {"references": "; ".join(dict.fromkeys(filter(None, cited)))} if any(cited) else {}
     attrs["history"] = "\n".join(filter(None, [before.get("history", ""), history]))
@@ -238,19 +246,25 @@ def check_quantity(array, *names):
             "convert it with .fifesim.to_reflectance()"
         )
     stated = array.attrs.get("standard_name")
-    if stated in _LONG_NAMES and all(stated != QUANTITIES[name].standard_name for name in names):
-        raise ValueError(
-            f"{array.name or 'the array'} is {_LONG_NAMES[stated]} by its standard_name, where "
-            f"{QUANTITIES[names[0]].long_name} is needed: take {_STEPS.get((stated, names[0]), 'the step between')}, "
-            "or remove .attrs['standard_name'] if it is wrong"
-        )
+    if stated not in _LONG_NAMES:
+        return
+    for name in names:
+        if QUANTITIES[name].standard_name == stated:
+            return
+    raise ValueError(
+        f"{array.name or 'the array'} is {_LONG_NAMES[stated]} by its standard_name, where "
+        f"{QUANTITIES[names[0]].long_name} is needed: take {_STEPS.get((stated, names[0]), 'the step between')}, "
+        "or remove .attrs['standard_name'] if it is wrong"
+    )
 
 
 def check_words(raster, texts, name, units=""):
-    """Raise ValueError if metadata clearly name another quantity; unknown ones pass."""
+    """Raise ValueError if metadata clearly name another quantity; unknown ones pass, and what is no text."""
     for text in texts:
+        if not isinstance(text, str):
+            continue
         words = re.findall("[a-z]+[0-9]?", text.lower().replace("leaf area", "lai"))
-        found = {_WORDS[word] for word in words if word in _WORDS}
+        found = {*map(_WORDS.get, words)} - {None}
         if (found and name not in found) or found & {"quality"}:
             raise ValueError(
                 f"{raster} is named {text!r}, where {QUANTITIES[name].long_name} is needed: take the raster or band of "
@@ -266,17 +280,18 @@ def check_words(raster, texts, name, units=""):
 
 def check_units(array, *names):
     """Raise ValueError for an array with other units than any of some quantities; missing units are accepted."""
-    allowed = [QUANTITIES[name].units for name in names]
-    units = array.attrs.get("units", allowed[0])
+    units = array.attrs.get("units", QUANTITIES[names[0]].units)
     # rioxarray lists the units of the bands.
     units = units[0] if isinstance(units, tuple | list) and len(set(units)) == 1 else units
     units = str(units).strip()
-    if not {units, _SAME_UNITS.get(units)} & set(allowed):
-        wanted = " or ".join(map(repr, dict.fromkeys(allowed)))
-        raise ValueError(
-            f"{array.name or 'the array'} has units {units!r}, {names[0]} needs {wanted}: "
-            "convert it, then set .attrs['units']"
-        )
+    for name in names:
+        if QUANTITIES[name].units in (units, _SAME_UNITS.get(units)):
+            return
+    wanted = " or ".join(dict.fromkeys(repr(QUANTITIES[name].units) for name in names))
+    raise ValueError(
+        f"{array.name or 'the array'} has units {units!r}, {names[0]} needs {wanted}: "
+        "convert it, then set .attrs['units']"
+    )
 
 
 def band_coordinates(**values):

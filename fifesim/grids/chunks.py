@@ -21,27 +21,34 @@ from fifesim.grids.windows import array_from_windows, gather, slices
 
 def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
     """Apply a kernel cell by cell to rasters on one grid, lazily where an input is."""
-    arrays, core = aligned(arrays), {}
-    along_band = [bands is not None and "band" in array.dims for array in arrays]
-    if bands is not None:
-        core = {"input_core_dims": [["band"] * along for along in along_band], "output_core_dims": [["band"]]}
-        if any(along and array.sizes["band"] != bands for array, along in zip(arrays, along_band, strict=True)):
-            core["exclude_dims"] = {"band"}
-
-    def call(*blocks):
-        out = np.asarray(kernel(*blocks, **parameters), dtype)
-        # apply_ufunc wants new axes last; the transpose below undoes this view.
-        return out if bands is None else np.moveaxis(out, 0, -1)
-
-    lazy = any(getattr(array, "chunks", None) is not None for array in arrays)
-    apply = partial(_blockwise, call, along_band, bands, dtype) if lazy else call
-    # Use variables, because aligning coordinates takes longer than the kernel on small rasters.
+    # The kernel takes bands along the last axis and returns them along the first. xarray.apply_ufunc aligns coordinates
+    # and wants new axes last, which takes longer than the kernel on small rasters.
+    arrays = aligned(arrays)
     variables = [getattr(array, "variable", array) for array in arrays]
-    out = xr.apply_ufunc(apply, *variables, dask="allowed", keep_attrs=True, **core)
-    dims = [name for name in ("band", "y", "x") if name in out.dims]
-    names = {getattr(array, "name", None) for array in arrays}
-    name = names.pop() if len(names) == 1 else None
-    return grids.raster_of(out.transpose(*dims, ...), *_shared_coordinates(arrays, out.dims), name)
+    cells = list(dict.fromkeys([name for each in variables for name in each.dims if bands is None or name != "band"]))
+    blocks = [_with_axes(each, cells) for each in variables]
+    if [each for each in blocks if isinstance(each, da.Array)]:
+        along_band = [bands is not None and "band" in each.dims for each in variables]
+        data = _blockwise(partial(_typed, partial(kernel, **parameters), dtype), blocks, along_band, bands, dtype)
+    else:
+        data = np.asarray(kernel(*blocks, **parameters), dtype)
+    out = xr.Variable(cells if bands is None else ["band", *cells], data, variables[0].attrs)
+    names = dict.fromkeys([getattr(array, "name", None) for array in arrays])
+    ordered = out.transpose(*[name for name in ("band", "y", "x") if name in out.dims], ...)
+    return grids.raster_of(ordered, *_shared_coordinates(arrays, out.dims), *names if len(names) == 1 else ())
+
+
+def _with_axes(variable, cells):
+    """Data with axes in the order of some dimensions, then bands, which broadcast as arrays of numpy do."""
+    known = [*filter(variable.dims.__contains__, cells)]
+    data = variable.transpose(*known, ...).data
+    # Missing axes in front are added by broadcasting.
+    axes = cells[cells.index(known[0]) :] if known else known
+    return data if axes == known else data[tuple([slice(None) if name in known else None for name in axes])]
+
+
+def _typed(kernel, dtype, *blocks):
+    return np.asarray(kernel(*blocks), dtype)
 
 
 def _shared_coordinates(arrays, dims):
@@ -57,16 +64,19 @@ def _shared_coordinates(arrays, dims):
                 variables[name] = variable
             elif name not in dims and not (variables[name] is variable or variables[name].equals(variable)):
                 differing.add(name)
-        indexes |= {name: each for name, each in array.xindexes.items() if name not in indexes and name in variables}
-    known = {name: variable for name, variable in variables.items() if name not in differing}
-    return known, indexes
+        for name, index in array.xindexes.items():
+            if name in variables:
+                indexes.setdefault(name, index)
+    for name in differing:
+        del variables[name]
+    return variables, indexes
 
 
-def _blockwise(call, along_band, bands, dtype, *data):
-    """Array whose blocks are made from the blocks of others, with a new last axis for bands."""
+def _blockwise(call, data, along_band, bands, dtype):
+    """Array whose blocks are made from the blocks of others, with a new first axis for bands."""
     # The gufuncs of dask concatenate blocks along such an axis, and copy even a single one.
     loops = max(each.ndim - along for each, along in zip(data, along_band, strict=True))
-    arguments, last = [], {loops: bands} if bands is not None else {}
+    arguments, first = [], {loops: bands} if bands is not None else {}
     for each, along in zip(data, along_band, strict=True):
         if along and isinstance(each, da.Array):
             # A lazily opened file has one band per chunk, but the kernel needs all bands.
@@ -75,9 +85,9 @@ def _blockwise(call, along_band, bands, dtype, *data):
         whole = isinstance(each, np.ndarray) and each.ndim == along
         arguments += [each, None if whole else axes]
     known = any(loops in (axes or ()) for axes in arguments[1::2])
-    sizes = {"adjust_chunks" if known else "new_axes": last}
-    meta = np.empty((0,) * (loops + len(last)), dtype)
-    return da.blockwise(call, (*range(loops), *last), *arguments, dtype=dtype, meta=meta, **sizes)
+    sizes = {"adjust_chunks" if known else "new_axes": first}
+    meta = np.empty((0,) * (loops + len(first)), dtype)
+    return da.blockwise(call, (*first, *range(loops)), *arguments, dtype=dtype, meta=meta, **sizes)
 
 
 class Reads(NamedTuple):
@@ -173,13 +183,9 @@ def runs(cells, chunks):
     return tuple(np.diff([*starts, len(chunk)]).tolist())
 
 
-def _is_raster(array):
-    return isinstance(array, xr.DataArray) and {"y", "x"} <= set(array.dims)
-
-
 def aligned(arrays):
     """Rasters with common coordinates, after a check that their grids agree; other arrays stay."""
-    rasters = [array for array in arrays if _is_raster(array)]
+    rasters = [array for array in arrays if isinstance(array, xr.DataArray) and {"y", "x"} <= set(array.dims)]
     if len(rasters) < 2:
         return list(arrays)
     if grids.on_same_coordinates(rasters):
@@ -189,8 +195,8 @@ def aligned(arrays):
     # Rasters without a CRS take the CRS of another one on the same cells.
     known = [array for array in rasters if array.odc.crs is not None]
     if 0 < len(known) < len(rasters):
-        arrays = [with_crs_of(array, known[0]) if _is_raster(array) else array for array in arrays]
-        rasters = [array for array in arrays if _is_raster(array)]
+        placed = {id(array): with_crs_of(array, known[0]) for array in rasters}
+        arrays, rasters = [placed.get(id(array), array) for array in arrays], list(placed.values())
     placed = [(array, grids.geobox(array)) for array in rasters]
     for (one, own), (other, others) in combinations(placed, 2):
         if not grids.same_grid(own, others):

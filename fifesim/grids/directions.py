@@ -39,8 +39,11 @@ def with_geometry(array, geometry, names=_GEOMETRY):
 
 def coordinates_of(geometry, names=_GEOMETRY):
     """Coordinates of a raster for the directions of sun and sensor."""
-    angles = {name: xr.as_variable(getattr(geometry, name)) for name in names}
-    return {name: xr.Variable(angle.dims, angle.data, cf.attributes(name)) for name, angle in angles.items()}
+    found = {}
+    for name in names:
+        angle = xr.as_variable(getattr(geometry, name))
+        found[name] = xr.Variable(angle.dims, angle.data, cf.attributes(name))
+    return found
 
 
 def geometry_of(array, names=_GEOMETRY):
@@ -137,6 +140,8 @@ def checked_geometry(given):
 
 def varying(geometry):
     """Names of the angles that vary from cell to cell."""
+    if isinstance(geometry, Geometry):
+        return ()
     return tuple(name for name in _GEOMETRY if np.ndim(getattr(geometry, name)))
 
 

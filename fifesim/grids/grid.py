@@ -290,12 +290,15 @@ def with_coordinates(array, coordinates):
 
 def _with(array, coordinates, indexes):
     """Raster with other coordinates, assembled at once, because xarray aligns assigned ones."""
-    fresh = {name: getattr(each, "variable", each) for name, each in coordinates.items()}
-    made = xr.Coordinates({name: each for name, each in fresh.items() if each.dims == (name,) and name not in indexes})
-    kept = {name: each for name, each in array.coords.variables.items() if name not in fresh}
-    own = {name: index for name, index in array.xindexes.items() if name in kept}
-    variables, indexes = {**kept, **fresh, **made.variables}, {**own, **made.xindexes, **indexes}
-    return raster_of(array.variable, variables, indexes, array.name)
+    variables, known, axes = dict(array.coords.variables), dict(array.xindexes), {}
+    for name, each in coordinates.items():
+        variables.pop(name, None)
+        known.pop(name, None)
+        variables[name] = variable = getattr(each, "variable", each)
+        if variable.dims == (name,) and name not in indexes:
+            axes[name] = variable
+    made = xr.Coordinates(axes)
+    return raster_of(array.variable, {**variables, **made.variables}, {**known, **made.xindexes, **indexes}, array.name)
 
 
 def raster_of(variable, coordinates, indexes, name=None):

@@ -71,14 +71,16 @@ def no_data_of(raster):
 def unpacked(raster):
     """Values of a raster in their unit, NaN for no data, without the attributes of packing."""
     stored, (scale, offset) = _storage(raster), scale_and_offset(raster)
-    marks = {float(mark) for name in NO_DATA_ATTRIBUTES if name in stored for mark in np.ravel(stored[name])}
-    marks = sorted(mark for mark in marks if not np.isnan(mark))
     scaled = (scale, offset) != (1.0, 0.0)
     if scaled and raster.dtype.kind == "f":
         raise ValueError(
             f"{raster.name or 'the raster'} has fractions but also scale_factor {scale:g}, add_offset {offset:g}: "
             "if they were applied, remove them from .attrs; otherwise open the file with mask_and_scale=True"
         )
+    if not scaled and not stored.keys() & NO_DATA_ATTRIBUTES:
+        return raster
+    marks = {float(mark) for name in NO_DATA_ATTRIBUTES if name in stored for mark in np.ravel(stored[name])}
+    marks = sorted(mark for mark in marks if not np.isnan(mark))
     if not scaled and not marks:
         return raster
     cells = raster if raster.dtype.kind == "f" else raster.astype(float)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self, TypeAlias
 
 import numpy as np
@@ -10,7 +11,7 @@ from fifesim.base import arguments
 from fifesim.base.annotations import Array, FilePath, NumberOrArray
 from fifesim.base.messages import PARTS
 from fifesim.ground.canopy.crowns import check_crowns
-from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
+from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
 from fifesim.ground.canopy.properties import PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background
@@ -150,6 +151,11 @@ class Canopy:
     def __repr__(self):
         given = (f"{name}={_brief(getattr(self, name))}" for name in PROPERTIES if name in self.given)
         return f"Canopy({', '.join(given)})"
+
+    @cached_property
+    def leaf_angle_distribution(self) -> LeafAngles:
+        """Leaf angles as shares of the leaf area in classes of inclination."""
+        return leaf_angle_classes(self.leaf_angles)
 
     def replace(self, **changes: Any) -> Self:
         """

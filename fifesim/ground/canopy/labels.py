@@ -1,6 +1,7 @@
 """Reflectance and absorption of canopies on labelled rasters."""
 
 from functools import partial
+from operator import attrgetter
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -18,8 +19,7 @@ from fifesim.grids.windows import made_of
 from fifesim.ground.canopy import layers
 from fifesim.ground.canopy.absorption import scene_light
 from fifesim.ground.canopy.crowns import SHAPE, check_crowns, crown_shares, lai_in_crowns
-from fifesim.ground.canopy.description import Canopy, is_raster
-from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
+from fifesim.ground.canopy.description import Canopy
 from fifesim.ground.canopy.leaf_area import check_map, warn_of_large
 from fifesim.ground.canopy.properties import NUMERIC_PROPERTIES
 from fifesim.ground.canopy.reflectance_table import (
@@ -67,7 +67,8 @@ def even_canopy(lai, stand, light, exact):
     """EvenCanopy of a scene, or None where other properties vary or no table is used."""
     own = stand.canopy
     by_band = (*stand.leaf, stand.background, light.diffuse_fraction)
-    varies = any(map(is_raster, (own.brown, own.crown_cover, *by_band))) or directions.varying(light.geometry)
+    rasters = [each for each in (own.brown, own.crown_cover, *by_band) if isinstance(each, xr.DataArray)]
+    varies = rasters or directions.varying(light.geometry)
     if varies or own.brown != 0 or own.crown_cover != 1 or stand.soil_changes is not None or exact:
         return None
     return EvenCanopy(lai, tuple(map(float, stand.background)), _uniform_scene(stand, light))
@@ -76,19 +77,20 @@ def even_canopy(lai, stand, light, exact):
 def canopy_kernel(lai, bands, stand, light, exact=False):
     """Kernel of canopy reflectance, ``kernel(lai, *blocks)`` of shape (band, ...) [1], and its raster arguments."""
     leaves = stand.leaf + (stand.dead or ())
-    if not (directions.varying(light.geometry) or any(map(is_raster, leaves))):
+    if not directions.varying(light.geometry) and xr.DataArray not in map(type, leaves):
         return _uniform_kernel(partial(scene_reflectance, exact=exact), lai, bands, stand, light)
     varying, numbers = shares_of(stand.canopy, CELL_SHARES, lai)
     by_band = [_per_band(each) for each in (light.diffuse_fraction, *leaves)]
-    rasters = [_background_rasters(stand, bands), by_band[0], *directions.angles(light.geometry), *by_band[1:]]
+    rasters = [_per_band(stand.background, bands), by_band[0], *directions.angles(light.geometry), *by_band[1:]]
     own = stand.canopy
     kernel = partial(_by_cell, own.leaf_angles, own.hotspot, own.crown_shape, tuple(varying), numbers)
-    return _with_soil(kernel, [*rasters, *varying.values()], stand)
+    rasters += varying.values()
+    return (kernel, rasters) if stand.soil_changes is None else _with_soil(kernel, rasters, *stand.soil_changes)
 
 
 def light_kernel(lai, bands, stand, light, weights, part):
     """Kernel of the light absorbed in bands, ``kernel(lai, *blocks)`` of shape (k, ...) [1], and its rasters."""
-    if any(map(is_raster, stand.leaf + (stand.dead or ()))):
+    if xr.DataArray in map(type, stand.leaf + (stand.dead or ())):
         raise ValueError(
             "leaf optics vary by cell, absorbed light needs the same leaves in all cells of a class: use "
             "method='beer', or give leaf_optics of numbers"
@@ -100,18 +102,12 @@ def _uniform_kernel(evaluate, lai, bands, stand, light):
     """Kernel and rasters of a function of leaf area, background and Scene with the same leaves and directions."""
     varying, numbers = shares_of(stand.canopy, CELL_SHARES, lai)
     kernel = partial(_uniform, evaluate, _uniform_scene(stand, light), tuple(varying), numbers)
-    return _with_soil(kernel, [_background_rasters(stand, bands), *varying.values()], stand)
+    rasters = [_per_band(stand.background, bands), *varying.values()]
+    return (kernel, rasters) if stand.soil_changes is None else _with_soil(kernel, rasters, *stand.soil_changes)
 
 
-def _background_rasters(stand, bands):
-    return _per_band(_background_bands(stand.background, bands))
-
-
-def _with_soil(kernel, rasters, stand):
+def _with_soil(kernel, rasters, changed, changes):
     """Kernel and rasters, with the background of each cell changed first."""
-    if stand.soil_changes is None:
-        return kernel, rasters
-    changed, changes = stand.soil_changes
     return partial(_on_soil, kernel, changed, len(changes)), [*changes, *rasters]
 
 
@@ -120,7 +116,7 @@ def shares_of(canopy, names, lai):
     varying, numbers = {}, {}
     for name in names:
         given = getattr(canopy, name)
-        if not is_raster(given):
+        if not isinstance(given, xr.DataArray):
             numbers[name] = float(given)
             continue
         cf.check_units(given, name)
@@ -131,10 +127,8 @@ def shares_of(canopy, names, lai):
 
 def _uniform_scene(stand, light):
     own, at = stand.canopy, light.geometry
-    towards = at.sza, at.vza, at.raa
-    return uniform_scene(
-        stand.leaf, light.diffuse_fraction, towards, own.leaf_angles, own.hotspot, stand.dead, own.crown_shape
-    )
+    angles, towards = own.leaf_angle_distribution, (at.sza, at.vza, at.raa)
+    return uniform_scene(stand.leaf, light.diffuse_fraction, towards, angles, own.hotspot, stand.dead, own.crown_shape)
 
 
 def _on_soil(kernel, changed, count, lai, *blocks):
@@ -148,7 +142,7 @@ def _uniform(evaluate, scene, varying, numbers, lai, background, *shares):
     # apply_ufunc hands the bands over as the last axis.
     bands_first = background.transpose(-1, *range(background.ndim - 1))
     lai = check_map(lai)
-    scene = with_shares(scene, lai.shape, *_in_order(varying, numbers, shares))
+    scene = with_shares(scene, lai.shape, **numbers, **dict(zip(varying, shares, strict=True)))
     return evaluate(lai, bands_first, scene)
 
 
@@ -157,16 +151,12 @@ def _by_cell(
 ):  # fmt: skip
     """Reflectance where the directions of sun or view, or the leaves, vary from cell to cell."""
     count = len(optics) - len(varying)
-    leaf, dead, shares = optics[:2], optics[2:count] or None, _in_order(varying, numbers, optics[count:])
+    leaf, dead = optics[:2], optics[2:count] or None
+    by_name = numbers | dict(zip(varying, optics[count:], strict=True))
+    shares = [by_name[name] for name in CELL_SHARES]
     towards = sza, vza, relative_azimuth(saa, vaa)
     lai = check_map(lai)
     return directional_reflectance(lai, leaf, ground, sky, towards, leaf_angles, hotspot, dead, crown_shape, shares)
-
-
-def _in_order(varying, numbers, blocks):
-    """Shares of the canopy in the order of `CELL_SHARES`, from blocks of rasters and from numbers."""
-    shares = numbers | dict(zip(varying, blocks, strict=True))
-    return [shares[name] for name in CELL_SHARES]
 
 
 def shares_in_words(canopy, names=CELL_SHARES):
@@ -174,24 +164,23 @@ def shares_in_words(canopy, names=CELL_SHARES):
     texts = []
     for name in names:
         value = getattr(canopy, name)
-        if is_raster(value):
+        if isinstance(value, xr.DataArray):
             texts.append(f"{name} by cell, ")
         elif value != NUMERIC_PROPERTIES[name].default:
             texts.append(f"{name} {value:g}, ")
     return "".join(texts)
 
 
-def _per_band(values):
-    """Raster, or values of each band as one, without band names."""
-    if is_raster(values):
-        return values.drop_vars("band", errors="ignore")
-    return xr.DataArray(np.asarray(values, float), dims="band")
+def _per_band(values, bands=None):
+    """Raster, or values of each band as one, without band names; backgrounds in the order of some bands."""
+    if not isinstance(values, xr.DataArray):
+        return xr.DataArray(np.asarray(values, float), dims="band")
+    values = values if bands is None else _background_bands(values, bands)
+    return values.drop_vars("band", errors="ignore")
 
 
 def _background_bands(background, bands):
-    """Background with one band for each band of the canopy; numbers stay."""
-    if not is_raster(background):
-        return background
+    """Background with one band for each band of the canopy."""
     cf.check_units(background, "surface_reflectance")
     if "band" not in background.dims:
         return background.expand_dims(band=list(bands))
@@ -209,13 +198,14 @@ ABSORBING = ("leaf_angles", *CELL_SHARES)
 def level_reflectance(lai, bands, stand, light, exact=False, attrs=MappingProxyType({})):
     """Reflectance factor of a canopy over its background on flat ground, dims (band, y, x). [1]"""
     lai = checked_scene(lai)
-    kernel, rasters = canopy_kernel(lai, [band.name for band in bands], stand, light, exact)
+    kernel, rasters = canopy_kernel(lai, list(map(attrgetter("name"), bands)), stand, light, exact)
     varies = directions.varying(light.geometry)
     cells = lai.drop_vars(varies, errors="ignore") if varies else lai
     out = chunking.pointwise(kernel, cells, *rasters, bands=len(bands))
-    below = "raster" if is_raster(stand.background) else ",".join(f"{value:g}" for value in stand.background)
+    below = stand.background
+    below = "raster" if isinstance(below, xr.DataArray) else ",".join(map("{:g}".format, below))
     attrs = {"background": below} | dict(attrs)
-    shares, angles = shares_in_words(stand.canopy), str(leaf_angle_classes(stand.canopy.leaf_angles))
+    shares, angles = shares_in_words(stand.canopy), stand.canopy.leaf_angle_distribution.name
     out = _labelled(out, lai, bands, light.geometry, angles, shares, attrs)
     return out if out.chunks is None else made_of(out, even_canopy(lai, stand, light, exact))
 
@@ -229,7 +219,7 @@ def reflectance_of_classes(lai, cover, bands, stands, light, exact=False, attrs=
         kernels[code] = alike[0] if alike else canopy_kernel(lai, [band.name for band in bands], stand, light, exact)
         distinct.append((stand, kernels[code]))
     out = by_class(kernels, cover, lai, bands=len(bands))
-    angles = dict.fromkeys(str(leaf_angle_classes(each.canopy.leaf_angles)) for each in stands.values())
+    angles = dict.fromkeys(each.canopy.leaf_angle_distribution.name for each in stands.values())
     return _labelled(
         out, lai, bands, light.geometry, " and ".join(angles), "", {"background": "by class"} | dict(attrs)
     )
@@ -255,10 +245,14 @@ def _same(one, other):
 
 def _labelled(reflectance, lai, bands, geometry, angles, shares, attrs):
     """Reflectance of a scene with its bands, grid, directions and attributes."""
-    names, wavelengths = ([getattr(band, name) for band in bands] for name in ("name", "wavelength"))
+    names, wavelengths = zip(*map(attrgetter("name", "wavelength"), bands), strict=True)
     coordinates = cf.band_coordinates(band=names, wavelength=wavelengths) | directions.coordinates_of(geometry)
     out = grids.place(reflectance, grids.geobox(lai), coordinates)
-    history = f"surface_reflectance: SAIL, {angles} leaves, {shares}{_directions(geometry)}"
+    zeniths = []
+    for name in ("sza", "vza"):
+        angle = getattr(geometry, name)
+        zeniths.append(f"{name} varying" if np.ndim(angle) else f"{name} {angle:.2f}")
+    history = f"surface_reflectance: SAIL, {angles} leaves, {shares}{', '.join(zeniths)}"
     return cf.label(out, "surface_reflectance", source=lai, history=history, leaf_angles=angles, **attrs)
 
 
@@ -315,8 +309,7 @@ def checked_scene(lai):
     if set(lai.dims) != {"y", "x"}:
         raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
     grids.geobox(lai)
-    names = [name for name in (lai.name, lai.attrs.get("long_name")) if isinstance(name, str)]
-    cf.check_words(str(lai.name or "the raster"), names, "lai")
+    cf.check_words(str(lai.name or "the raster"), (lai.name, lai.attrs.get("long_name")), "lai")
     lai = unpacked(lai)
     if lai.chunks is None and lai.size:
         if not np.isfinite(lai.values).any():
@@ -327,11 +320,3 @@ def checked_scene(lai):
         if "lai_distribution" not in lai.attrs:
             warn_of_large(lai.values)
     return lai
-
-
-def _directions(geometry):
-    """Text of the zenith angles."""
-    return ", ".join(
-        f"{name} varying" if name in directions.varying(geometry) else f"{name} {getattr(geometry, name):.2f}"
-        for name in ("sza", "vza")
-    )

@@ -31,7 +31,7 @@ class LeafAngles:
     fraction : sequence of float, shape (n,)
         Share of the leaf area. They sum to 1; rounding is normalised away. [1]
     name : str, optional
-        Text that `leaf_angle_classes` turns into this distribution.
+        Text that `leaf_angle_classes` turns into this distribution, by default inclinations and fractions.
 
     Raises
     ------
@@ -61,10 +61,12 @@ class LeafAngles:
             fraction = tuple(value / total for value in fraction)
         object.__setattr__(self, "inclination", inclination)
         object.__setattr__(self, "fraction", fraction)
+        if not self.name:
+            pairs = zip(inclination, fraction, strict=True)
+            object.__setattr__(self, "name", ", ".join(f"{angle!r}:{share!r}" for angle, share in pairs))
 
     def __str__(self):
-        pairs = zip(self.inclination, self.fraction, strict=True)
-        return self.name or ", ".join(f"{angle!r}:{share!r}" for angle, share in pairs)
+        return self.name
 
 
 # Cumulative leaf area below an inclination t [radian]: spherical, and de Wit's types.

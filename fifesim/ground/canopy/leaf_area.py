@@ -8,11 +8,8 @@ from fifesim.base.messages import warn
 
 def within(values, lowest, highest):
     """Whether all values are in a range; NaN is ignored."""
-    values = np.asarray(values, float)
-    if values.flags.c_contiguous or values.flags.f_contiguous:
-        return not outside(read_only(values.ravel(order="K")), float(lowest), float(highest))
-    # Two passes without a copy.
-    low, high = (np.fmin.reduce(values, axis=None, initial=lowest), np.fmax.reduce(values, axis=None, initial=highest))
+    low = np.fmin.reduce(values, axis=None, initial=lowest)
+    high = np.fmax.reduce(values, axis=None, initial=highest)
     return bool(low >= lowest and high <= highest)
 
 

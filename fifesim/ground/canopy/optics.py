@@ -12,7 +12,7 @@ from fifesim.base.arrays import distinct_columns
 from fifesim.base.bands import Band
 from fifesim.base.caches import cached
 from fifesim.ground.canopy.interpolation import refined
-from fifesim.ground.canopy.leaf_area import check_fraction, check_share
+from fifesim.ground.canopy.leaf_area import check_fraction, check_share, read_only
 from fifesim.ground.canopy.prospect import CONTENTS, LARGEST_STRUCTURE, Leaf, leaf_band_means, leaf_spectrum
 from fifesim.ground.canopy.spectra import (
     Background,
@@ -32,18 +32,40 @@ DEAD_LEAF = Leaf(chlorophyll=0.0, carotenoids=0.0, brown=1.0, water=0.001)
 _DEFAULT_BACKGROUND = {"soil_dry": 0.475, "shade": 0.525}
 
 
+@cached(64, "leaf optics in bands")
+def optics_of_leaf(bands, leaf):
+    """Reflectance and transmittance of a leaf, by default green tallgrass, shape (band,), read-only. [1]"""
+    if leaf is None:
+        known = _default_leaves()
+        found = band_leaf_optics(bands, known | _leaf_means(_lacking(known, bands), Leaf()))
+    else:
+        found = band_leaf_optics(bands, _leaf_means(_responses(bands, "Leaf"), leaf))
+    return tuple(map(read_only, found))
+
+
+def is_even(leaf):
+    """Whether a leaf is the default one, or described by numbers."""
+    return leaf is None or (isinstance(leaf, Leaf) and not leaf.varying())
+
+
+@cached(64, "default background in bands")
+def default_background(bands):
+    """Reflectance of soil and litter of tallgrass, shape (band,), read-only. [1]"""
+    known = _default_background()
+    mixed = _background_means(_lacking(known, bands), Background(_DEFAULT_BACKGROUND))
+    return read_only(band_background(bands, known | mixed))
+
+
 def band_leaf_optics(bands, given=None):
     """Leaf reflectance and transmittance of bands, shape (band,). [1]"""
-    if given is None:
-        given = _default_leaves()
-        if lacking := _lacking(given, bands):
-            given = given | _leaf_means(lacking, Leaf())
-    elif is_path(given):
+    if is_even(given):
+        return tuple(each.copy() for each in optics_of_leaf(tuple(bands), given))
+    if is_path(given):
         given = read_spectrum(_csv(given), LeafSpectrum)
-    if isinstance(given, LeafSpectrum):
-        given = band_means(_responses(bands, "LeafSpectrum"), given.wavelength, given.values())
     elif isinstance(given, Leaf):
         given = _leaf_means(_responses(bands, "Leaf"), given)
+    if isinstance(given, LeafSpectrum):
+        given = band_means(_responses(bands, "LeafSpectrum"), given.wavelength, given.values())
     if isinstance(given, Mapping):
         given = np.reshape([of_band(given, band, "leaf optics") for band in _names(bands)], (-1, 2)).T
     reflectance, transmittance = (_for_bands(values, bands, "leaf optics") for values in given)
@@ -53,15 +75,13 @@ def band_leaf_optics(bands, given=None):
 
 def band_background(bands, given=None):
     """Background reflectance of bands, shape (band,). [1]"""
+    if given is None:
+        return default_background(tuple(bands)).copy()
     if is_path(given):
         given = Background({str(given): 1.0})
     elif is_mixture(given) and not set(given) <= set(_names(bands)):
         given = Background(given)
-    if given is None:
-        given = _default_background()
-        if lacking := _lacking(given, bands):
-            given = given | _background_means(lacking, Background(_DEFAULT_BACKGROUND))
-    elif isinstance(given, Background | Spectrum):
+    if isinstance(given, Background | Spectrum):
         given = _background_means(_responses(bands, type(given).__name__), given)
     if isinstance(given, Mapping):
         given = [of_band(given, band, "background") for band in _names(bands)]
@@ -109,17 +129,9 @@ def _leaf_means(bands, leaf):
     """Leaf optics by band."""
     if not bands:
         return {}
-    means = _means_of_numbers(tuple(bands), leaf) if not leaf.varying() else _means_of(bands, leaf)
-    return {band.name: tuple(pair) for band, pair in zip(bands, means.T.tolist(), strict=True)}
-
-
-def _means_of(bands, leaf):
     wavelength, *spectra = leaf_spectrum(leaf)
-    return band_means(bands, wavelength, spectra)
-
-
-# Dead leaves stay the same where green ones vary.
-_means_of_numbers = cached(64, "band means of leaf optics")(_means_of)
+    means = band_means(bands, wavelength, spectra)
+    return {band.name: tuple(pair) for band, pair in zip(bands, means.T.tolist(), strict=True)}
 
 
 def _background_means(bands, mixture):

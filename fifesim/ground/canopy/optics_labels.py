@@ -12,7 +12,6 @@ from fifesim.grids.chunks import by_band, layers_of
 from fifesim.grids.grid import with_crs_of
 from fifesim.grids.inputs import micrometres
 from fifesim.ground.canopy import optics
-from fifesim.ground.canopy.description import is_raster
 from fifesim.ground.canopy.optics import leaf_means
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.soil import brightened, moistened, soil_line, water_films
@@ -21,6 +20,8 @@ from fifesim.ground.canopy.spectra import LeafSpectrum, Spectrum, check_shares, 
 
 def background(bands, given, lai):
     """Background reflectance of bands, shape (band,), or dims ([band], y, x) where it varies by cell. [1]"""
+    if given is None:
+        return optics.default_background(tuple(bands))
     if isinstance(given, xr.DataArray):
         return given.rename("background")
     if isinstance(given, xr.Dataset):
@@ -49,9 +50,9 @@ def spectrum_of(dataset, what, kind=Spectrum):
 
 def as_it_lies(bands, below, lai, soil=None, moisture=None):
     """Background with changed soil brightness and moisture, shape (band,) or dims (band, y, x). [1]"""
-    kernel, changes = soil_kernel(bands, lai, soil, moisture)
-    if kernel is None:
+    if soil is None and moisture is None:
         return below
+    kernel, changes = soil_kernel(bands, lai, soil, moisture)
     if not any(isinstance(each, xr.DataArray) for each in (below, soil, moisture)):
         return kernel(below, *(each.values for each in changes))
     names = [band.name for band in bands]
@@ -84,18 +85,25 @@ def soil_kernel(bands, lai, soil=None, moisture=None):
             reflectance = change(reflectance, block, parameters)
         return reflectance
 
-    return kernel if steps else None, rasters
+    return kernel, rasters
 
 
 def changes_of(canopy):
-    """Brightness and moisture of the background of a canopy, numbers or rasters; None for no change."""
-    return tuple(None if not is_raster(each) and each == 0 else each for each in (canopy.soil, canopy.moisture))
+    """Brightness and moisture of the background of a canopy, numbers or rasters, where they differ from 0."""
+    changes = {}
+    for name in ("soil", "moisture"):
+        value = getattr(canopy, name)
+        if isinstance(value, xr.DataArray) or value != 0:
+            changes[name] = value
+    return changes
 
 
 def background_attributes(canopy):
     """Attributes for the brightness and moisture of the background: numbers, or "raster"."""
-    changes = zip(("soil", "moisture"), changes_of(canopy), strict=True)
-    return {name: "raster" if is_raster(each) else float(each) for name, each in changes if each is not None}
+    attributes = changes_of(canopy)
+    for name, each in attributes.items():
+        attributes[name] = "raster" if isinstance(each, xr.DataArray) else float(each)
+    return attributes
 
 
 def _by_cell(name, value, lai):
@@ -128,6 +136,8 @@ def _mixed(bands, given, lai):
 
 def leaf_optics(bands, given, lai, *, exact=False):
     """Leaf reflectance and transmittance of bands, shape (band,), or dims (band, y, x) where they vary by cell. [1]"""
+    if given is None:
+        return optics.optics_of_leaf(tuple(bands), given)
     if isinstance(given, xr.Dataset):
         given = spectrum_of(given, "leaf_optics", LeafSpectrum)
     names = [band.name for band in bands]

@@ -2,6 +2,7 @@
 Reflectance of a canopy in many cells: by the models, or interpolated in tables of the properties that cells share.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -112,17 +113,25 @@ def canopy_reflectance(
     dead = brown_reflectance, brown_transmittance
     dead = None if any(each is None for each in dead) else dead
     bands = np.broadcast_shapes(*map(np.shape, (*leaf, diffuse_fraction)), background.shape[: background.ndim < 2])
-    scene = uniform_scene(leaf, diffuse_fraction, (sza, vza, raa), leaf_angles, hotspot, dead, crown_shape, bands)
+    if not 0 <= crown_shape < np.inf:
+        raise ValueError(f"crown_shape must be at least 0, got {crown_shape:g}: it is crown diameter over height")
+    for optics in (leaf, dead or leaf):
+        check_leaf_optics(*optics)
+    classes = leaf_angle_classes(leaf_angles)
+    scene = uniform_scene(leaf, diffuse_fraction, (sza, vza, raa), classes, hotspot, dead, crown_shape, bands)
     scene = with_shares(scene, lai.shape, brown, dissociation, crown_cover)
+    check_cells(lai.reshape(-1), background, scene)
     return scene_reflectance(lai, background, scene, exact)
 
 
 def scene_reflectance(lai, background, scene, exact=False):
-    """Reflectance of cells, shape (band,) + lai.shape, from leaf area of any shape, a background and a Scene."""
+    """Reflectance of cells, shape (band,) + lai.shape, from valid leaf area of any shape, a background and a Scene."""
     bands, cells = len(scene.leaf_reflectance), lai.shape
     uniform = background.ndim < 2
     if not (exact or scene.varies()):
-        check_cells(lai, background, scene)
+        check_share("background reflectance", background)
+        if scene.crown_cover != 1:
+            check_crowns(lai, scene.crown_cover)
         if uniform:
             return interpolation.interpolate(_surface_table(_per_band(background, (bands,)), scene), lai)
         return interpolation.interpolate_over(_layer_table(scene), lai, background)
@@ -134,17 +143,12 @@ def scene_reflectance(lai, background, scene, exact=False):
 
 
 def uniform_scene(leaf, sky, directions, leaf_angles, hotspot, dead=None, crown_shape=SHAPE, bands=(1,)):
-    """Scene without gaps or dead leaves, with the same optics in all cells."""
-    if not 0 <= crown_shape < np.inf:
-        raise ValueError(f"crown_shape must be at least 0, got {crown_shape:g}: it is crown diameter over height")
-    for optics in (leaf, dead or leaf):
-        check_leaf_optics(*optics)
+    """Scene without gaps or dead leaves, with the same valid optics in all cells."""
     bands = np.broadcast_shapes(bands, (1,), *map(np.shape, (*leaf, sky)))
-    of_leaves = [_per_band(each, bands) for each in (*leaf, sky)]
-    of_dead = [None, None] if dead is None else [_per_band(each, bands) for each in dead]
+    by_band = partial(_per_band, bands=bands)
+    optics, of_dead = map(by_band, (*leaf, sky)), (None, None) if dead is None else map(by_band, dead)
     angles = map(float, directions)
-    scene = Scene(*of_leaves, *angles, leaf_angle_classes(leaf_angles), float(hotspot), *of_dead)
-    return scene._replace(crown_shape=float(crown_shape))
+    return Scene(*optics, *angles, leaf_angles, float(hotspot), *of_dead, crown_shape=float(crown_shape))
 
 
 def with_shares(scene, cells, brown=0.0, dissociation=0.0, crown_cover=1.0):
@@ -154,8 +158,11 @@ def with_shares(scene, cells, brown=0.0, dissociation=0.0, crown_cover=1.0):
     elif scene.brown_reflectance is None:
         raise ValueError("brown leaves need optics of their own: give brown_reflectance and brown_transmittance")
     check_share("dissociation", dissociation)
-    brown, dissociation, crown_cover = (_of_cells(share, cells) for share in (brown, dissociation, crown_cover))
-    return scene._replace(brown=brown, dissociation=dissociation, crown_cover=crown_cover)
+    shares = {"brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
+    for name, share in shares.items():
+        by_cell = np.ndim(share) > 0
+        shares[name] = np.broadcast_to(np.asarray(share, float), cells).reshape(-1) if by_cell else float(share)
+    return scene._replace(**shares)
 
 
 def surface_table(background, scene):
@@ -235,11 +242,6 @@ def _leaves_by_cell(reflectance, transmittance, cells):
     return tuple(np.ascontiguousarray(np.broadcast_to(each, shape).reshape(-1, shape[-1]).T) for each in (rho, tau))
 
 
-def _of_cells(value, cells):
-    """A number, or values of cells, shape (n,)."""
-    return np.broadcast_to(np.asarray(value, float), cells).reshape(-1) if np.ndim(value) else float(value)
-
-
 def _per_band(values, bands):
     """Values of each band as a tuple, for the key of a cache."""
     return tuple(np.broadcast_to(np.asarray(values, float), bands).tolist())
@@ -298,7 +300,7 @@ class Scene(NamedTuple):
 
     def varies(self):
         """Whether leaves or crowns vary from cell to cell."""
-        return any(isinstance(each, np.ndarray) for each in (self.brown, self.dissociation, self.crown_cover))
+        return np.ndarray in {type(self.brown), type(self.dissociation), type(self.crown_cover)}
 
     def part(self, cells):
         """Scene of some cells, which are the last axis of its arrays."""

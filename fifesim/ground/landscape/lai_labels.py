@@ -201,7 +201,7 @@ def _check_band(path, name, allow_remote):
 
 
 def _check_metadata(name, words, units, counts):
-    cf.check_words(name, [word for word in words if isinstance(word, str)], "lai", str(units or ""))
+    cf.check_words(name, words, "lai", str(units or ""))
     if counts:
         warn(
             f"{name} holds integers without a scale, which are used as leaf area index: if they are scaled, set their "

@@ -283,7 +283,7 @@ def _known(chips, layout, table):
         found[name] = ((name,), values, {"long_name": words, "units": "m", "axis": name.upper()})
     for name, variable in layout.bands.coords.items():
         values = variable.values.astype(object) if variable.dtype.kind == "U" else variable.values
-        known = cf.attributes(name) if name in cf.QUANTITIES else {"long_name": "band"}
+        known = dict(cf.attributes(name)) if name in cf.QUANTITIES else {"long_name": "band"}
         found[str(name)] = (("band",), values, known)
     crs = {key: value for key, value in layout.crs.attrs.items() if key != "GeoTransform"}
     found["spatial_ref"] = ((), np.asarray(layout.crs.values, np.int64), crs)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, field, replace
+from functools import cached_property
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
@@ -298,12 +299,12 @@ class InstrumentBand:
         parts = [f"{name}={value!r}" for name, value in vars(self).items() if value is not None and name in _SHOWN]
         return f"InstrumentBand({', '.join(parts)})"
 
-    @property
+    @cached_property
     def response(self):
         """Relative spectral response."""
         return self.srf.read(self.name)
 
-    @property
+    @cached_property
     def wavelength(self):
         """Response-weighted mean wavelength. [um]"""
         return self.response.center
@@ -618,17 +619,27 @@ class Instrument:
         >>> [band.name for band in instrument("TM").select(["TM4", "tm3"])]
         ['TM4', 'TM3']
         """
-        known = {key(band.name): band for band in self.bands}
-        names = known if bands is None else [bands] if isinstance(bands, str) else bands
-        found = tuple(
-            (isinstance(name, str) and band_called(name, self)) or lookup(name, known, f"band of {self.name}")
-            for name in names
-        )
+        if bands is None:
+            return self.bands
+        names = [bands] if isinstance(bands, str) else bands
+        found = tuple(map(self._own_names.get, names))
+        if None in found:
+            found = tuple(own or self._band_called(name) for own, name in zip(found, names, strict=True))
         if not found or len(set(found)) < len(found):
             raise ValueError(
                 f"bands of {self.name} must be at least one, each once, got {', '.join(map(str, names)) or 'none'}"
             )
         return found
+
+    @cached_property
+    def _own_names(self):
+        return {band.name: band for band in self.bands}
+
+    def _band_called(self, name):
+        """Band by another spelling of its name, its number or a common name."""
+        if isinstance(name, str) and (found := band_called(name, self)):
+            return found
+        return lookup(name, {key(band.name): band for band in self.bands}, f"band of {self.name}")
 
     def red_and_near_infrared(self) -> tuple[InstrumentBand, InstrumentBand]:
         """

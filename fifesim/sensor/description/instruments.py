@@ -85,20 +85,20 @@ def instrument(
     >>> tm.name, round(tm.line_spread.fwhm, 2), round(tm.ground_interval, 3)
     ('TM', 36.01, 30.315)
     """
-    found = name if isinstance(name, Instrument) else _found(name)
-    return found if response is None else with_response(found, response)
-
-
-def _found(name):
-    if isinstance(name, Path) or (isinstance(name, str) and Path(name).suffix.lower() == ".toml"):
+    if isinstance(name, Instrument):
+        found = name
+    elif isinstance(name, Path) or (isinstance(name, str) and Path(name).suffix.lower() == ".toml"):
         path = Path(name).absolute()
         # A file that has changed is read again, with its tables; one that is not there is an error of reading.
         state = _state(path)
         tables = () if state is None else _tables(path, state)
-        return _read_again(path, (state, *map(_state, tables)))
-    return catalogued(name)
+        found = _read_again(path, (state, *map(_state, tables)))
+    else:
+        found = catalogued(name) if isinstance(name, str) else lookup(name, _catalogue(), "instrument")
+    return found if response is None else with_response(found, response)
 
 
+@cached(128, "instruments by name")
 def catalogued(name):
     """Built-in instrument by name or alias."""
     # Most are called as their file is; to read all of them takes ten times as long.

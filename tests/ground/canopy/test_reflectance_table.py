@@ -239,7 +239,6 @@ def test_models_are_those_that_a_scene_needs():
     expected = reflectance_factor(surface.rso, surface.rdo, np.array([[0.2], [0.1]]))
     np.testing.assert_array_equal(model_reflectance(LAI, np.full((2, 1), 0.2), crowns), expected)
     np.testing.assert_array_equal(cell_by_cell(LAI, np.full((2, 1), 0.2), crowns), expected)
-    assert crowns.varies() and not PLAIN.varies()
 
 
 def test_part_of_a_scene_has_part_of_what_varies():
