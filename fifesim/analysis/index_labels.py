@@ -86,7 +86,6 @@ def _wavelengths(reflectance):
     )
 
 
-_METHODS = {"maximum-value": date_of_maximum}
 _REFERENCE = "Holben (1986), doi:10.1080/01431168608948945"
 
 
@@ -141,8 +140,8 @@ def composite(
     >>> bool((best.date == dates[1])[1:-1, 1:-1].all())
     True
     """
-    if method not in _METHODS:
-        raise ValueError(f"method must be one of {', '.join(_METHODS)}, got {method!r}")
+    if method != "maximum-value":
+        raise ValueError(f"method must be 'maximum-value', got {method!r}")
     if images.dtype.kind != "f" or cf.QUANTITIES["toa_radiance"].units == images.attrs.get("units"):
         raise ValueError(
             "a composite needs reflectance or NDVI, as digital numbers and radiance depend on the sun of each date: "
@@ -155,7 +154,7 @@ def composite(
         )
     grid = grids.geobox(images.isel(time=0))
     index = _index(images) if by is None else _checked(by, images)
-    chosen = _along_time(_METHODS[method], index.drop_vars(list(index.coords)), dtype=np.int64)
+    chosen = _along_time(date_of_maximum, index.drop_vars(list(index.coords)), dtype=np.int64)
     plain = images.drop_vars(list(images.coords))
     out = _along_time(values_of_date, plain, chosen, dtype=images.dtype, missing=np.nan)
     out = out.transpose(*(name for name in images.dims if name != "time"))

@@ -280,19 +280,3 @@ def increment_moments(sums):
         variance = (square - index * index / count) / (count - 1)
         mean = np.where(count > 0, value / count, np.nan)
     return count.astype(int), mean, np.sqrt(np.where(count > 1, np.maximum(variance, 0.0), np.nan))
-
-
-@numba.njit(nogil=True, cache=True)
-def error_sums(truth, estimate, low, high):
-    """Sums of 1, error, squared error and covered truth over the valid pixels of each row, shape (rows, 4)."""
-    sums = np.zeros((truth.shape[0], 4))
-    for i in range(truth.shape[0]):
-        for j in range(truth.shape[1]):
-            error = estimate[i, j] - truth[i, j]
-            if error == error:
-                sums[i, 0] += 1.0
-                sums[i, 1] += error
-                sums[i, 2] += error * error
-                if low[i, j] <= truth[i, j] <= high[i, j]:
-                    sums[i, 3] += 1.0
-    return sums

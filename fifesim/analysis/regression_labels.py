@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -11,13 +10,11 @@ import numpy as np
 import xarray as xr
 
 from fifesim.analysis import regression
-from fifesim.analysis.regression import Regression, totals
+from fifesim.analysis.regression import Regression
 from fifesim.base.annotations import Pairing
-from fifesim.base.messages import warn
 from fifesim.grids import cf, chunks, swaths
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import with_crs_of
-from fifesim.grids.inputs import RasterOrDataset
 from fifesim.grids.reductions import computed, extremes, sums_by_row
 
 # Numbers by which files mark missing data and which no quantity here takes, and a bound that all of them keep.
@@ -344,63 +341,6 @@ def invert(
     return xr.Dataset(found | {"flag": flag})
 
 
-def inversion_error(estimate: RasterOrDataset, truth: xr.DataArray, *, pair: Pairing = "coordinates") -> xr.Dataset:
-    """
-    Error of an estimated map against the truth; computes.
-
-    Deprecated: use `fifesim.score`, which also has standard errors and groups. It will be removed in the next release.
-
-    Parameters
-    ----------
-    estimate : xarray.Dataset or xarray.DataArray, dims (y, x)
-        From `invert`, or a map alone.
-    truth : xarray.DataArray, dims (y, x)
-    pair : {"coordinates", "index"}, optional
-        As in `regress`.
-
-    Returns
-    -------
-    error : xarray.Dataset
-        ``bias``, mean of estimate minus truth; ``rmse``, root mean square difference; ``n``, number of pixels; and for
-        a Dataset ``coverage``, the fraction of true values within the interval. Identical for any chunks.
-
-    Raises
-    ------
-    ValueError
-        If the rasters do not match, no pixel has both values, or a Dataset is not a result of `invert`.
-
-    See Also
-    --------
-    fifesim.score
-
-    Examples
-    --------
-    >>> import fifesim
-    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
-    >>> lai = fifesim.lai_scene(grid, seed=7)
-    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
-    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
-    >>> ndvi, truth = image.fifesim.ndvi(), lai.fifesim.aggregate(30)
-    >>> estimate = ndvi.fifesim.invert(fifesim.regress(truth, ndvi))
-    >>> error = estimate.fifesim.inversion_error(truth)
-    >>> abs(round(float(error.bias), 6)), round(float(error.coverage), 2)
-    (0.0, 0.94)
-    """
-    warn("inversion_error is deprecated and will be removed: use fifesim.score(estimate, truth)", FutureWarning)
-    value, low, high = [estimate] * 3 if isinstance(estimate, xr.DataArray) else _map_and_limits(estimate)
-    check_same_quantity(value, truth, ("estimate", "truth"))
-    value, true = matched(value, truth, pair)
-    low, _ = matched(low, truth, pair)
-    high, _ = matched(high, truth, pair)
-    n, total, squares, inside = totals(sums_by_row(regression.error_sums, true, value, low, high, count=4))
-    if n == 0:
-        raise ValueError("no pixel has both an estimate and a true value: do the rasters overlap?")
-    found = {"bias": total / n, "rmse": math.sqrt(squares / n), "n": int(n)}
-    if isinstance(estimate, xr.Dataset):
-        found["coverage"] = inside / n
-    return xr.Dataset(found)
-
-
 def _check_names(ndvi, fit, quantity):
     """Raise ValueError if a regression does not relate the quantity to the index, by standard names."""
     wanted, given = cf.QUANTITIES[quantity].standard_name, ndvi.attrs.get("standard_name", "")
@@ -411,17 +351,6 @@ def _check_names(ndvi, fit, quantity):
         )
     if fit.x_name and given and fit.x_name != given:
         raise ValueError(f"ndvi must be {fit.x_name}, as in the fit, got {given}: give the raster of the index")
-
-
-def _map_and_limits(estimate):
-    """Variable of an estimate, and the limits of its interval."""
-    variables = [name for name in estimate.data_vars if name not in (*_LIMITS, "flag")]
-    if len(variables) != 1 or not set(_LIMITS) <= set(estimate.data_vars):
-        raise ValueError(
-            f"an estimate has one variable with low and high, as invert gives it, got {list(estimate.data_vars)}: "
-            "give a single map as a DataArray"
-        )
-    return [estimate[name] for name in (*variables, *_LIMITS)]
 
 
 def _clipped(index, fit, allowed):

@@ -14,6 +14,7 @@ from fifesim.analysis.regression import totals
 from fifesim.analysis.regression_labels import check_same_quantity, matched, sound_cells
 from fifesim.base.annotations import Pairing
 from fifesim.base.arguments import Kind, described, is_a
+from fifesim.base.messages import warn
 from fifesim.grids.inputs import AnyDimensions, RasterOrDataset
 from fifesim.grids.reductions import computed, sums_by_row
 
@@ -113,6 +114,64 @@ def score(
     return found.assign_coords(group=labels).rename(group=name)
 
 
+def inversion_error(estimate: RasterOrDataset, truth: xr.DataArray, *, pair: Pairing = "coordinates") -> xr.Dataset:
+    """
+    Error of an estimated map against the truth; computes.
+
+    Deprecated: use `fifesim.score`, which also has standard errors and groups. It will be removed in the next release.
+
+    Parameters
+    ----------
+    estimate : xarray.Dataset or xarray.DataArray, dims (y, x)
+        From `invert`, or a map alone.
+    truth : xarray.DataArray, dims (y, x)
+    pair : {"coordinates", "index"}, optional
+        As in `regress`.
+
+    Returns
+    -------
+    error : xarray.Dataset
+        ``bias``, mean of estimate minus truth; ``rmse``, root mean square difference; ``n``, number of pixels; and for
+        a Dataset ``coverage``, the fraction of true values within the interval. Identical for any chunks.
+
+    Raises
+    ------
+    ValueError
+        If the rasters do not match, no pixel has both values, or a Dataset is not a result of `invert`.
+
+    See Also
+    --------
+    fifesim.score
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> ndvi, truth = image.fifesim.ndvi(), lai.fifesim.aggregate(30)
+    >>> estimate = ndvi.fifesim.invert(fifesim.regress(truth, ndvi))
+    >>> error = estimate.fifesim.inversion_error(truth)
+    >>> abs(round(float(error.bias), 6)), round(float(error.coverage), 2)
+    (0.0, 0.94)
+    """
+    warn("inversion_error is deprecated and will be removed: use fifesim.score(estimate, truth)", FutureWarning)
+    dataset = isinstance(estimate, xr.Dataset)
+    if dataset:
+        variables = [name for name in estimate.data_vars if name not in ("low", "high", "flag")]
+        if len(variables) != 1 or not {"low", "high"} <= set(estimate.data_vars):
+            raise ValueError(
+                f"an estimate has one variable with low and high, as invert gives it, got {list(estimate.data_vars)}: "
+                "give a single map as a DataArray"
+            )
+        # The level has no part in the coverage.
+        estimate = estimate if "level" in estimate.coords else estimate.assign_coords(level=0.5)
+    found = score(estimate, truth, pair=pair)
+    error = {name: found[name].item() for name in ("bias", "rmse", "n")}
+    return xr.Dataset(error | ({"coverage": found["coverage"].item()} if dataset else {}))
+
+
 def _parts(estimate, truth):
     """Value, spread, limits and members of an estimate by role."""
     if isinstance(estimate, xr.DataArray):
@@ -166,11 +225,6 @@ def _paired(given, truth, pair):
     return dict(zip(given, aligned, strict=True)), truth
 
 
-def _is_ensemble(given):
-    """Whether an estimate is an ensemble."""
-    return "member" in given["value"].dims
-
-
 def _groups(by, truth):
     """Number of the group of each pixel, NaN for none, and labels of the groups."""
     if by is None:
@@ -214,7 +268,7 @@ def _pixel_scores(given, truth):
             output_dtypes=[float], dask_gufunc_kwargs={"allow_rechunk": True},
         )  # fmt: skip
 
-    if _is_ensemble(given):
+    if "member" in value.dims:
         values["error"] = value.mean("member", skipna=False) - truth
         values["crps"] = each_pixel(scores.ensemble_crps, value, truth, core=("member",))
         values["pit"] = each_pixel(scores.ensemble_pit, value, truth, core=("member",))
@@ -271,33 +325,39 @@ def _dataset(sums, levels, is_probabilistic, unit):
     """Scores from sums, shape (landscapes, groups, sums)."""
     count, total = sums[..., 0], sums.sum(axis=0)
     n = total[:, 0]
+    at = _FIXED if is_probabilistic else _FIXED - 1
+    by_level = sums[..., at : at + 3 * len(levels)].reshape(*count.shape, len(levels), 3)
+    pixels = np.broadcast_to(count[..., None], by_level.shape[:-1])
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = {
-            "n": (("group",), n.astype(int), {"long_name": "number of pixels", "units": "1"}),
-            "bias": (("group",), total[:, 1] / n, {"long_name": "mean of estimate less truth", "units": unit}),
-            "bias_se": (("group",), scores.ratio_error(sums[..., 1], count),
-                        {"long_name": "standard error of the bias over landscapes", "units": unit}),
-            "rmse": (("group",), np.sqrt(total[:, 2] / n), {"long_name": "root mean square error", "units": unit}),
-        }  # fmt: skip
-        at = _FIXED if is_probabilistic else _FIXED - 1
+        found = [
+            ("n", n.astype(int), "number of pixels", "1"),
+            ("bias", total[:, 1] / n, "mean of estimate less truth", unit),
+            ("bias_se", scores.ratio_error(sums[..., 1], count), "standard error of the bias over landscapes", unit),
+            ("rmse", np.sqrt(total[:, 2] / n), "root mean square error", unit),
+        ]
         if is_probabilistic:
-            words = {"long_name": "continuous ranked probability score", "units": unit}
-            found["crps"] = ("group",), total[:, _FIXED - 1] / n, words
             bins = total[:, -_BINS:]
-            words = {"long_name": "density of the probability integral transform", "units": "1"}
-            found["pit"] = ("group", "pit_bin"), bins * _BINS / bins.sum(axis=1, keepdims=True), words
-        by_level = sums[..., at : at + 3 * len(levels)].reshape(*count.shape, len(levels), 3)
+            density = bins * _BINS / bins.sum(axis=1, keepdims=True)
+            found += [
+                ("crps", total[:, _FIXED - 1] / n, "continuous ranked probability score", unit),
+                ("pit", density, "density of the probability integral transform", "1"),
+            ]
         if len(levels):
-            means = by_level.sum(axis=0) / n[:, None, None]
-            dims = ("group", "level")
-            error = scores.ratio_error(by_level[..., 0], np.broadcast_to(count[..., None], by_level[..., 0].shape))
-            found |= {
-                "coverage": (dims, means[..., 0], {"long_name": "share of true values in the interval", "units": "1"}),
-                "coverage_se": (dims, error,
-                                {"long_name": "standard error of the coverage over landscapes", "units": "1"}),
-                "width": (dims, means[..., 1], {"long_name": "mean width of the interval", "units": unit}),
-                "interval_score": (dims, means[..., 2], {"long_name": "interval score", "units": unit}),
-            }  # fmt: skip
+            inside, width, penalty = np.moveaxis(by_level.sum(axis=0) / n[:, None, None], -1, 0)
+            error = scores.ratio_error(by_level[..., 0], pixels)
+            found += [
+                ("coverage", inside, "share of true values in the interval", "1"),
+                ("coverage_se", error, "standard error of the coverage over landscapes", "1"),
+                ("width", width, "mean width of the interval", unit),
+                ("interval_score", penalty, "interval score", unit),
+            ]
     coords = {"level": levels} if len(levels) else {}
     coords |= {"pit_bin": (np.arange(_BINS) + 0.5) / _BINS} if is_probabilistic else {}
-    return xr.Dataset(found, coords)
+    axes = {"pit": ("group", "pit_bin")}
+    return xr.Dataset(
+        {
+            name: (axes.get(name, ("group", "level")[: values.ndim]), values, {"long_name": words, "units": units})
+            for name, values, words, units in found
+        },
+        coords,
+    )

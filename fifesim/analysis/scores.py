@@ -1,4 +1,4 @@
-"""Scores of uncertain estimates against known values: CRPS, logarithmic and interval score, and coverage."""
+"""Scores of uncertain estimates against known values: CRPS, interval score and coverage."""
 
 import numpy as np
 from scipy.special import ndtr
@@ -41,35 +41,6 @@ def normal_crps(mean, sd, truth):
         density = np.exp(-0.5 * z * z) / np.sqrt(2 * np.pi)
         found = sd * (z * (2 * ndtr(z) - 1) + 2 * density - _INVERSE_SQRT_PI)
     return np.where(sd == 0, np.abs(truth - mean), found)
-
-
-def normal_log_score(mean, sd, truth):
-    r"""
-    Logarithmic score of a normal distribution.
-
-    .. math:: S = \tfrac{1}{2} \ln(2 \pi \sigma^2) + \frac{(y - \mu)^2}{2 \sigma^2}
-
-    Parameters
-    ----------
-    mean, sd, truth : array
-        As in `normal_crps`.
-
-    Returns
-    -------
-    score : array, shape of the broadcast inputs
-        Small is good. [1]
-
-    References
-    ----------
-    [GneitingRaftery2007]_, Section 4.1
-
-    Examples
-    --------
-    >>> round(float(normal_log_score(0.0, 1.0, 0.0)), 4)
-    0.9189
-    """
-    mean, sd, truth = (np.asarray(each, float) for each in (mean, sd, truth))
-    return 0.5 * np.log(2 * np.pi * sd**2) + 0.5 * ((truth - mean) / sd) ** 2
 
 
 def normal_pit(mean, sd, truth):

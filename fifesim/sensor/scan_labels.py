@@ -109,8 +109,6 @@ def find_track(grid, track=None, nadir_offset=0.0, heading=180.0):
     if track is not None:
         if nadir_offset:
             raise ValueError("track and nadir_offset both determine the track: give one of them")
-        if not isinstance(track, scan.Track):
-            raise TypeError(f"track must be a fifesim.Track(latitude, longitude, heading), got {track!r}")
         return track
     latitude, longitude = latitude_longitude(grid, grid.shape.y / 2, grid.shape.x / 2)
     here = scan.Track(float(latitude), float(longitude), heading)

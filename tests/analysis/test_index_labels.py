@@ -162,7 +162,7 @@ def test_images_are_composed_by_their_ndvi_or_by_what_is_given(stack):
             r"sun of each date: convert them with \.fifesim\.to_reflect",
         ),
         (lambda ndvi: ndvi.isel(time=0), {}, "images along time, got dimensions"),
-        (lambda ndvi: ndvi, {"method": "median"}, "method must be one of maximum-value, got 'median'"),
+        (lambda ndvi: ndvi, {"method": "median"}, "method must be 'maximum-value', got 'median'"),
         (lambda ndvi: ndvi, {"by": xr.DataArray(np.zeros((2, 2, 2)), dims=("time", "y", "x"))}, "dates of the images"),
         (lambda ndvi: ndvi.assign_attrs(standard_name="leaf_area_index"), {}, "leaf area index by its standard_name"),
     ],

@@ -28,7 +28,7 @@ from fifesim.sensor.description.fields import (
     worded,
 )
 from fifesim.sensor.description.provenance import DescribedQuantity, Origin, Provenance, provenance_of
-from fifesim.sensor.description.spatial_response import SpatialResponse, View
+from fifesim.sensor.description.spatial_response import SpatialResponse, responses_by_axis
 from fifesim.sensor.description.spectral_response import SpectralResponse
 from fifesim.sensor.response.noise import NoiseModel
 from fifesim.sensor.response.scan import ScanPattern, Zone
@@ -535,12 +535,10 @@ class Instrument:
         lsf : AlongAcross
             As `fifesim.base.footprints` takes them: along for its rows, across for its columns.
         """
-        given = band.lsf or self.lsf, band.ifov or self.ifov, band.interval or self.interval
-        axes = zip(*map(by_axes, given), strict=True)
-        along, across = (lsf.spread(View(self.altitude, ifov, interval, band)) for lsf, ifov, interval in axes)
+        (along, _), (across, view) = ((lsf.spread(view), view) for lsf, view in responses_by_axis(self, band))
         count = self._aggregation if aggregation is None else aggregation
         if count > 1:
-            across = AggregatedSpread(across, count, by_axes(given[2]).across * self.altitude)
+            across = AggregatedSpread(across, count, view.interval * self.altitude)
         return AlongAcross(along, across)
 
     def noise_model(self, band: InstrumentBand) -> NoiseModel:

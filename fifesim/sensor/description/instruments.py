@@ -28,22 +28,12 @@ from fifesim.sensor.description.instrument_file import (
     ScanZone,
 )
 from fifesim.sensor.description.plausibility import check_instrument_units
-from fifesim.sensor.description.short_file import completed
+from fifesim.sensor.description.short_file import NOISE_KEYS, RESPONSE_KEYS, completed
 from fifesim.sensor.description.spatial_response import with_response
 
 # Keys that are suggested for misspelt ones, including keys of short files.
 _KEYS = {key.name for kind in (Instrument, InstrumentBand, Noise, Product, Scan, ScanZone) for key in fields(kind)}
-_KEYS |= {
-    "center",
-    "width",
-    "shape",
-    "snr",
-    "snr_radiance",
-    "snr_shot",
-    "high_snr",
-    "high_snr_radiance",
-    "mtf_at_nyquist",
-}
+_KEYS |= {*NOISE_KEYS, *RESPONSE_KEYS, "mtf_at_nyquist"}
 
 
 def instrument(

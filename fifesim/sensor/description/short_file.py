@@ -22,10 +22,12 @@ _REFERENCES = {
     _SPECTRUM: "ASTM G173-03, extraterrestrial spectrum, as distributed with pvlib, over the band's response",
     _WHITE: "taken for a white surface below an overhead sun of ASTM G173-03, and 0 for digital number 0",
 }
-_NOISE = {
+# Keys of a band that belong to its noise, with their names there, and those that make its response.
+NOISE_KEYS = {
     "snr": "snr", "snr_radiance": "radiance", "snr_shot": "shot",
     "high_snr": "high_snr", "high_snr_radiance": "high_radiance",
 }  # fmt: skip
+RESPONSE_KEYS = ("center", "width", "shape")
 
 # Made once: making it takes longer than what it does.
 _ADAPTER: TypeAdapter = TypeAdapter(SpectralResponse)
@@ -92,13 +94,13 @@ def _band(given, content, sampled, folder):
     """Band with its missing values."""
     band, sources = dict(given), {}
     _blur(band)
-    response = {key: band.pop(key) for key in ("center", "width", "shape") if key in band}
+    response = {key: band.pop(key) for key in RESPONSE_KEYS if key in band}
     if response:
         band.setdefault("srf", response)
     srf = band.get("srf")
     if isinstance(srf, dict) and "table" in srf:
         band["srf"] = srf | {"folder": str(folder)}
-    noise = {name: band.pop(key) for key, name in _NOISE.items() if key in band}
+    noise = {name: band.pop(key) for key, name in NOISE_KEYS.items() if key in band}
     if noise:
         band.setdefault("noise", noise)
     if sampled:

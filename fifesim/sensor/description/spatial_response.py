@@ -238,7 +238,14 @@ _DETECTOR = BoxcarResponse(kind="boxcar")
 
 def knows_blur(instrument, band):
     """Whether the spatial response of a band is known beyond its detector; else images are too sharp."""
-    return _kinds(instrument, band) != {"boxcar"}
+    return {part.kind for part in by_axes(band.lsf or instrument.lsf)} != {"boxcar"}
+
+
+def responses_by_axis(instrument, band):
+    """Response and view of a band along and across the track."""
+    given = band.lsf or instrument.lsf, band.ifov or instrument.ifov, band.interval or instrument.interval
+    axes = zip(*map(by_axes, given), strict=True)
+    return [(lsf, View(instrument.altitude, ifov, interval, band)) for lsf, ifov, interval in axes]
 
 
 def with_response(instrument, response):
@@ -269,28 +276,21 @@ _LEAST, _MOST = 0.01, 0.95
 def _at_end(instrument, sign):
     """Instrument with Gaussians whose transfer at the Nyquist frequency is one end of its stated uncertainty."""
     origins = [band.origin.get("blur") or instrument.origin.get("blur") for band in instrument.bands]
-    bands = zip(instrument.bands, origins, strict=True)
+    bands = list(zip(instrument.bands, origins, strict=True))
     if unknown := [band.name for band, origin in bands if origin is None or origin.uncertainty is None]:
         raise ValueError(
             f"the description of {instrument.name} states no uncertainty of the blur of {', '.join(unknown)}: give "
             "[origin] blur = { kind = ..., uncertainty = ... } in its file"
         )
     found = []
-    for band, origin in zip(instrument.bands, origins, strict=True):
-        given = band.lsf or instrument.lsf, band.ifov or instrument.ifov, band.interval or instrument.interval
+    for band, origin in bands:
         axes = []
-        for lsf, ifov, interval in zip(*map(by_axes, given), strict=True):
-            own = lsf.spread(View(instrument.altitude, ifov, interval, band)).mtf(
-                0.5 / (interval * instrument.altitude)
-            )
+        for lsf, view in responses_by_axis(instrument, band):
+            own = lsf.spread(view).mtf(0.5 / (view.interval * view.altitude))
             end = min(max(float(own) + sign * origin.uncertainty, _LEAST), _MOST)
             axes.append(GaussianResponse(kind="gaussian", mtf_at_nyquist=end))
         found.append(replace(band, lsf=TwoAxesResponse(*axes)))
     return replace(instrument, bands=tuple(found))
-
-
-def _kinds(instrument, band):
-    return {part.kind for part in by_axes(band.lsf or instrument.lsf)}
 
 
 def _sharp(instrument, band):

@@ -187,8 +187,6 @@ def calibrate(
     >>> bool(abs(again.fifesim.ndvi() - image.fifesim.ndvi()).max() < 1e-3)
     True
     """
-    if not isinstance(dn, xr.DataArray):
-        raise TypeError(f"dn must be an xarray.DataArray of digital numbers, got {type(dn).__name__}")
     if "gain" in dn.coords:
         raise ValueError("the raster carries a calibration already: drop it with .drop_vars(['gain', 'offset'])")
     description = find_instrument(instrument)

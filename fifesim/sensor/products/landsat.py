@@ -54,25 +54,13 @@ def read_groups(path):
         raise ValueError(f"{name} is of Collection 1 or older: take the scene's Collection-2 product, which USGS has")
     if root != _ROOT:
         raise ValueError(f"{name} is no metadata of a Landsat product: it begins with {shown(root)}, not {_ROOT}")
-    groups = _unique(pairs, name, "group")
-    groups = {group: _unique(values, name, f"{group} key") for group, values in groups.items() if values}
+    with metadata.naming(path):
+        groups = metadata.unique(pairs, "the group")
+        groups = {group: metadata.unique(values, f"the {group} key") for group, values in groups.items() if values}
     collection = groups.get("PRODUCT_CONTENTS", {}).get("COLLECTION_NUMBER")
     if collection is None or collection.lstrip("0") != "2":
         raise ValueError(f"{name} is of collection {shown(collection)}: Collection 2 is read")
     return groups
-
-
-def _unique(pairs, name, what):
-    """Dict of pairs without repeated keys."""
-    found = {}
-    for key, value in pairs:
-        if key in found:
-            raise ValueError(
-                f"{name} has the {what} {in_a_line(key, 60)} twice: the file was changed or joined, and nothing says "
-                "which one holds; fetch the product's metadata again"
-            )
-        found[key] = value
-    return found
 
 
 def _text_pairs(path):
@@ -429,14 +417,7 @@ def _value(group, key, kind=""):
 
 
 def _number(group, key):
-    text = _value(group, key)
-    try:
-        number = float(text)
-    except ValueError:
-        number = np.nan
-    if not np.isfinite(number):
-        raise ValueError(f"{key} must be a number, got {shown(text)}")
-    return number
+    return metadata.stated_number(_value(group, key), key)
 
 
 def _file(group, key):

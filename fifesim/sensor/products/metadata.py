@@ -86,6 +86,27 @@ _IRRADIANCE = 1.25
 REFETCH = "the metadata were changed, or mix two products; fetch them again"
 
 
+def unique(pairs, what):
+    """Dict of pairs; ValueError for a repeated key."""
+    found = {}
+    for key, value in pairs:
+        if key in found:
+            raise ValueError(f"{what} {in_a_line(str(key), 60)} stands twice: {REFETCH}")
+        found[key] = value
+    return found
+
+
+def stated_number(text, key):
+    """Number from the text of a key."""
+    try:
+        number = float(text)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not np.isfinite(number):
+        raise ValueError(f"{key} must be a number, got {shown((text or '').strip())}")
+    return number
+
+
 def check_product_scale(keys, gain, offset, counts, stated=None, *, brightest=0.1):
     """Raise ValueError if a scale contradicts the range in the file, or gives impossible reflectance."""
     if not 0 < counts[0] < counts[1]:

@@ -9,7 +9,16 @@ import pyproj
 
 from fifesim.base.files import in_a_line, shown
 from fifesim.base.geometry import angle_between
-from fifesim.sensor.products.metadata import REFETCH, check_product_scale, check_sun, naming, read_xml, utc_time
+from fifesim.sensor.products import metadata
+from fifesim.sensor.products.metadata import (
+    REFETCH,
+    check_product_scale,
+    check_sun,
+    naming,
+    stated_number,
+    unique,
+    utc_time,
+)
 from fifesim.sensor.response.calibration import ProductBand, direction_angles, mean_direction
 
 # File names of the other form, in which Sentinel-2 lies in buckets of AWS.
@@ -50,17 +59,7 @@ def _of_aws(path):
 
 def numbers_by_band(root, key, attribute):
     """Numbers of a key that occurs once for each band."""
-    return unique([(each.get(attribute), number_of(each, ".")) for each in root.iter(key)], key)
-
-
-def unique(pairs, key):
-    """Dict of pairs without repeated keys."""
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        names = [str(name) for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"{key} stands twice for {in_a_line(twice, 60)}: {REFETCH}")
-    return found
+    return unique([(each.get(attribute), number_of(each, ".")) for each in root.iter(key)], f"{key} of")
 
 
 def part_of(element, path):
@@ -84,13 +83,7 @@ def text_of(element, path):
 def number_of(element, path):
     """Number in an element."""
     found = part_of(element, path)
-    try:
-        value = float(found.text)
-    except (TypeError, ValueError):
-        value = np.nan
-    if not np.isfinite(value):
-        raise ValueError(f"{found.tag} must be a number, got {shown((found.text or '').strip())}")
-    return value
+    return stated_number(found.text, found.tag)
 
 
 _INSTRUMENTS = {"Sentinel-2A": "MSI", "Sentinel-2B": "MSI-B"}
@@ -152,7 +145,7 @@ class Sentinel2Product:
 
 def sentinel2_product(path):
     """Product from its metadata."""
-    root = read_xml(path)
+    root = metadata.read_xml(path)
     with naming(path):
         return _product(root)
 
@@ -310,7 +303,7 @@ class Sentinel2Tile:
 
 def sentinel2_tile(path, spacecraft="Sentinel-2A"):
     """Tile from its metadata."""
-    root = read_xml(path)
+    root = metadata.read_xml(path)
     with naming(path):
         return _tile(root, _LAUNCHED.get(spacecraft, min(_LAUNCHED.values())))
 

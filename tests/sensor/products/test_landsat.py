@@ -113,8 +113,8 @@ GROUPS = {
 @FORMS
 def test_repeated_keys_and_groups_are_refused(tmp_path, form):
     for change, said in (
-        (REPEATED, rf"LEVEL1_RADIOMETRIC_RESCALING key {KEY} twice: .*fetch"),
-        (GROUPS, f"has the group {GROUP} twice"),
+        (REPEATED, rf"MTL.*: the LEVEL1_RADIOMETRIC_RESCALING key {KEY} stands twice: .*fetch"),
+        (GROUPS, f"the group {GROUP} stands twice"),
     ):
         path = written(tmp_path, products.landsat_groups(products.TM), form)
         path.write_text(path.read_text().replace(*change[form]))

@@ -68,7 +68,7 @@ def test_values_of_elements():
     for path, said in (("c", "c stands 2 times with different values, 1, 2"), ("e", "must be a number"), ("f", "no f")):
         with pytest.raises(ValueError, match=said):
             sentinel2.number_of(xml, path)
-    with pytest.raises(ValueError, match="d stands twice for None"):
+    with pytest.raises(ValueError, match="d of None stands twice"):
         sentinel2.numbers_by_band(xml, "d", "other")
 
 
@@ -130,8 +130,8 @@ def test_offsets_are_by_band(tmp_path):
         (products.product_xml(2, "04.00").replace(">10000<", ">1000<"), "BOA_QUANTIFICATION_VALUE = 1000, "),
         (re.sub("<U>.*</U>", "<U>1.1</U>", L1C), r"U .* must be in \[0.956, 1.045\], got 1.1"),
         (L1C.replace("<U>", "<U>1.0</U><U>"), r"U stands 2 times with different values, 0.98\d+, 1.0: .*fetch"),
-        (L1C.replace('OFFSET band_id="4"', 'OFFSET band_id="3"'), "RADIO_ADD_OFFSET stands twice for 3"),
-        (L1C.replace("TEXT>SATURATED", "TEXT>NODATA"), "SPECIAL_VALUE_TEXT stands twice for NODATA"),
+        (L1C.replace('OFFSET band_id="4"', 'OFFSET band_id="3"'), "RADIO_ADD_OFFSET of 3 stands twice"),
+        (L1C.replace("TEXT>SATURATED", "TEXT>NODATA"), "SPECIAL_VALUE_TEXT NODATA stands twice"),
         ('<!DOCTYPE a [<!ENTITY b "c">]><a/>', "declares a document type"),
     ],
 )  # fmt: skip
