@@ -3,12 +3,16 @@
 import json
 from pathlib import Path
 
-_LINES = (Path(__file__).parent / "data" / "scenario_mistakes.jsonl").read_text(encoding="utf-8").splitlines()
+
+def lines(name):
+    """Rows of a table of JSON lines."""
+    text = (Path(__file__).parent / "data" / f"{name}.jsonl").read_text(encoding="utf-8")
+    return [json.loads(line) for line in text.splitlines()[1:]]
 
 
 def mistakes(*stages):
     """Stage, values and beginning of the message of each mistake of some stages."""
-    return [each for each in map(json.loads, _LINES[1:]) if each[0] in stages]
+    return [each for each in lines("scenario_mistakes") if each[0] in stages]
 
 
 def check_message(message, start):

@@ -94,7 +94,7 @@ def short_name(array):
 def axis_label(name):
     """Name of a quantity with its unit, for an axis."""
     quantity = cf.QUANTITIES[name]
-    return " ".join(filter(None, [quantity.label, _printed(quantity.shown_units or quantity.units)]))
+    return f"{quantity.label} {_printed(quantity.shown_units or quantity.units)}".rstrip()
 
 
 def long_name(array):
@@ -144,13 +144,16 @@ def _day(array):
 
 
 def _place(array):
-    """Latitude and longitude of the middle of a map, or of a scan."""
+    """Position of the middle of a map, or of a scan."""
     if {"latitude", "longitude"} <= set(array.coords) and array["latitude"].ndim == 2:
-        latitude, longitude = float(array["latitude"].mean()), float(array["longitude"].mean())
-    elif {"y", "x"} <= set(array.dims):
+        return position(float(array["longitude"].mean()), float(array["latitude"].mean()))
+    if {"y", "x"} <= set(array.dims):
         west, south, east, north = projection.degrees(grids.geobox(array))
-        latitude, longitude = (south + north) / 2, (west + east) / 2
-    else:
-        return ""
+        return position((west + east) / 2, (south + north) / 2)
+    return ""
+
+
+def position(longitude, latitude):
+    """Longitude and latitude as text."""
     north, east = "N" if latitude >= 0 else "S", "E" if longitude >= 0 else "W"
     return f"{abs(latitude):.2f}° {north}, {abs(longitude):.2f}° {east}"

@@ -113,7 +113,7 @@ def plot(
         drawn = _draw(axes, shown, cmap=own if cmap is None else cmap, vmin=low, vmax=high)
         beyond = bool((shown < low).any()), bool((shown > high).any())
         extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(beyond, "neither")
-        words = " ".join(filter(None, [colours.short_name(shown), colours.unit(shown)]))
+        words = f"{colours.short_name(shown)} {colours.unit(shown)}".strip()
         axes.figure.colorbar(drawn, ax=axes, shrink=0.8, label=words, extend=extend)
         what = colours.long_name(shown)
     where = colours.subject(raster)
@@ -174,9 +174,7 @@ def plot_fit(
     spread = 2.5 * np.sqrt(fit.x_sum_of_squares / fit.n)
     span = fit.x_mean - spread, fit.x_mean + spread
     if y is not None:
-        labels = tuple(
-            " ".join(filter(None, [colours.capital(colours.long_name(each)), colours.unit(each)])) for each in (y, x)
-        )
+        labels = [f"{colours.capital(colours.long_name(each))} {colours.unit(each)}".rstrip() for each in (y, x)]
         pairs = computed(*(thinned(each, _SIZE) for each in matched(y, x, pair)))
         ordinate, abscissa = (np.asarray(each, float).ravel() for each in pairs)
         both = np.isfinite(ordinate) & np.isfinite(abscissa)
@@ -337,8 +335,6 @@ def plot_comparison(images: xr.DataTree, *, limits: tuple[float, float] | None =
 
 def _checked(raster, band):
     """Raster that can be drawn: of several bands, or of one quantity."""
-    if not isinstance(raster, xr.DataArray):
-        raise TypeError(f"plot draws a DataArray, got a {type(raster).__name__}: select a variable, such as run['dn']")
     if band is not None:
         if "band" not in raster.dims or band not in raster["band"].values:
             have = ", ".join(map(str, np.atleast_1d(raster["band"].values))) if "band" in raster.coords else "none"

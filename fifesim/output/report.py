@@ -14,7 +14,7 @@ from fifesim.base import files
 from fifesim.chain.comparison import TYPICAL_LAI, engine_error
 from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
-from fifesim.output.colours import axis_label, capital, draw_line, finite, percentile_limits
+from fifesim.output.colours import axis_label, capital, draw_line, finite, percentile_limits, position
 from fifesim.output.folders import versions
 from fifesim.output.maps import encoded, false_colour_names, image_map, relief_map, rendered, stretch_of, value_map
 from fifesim.scenario.ensemble import realise
@@ -252,11 +252,7 @@ def headline(scenario):
 
 def _place(scenario):
     """Name or position of the centre of a scene."""
-    if is_on_site(scenario):
-        return "FIFE site"
-    longitude, latitude = projection.middle(scenario.geobox())
-    sides = "N" if latitude >= 0 else "S", "E" if longitude >= 0 else "W"
-    return f"{abs(latitude):.2f}° {sides[0]}, {abs(longitude):.2f}° {sides[1]}"
+    return "FIFE site" if is_on_site(scenario) else position(*projection.middle(scenario.geobox()))
 
 
 def finding(fits, reasons):

@@ -74,7 +74,7 @@ def item(scenario, folder, title):
     }
 
 
-def collection(identifier, description, items, *, license="other"):
+def collection(identifier, description, items):
     """STAC collection, and its items with links to it, by path."""
     boxes = np.array([each["bbox"] for each in items.values()])
     whole = [*boxes[:, :2].min(axis=0).tolist(), *boxes[:, 2:].max(axis=0).tolist()]
@@ -84,7 +84,7 @@ def collection(identifier, description, items, *, license="other"):
         "stac_version": VERSION,
         "id": identifier,
         "description": description,
-        "license": license,
+        "license": "other",
         "extent": {"spatial": {"bbox": [whole]}, "temporal": {"interval": [[min(starts), max(ends)]]}},
         "links": [_link("root", "./collection.json")]
         + [_link("item", f"./{path}", "application/geo+json") for path in items],
@@ -97,9 +97,9 @@ def collection(identifier, description, items, *, license="other"):
     return found, linked
 
 
-def write_collection(folder, identifier, description, items, *, license="other"):
+def write_collection(folder, identifier, description, items):
     """Write a collection, ``collection.json``, and its items."""
-    found, linked = collection(identifier, description, items, license=license)
+    found, linked = collection(identifier, description, items)
     for path, each in {"collection.json": found, **linked}.items():
         write_stac(each, folder / path)
 

@@ -17,7 +17,6 @@ from fifesim.grids import grid as grids
 from fifesim.grids.grid import as_carried
 from fifesim.ground.landscape.lai_labels import scene_cells
 from fifesim.scenario.ground import elevation, fpar_kinds, ground_scene, in_memory, light_of, truth_of
-from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of, simulate, with_margin
 from fifesim.sensor.instrument_labels import attributes_of
 
@@ -32,8 +31,6 @@ def realise(scenario, *, complete=False):
     """Image and truth of a scenario in memory, identical to the result of `fifesim.simulate`."""
     # Consecutive scenes share intermediate results if they have the same grid, atmosphere, canopy or instrument, and
     # tiles of the random field if they have the same seed and arp.
-    if not isinstance(scenario, Scenario):
-        raise TypeError(f"realise needs a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     grid, setup = scenario.geobox(), setup_of(scenario)
     if _is_small(grid) and not varying_parts(setup):
         scene = _scene(scenario, grid, setup, complete)

@@ -58,8 +58,6 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
     >>> list(run.children), run["image"]["dn"].shape
     (['scene', 'truth', 'image'], (2, 10, 10))
     """
-    if not isinstance(scenario, Scenario):
-        raise TypeError(f"simulate needs a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     grid, setup = scenario.geobox(), setup_of(scenario)
     ground, setup, inside = with_margin(scenario, setup) if complete else (grid, setup, {})
 

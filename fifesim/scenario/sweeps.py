@@ -69,8 +69,6 @@ def sweep(
     >>> dict(fit.r2.sizes)
     {'arp': 3, 'visibility': 2, 'variable': 2}
     """
-    if not isinstance(scenario, Scenario):
-        raise TypeError(f"sweep needs a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     if not isinstance(axes, Mapping):
         raise TypeError(f"axes must map keys to values, such as {{'visibility': [5, 45]}}, got {described(axes)}")
     if not axes:

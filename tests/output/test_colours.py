@@ -102,17 +102,6 @@ def test_quantities_have_short_words_a_range_and_a_colour_map(name):
     assert all(end is None or lowest <= end for end in quantity.ends)
 
 
-@pytest.mark.parametrize("name", ["brown", "dissociation", "crown_cover", "crown_shape", "hotspot", "soil", "moisture"])
-def test_ranges_of_canopies_are_those_of_the_verb(name, lai):
-    few, canopy = lai[:2, :2], fifesim.Canopy(brown=0.3, crown_cover=0.9)
-    quantity, step = cf.QUANTITIES[name], 1e-6
-    for value in (quantity.lowest, quantity.highest):
-        few.fifesim.surface_reflectance("TM", bands=["TM4"], canopy=canopy.replace(**{name: float(value)}))
-    for value in (quantity.lowest - step, quantity.highest + step):
-        with pytest.raises(ValueError, match=f"{name} must be"):
-            canopy.replace(**{name: value})
-
-
 def test_rasters_of_a_run_lie_within_the_ranges(whole, site):
     dem = fifesim.flint_hills(site, seed=1)
     rasters = [

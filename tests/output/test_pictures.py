@@ -1,7 +1,5 @@
 """Pictures: what they draw, in which colours, where and under which title."""
 
-import dataclasses
-
 import dask.array as da
 import matplotlib
 import matplotlib.pyplot as plt
@@ -138,12 +136,6 @@ def test_a_fit_is_drawn_with_its_pixels(whole):
     assert f"n = {fit.n}" in axes.get_title() and "R² = " in axes.get_title()
     pixels = axes.collections[0].get_array()
     assert pixels.sum() == fit.n
-
-
-def test_the_axis_of_a_fit_begins_below_zero_only_where_pixels_are(whole):
-    steep = dataclasses.replace(fifesim.regress(whole["truth"], whole["ndvi"]), intercept=-3.0)
-    assert steep.plot(whole["truth"], whole["ndvi"]).get_ylim()[0] == 0
-    assert steep.plot(whole["truth"] - 2, whole["ndvi"]).get_ylim()[0] < 0
 
 
 def test_a_fit_alone_is_a_line_about_the_mean(whole):

@@ -1,10 +1,6 @@
 """What a run writes, as other programs open it: in the right place, with the right values."""
 
 import json
-import os
-import shutil
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -13,7 +9,6 @@ import rioxarray
 import xarray as xr
 
 import fifesim
-from fifesim.output.colours import dark_and_bright
 
 # Corner and size of the run, as its scenario says them. [m]
 WEST, NORTH, PIXEL, ROWS, COLUMNS = 704970.0, 4334220.0, 30.0, 20, 30
@@ -110,50 +105,3 @@ def test_gdal_opens_the_cells_with_their_crs(travelled):
     with rasterio.open(f'ZARR:"{travelled}/scene.zarr":/surface_reflectance') as source:
         assert source.crs.to_epsg() == 26914 and np.isnan(source.nodata)
         np.testing.assert_array_equal(source.read(), reflectance)
-
-
-QGIS = """
-import json, sys
-from qgis.core import QgsApplication, QgsRasterLayer
-application = QgsApplication([], False)
-application.initQgis()
-found = {}
-for name in ("image", "truth"):
-    layer = QgsRasterLayer(f"{sys.argv[1]}/{name}.tif", name)
-    renderer = layer.renderer()
-    found[name] = {"valid": layer.isValid(), "type": renderer.type(), "crs": layer.crs().authid()}
-    if renderer.type() == "multibandcolor":
-        stretches = [getattr(renderer, f"{each}ContrastEnhancement")() for each in ("red", "green", "blue")]
-        found[name]["bands"] = [renderer.redBand(), renderer.greenBand(), renderer.blueBand()]
-        found[name]["limits"] = [(each.minimumValue(), each.maximumValue()) for each in stretches]
-    else:
-        items = renderer.shader().rasterShaderFunction().colorRampItemList()
-        found[name]["ramp"] = [(item.value, item.color.name()) for item in items]
-print(json.dumps(found))
-"""
-
-
-def qgis_python():
-    """A Python that has QGIS: named by a variable of the environment, this one, or that of the system."""
-    for name in (os.environ.get("FIFESIM_QGIS_PYTHON"), sys.executable, shutil.which("python3")):
-        if name and subprocess.run([name, "-c", "import qgis.core"], capture_output=True).returncode == 0:
-            return name
-    return None
-
-
-def test_qgis_takes_the_styles_by_itself(travelled, tmp_path):
-    python = qgis_python()
-    if python is None:
-        pytest.skip("no Python here has QGIS")
-    shutil.copytree(travelled, tmp_path / "run")
-    command = [python, "-c", QGIS, str(tmp_path / "run")]
-    said = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"QT_QPA_PLATFORM": "offscreen"})
-    found = json.loads(said.stdout.strip().splitlines()[-1])
-    assert all(layer["valid"] and layer["crs"] == "EPSG:26914" for layer in found.values())
-    assert (found["image"]["type"], found["image"]["bands"]) == ("multibandcolor", [3, 2, 1])
-    for band, limits in zip(("TM4", "TM3", "TM2"), found["image"]["limits"], strict=True):
-        np.testing.assert_allclose(limits, dark_and_bright(radiance(travelled).sel(band=band)), rtol=1e-5)
-    lai = fifesim.open_image(travelled / "truth.tif").sel(band="lai")
-    assert found["truth"]["type"] == "singlebandpseudocolor"
-    (low, _), *_, (high, _) = found["truth"]["ramp"]
-    assert low == 0 and high == pytest.approx(float(np.percentile(lai, 99)), rel=1e-5)

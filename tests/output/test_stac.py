@@ -118,7 +118,7 @@ def test_a_collection_is_valid_and_leads_to_its_items(item, tmp_path, pystac):
     moved = item | {"id": "moved", "bbox": [-96.0, 39.0, -95.9, 39.1]}
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-    stac.write_collection(tmp_path, "trial", "Two scenes.", {"a/item.json": item, "b/item.json": moved}, license="MIT")
+    stac.write_collection(tmp_path, "trial", "Two scenes.", {"a/item.json": item, "b/item.json": moved})
     found = pystac.Collection.from_file(str(tmp_path / "collection.json"))
     assert found.validate()[0].endswith("collection.json")
     assert {each.id for each in found.get_items()} == {item["id"], "moved"}

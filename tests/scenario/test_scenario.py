@@ -10,7 +10,7 @@ import pyproj
 import pytest
 import rasterio
 from affine import Affine
-from mistakes import check_message, mistakes
+from mistakes import check_message, lines, mistakes
 
 import fifesim
 from fifesim.atmosphere import six_s
@@ -338,53 +338,7 @@ def test_default_landscape_is_called_synthetic():
         assert summary(scenario) == "synthetic landscape, hypothetical overpass"
 
 
-@pytest.mark.parametrize(
-    ("values", "said", "short"),
-    [
-        (
-            {},
-            "Synthetic landscape: leaf area and hills are synthetic; only the grass type and the location are FIFE's.",
-            "synthetic landscape, hypothetical overpass",
-        ),
-        (
-            {"terrain": {"dem": "flat"}, "ground": {"distribution": "mine.csv"}},
-            "Synthetic landscape: leaf area is synthetic; the ground is level; only the location is FIFE's.",
-            "synthetic landscape, hypothetical overpass",
-        ),
-        (
-            {"landscape": {"cover": "levels"}, "classes": {"a": {"distribution": "mine.csv"}, "b": {}}},
-            "Synthetic landscape: patches and hills are synthetic; only the location is FIFE's.",
-            "synthetic landscape, hypothetical overpass",
-        ),
-        (
-            {"landscape": {"deviations": {"soil": 0.03, "brown": 0.0, "moisture": 0.1}}},
-            "Synthetic landscape: leaf area, soil brightness, soil moisture and hills are synthetic; only the grass "
-            "type and the location are FIFE's.",
-            "synthetic landscape, hypothetical overpass",
-        ),
-        (
-            PASTURES | {"terrain": {"dem": "dem.tif"}},
-            "Partly synthetic landscape: fields are synthetic; elevation is from a file.",
-            "partly synthetic landscape, hypothetical overpass",
-        ),
-        (
-            {"landscape": {"cover": "map.tif"}, "terrain": {"dem": "dem.tif"}},
-            "Partly synthetic landscape: leaf area is synthetic; land cover and elevation are from files.",
-            "partly synthetic landscape, hypothetical overpass",
-        ),
-        (
-            PLACE | {"ground": {"lai_file": "lai.tif"}, "terrain": {"dem": "flint-hills"}},
-            "Partly synthetic landscape: hills are synthetic; leaf area is from a file.",
-            "partly synthetic landscape, hypothetical overpass",
-        ),
-        (
-            PLACE | {"ground": {"lai_file": "lai.tif"}, "landscape": {"deviations": {"brown": 0.1}}},
-            "Partly synthetic landscape: dead leaves are synthetic; leaf area is from a file; the ground is level.",
-            "partly synthetic landscape, hypothetical overpass",
-        ),
-        (PLACE | GIVEN, "Leaf area and elevation are from files.", "hypothetical overpass"),
-    ],
-)
+@pytest.mark.parametrize(("values", "said", "short"), lines("scenario_statements"), ids=str)
 def test_parts_are_told_apart_by_where_they_come_from(values, said, short):
     scenario = parse_scenario(values)
     assert statement(scenario) == f"{said} {OVERPASS}"

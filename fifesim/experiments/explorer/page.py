@@ -304,8 +304,6 @@ def explore(scenario: Scenario | None = None, path: FilePath = "explore.html", *
     >>> import fifesim
     >>> fifesim.explore(fifesim.Scenario(), "mine.html")  # doctest: +SKIP
     """
-    if scenario is not None and not isinstance(scenario, Scenario):
-        raise TypeError(f"explore needs a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     path = Path(path)
     check_file(path, overwrite)
     sweep = sweep_of(scenario)

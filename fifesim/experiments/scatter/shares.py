@@ -99,8 +99,6 @@ def budget(
     0.24
     """
     scenario = budget_scenario() if scenario is None else scenario
-    if not isinstance(scenario, Scenario):
-        raise TypeError(f"budget needs a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     _check_map(scenario)
     cases = budget_cases(scenario, realisations=realisations, cells=cells, seed=seed)
     shown = steps(cases, "stage by stage") if each is None else each(cases)

@@ -1,8 +1,11 @@
 """Datasheet of a dataset: its contents, draws, split and variable ranges, with a contact sheet."""
 
 import hashlib
+import warnings
 from pathlib import Path
 
+import dask
+import dask.array as da
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
@@ -76,38 +79,24 @@ def write_datasheet(folder, chips, shards, page, picture):
     """Write the datasheet and the contact sheet of a dataset."""
     with xr.open_zarr(folder, chunks=None) as dataset:
         sheet = report.png(contact_sheet(dataset, list(chips.study.split)), _DPI)
-        ranges = ranges_of(dataset, shards)
+        ranges = ranges_of(dataset, shards.length)
         text = datasheet_page(dataset, chips, ranges, sheet)
     (folder / picture).write_bytes(sheet)
     (folder / page).write_text(text, encoding="utf-8")
 
 
-def ranges_of(dataset, shards):
-    """Range, mean and missing share of the variables of chips, one shard at a time, by name."""
-    split, parts = dataset["split"].values, list(dict.fromkeys(dataset["split"].values.tolist()))
-    sums = {str(name): {"least": np.inf, "greatest": -np.inf, "cells": 0} for name in dataset.data_vars}
-    totals = {(name, part): np.zeros(2) for name in sums for part in parts}
-    for shard in range(len(shards)):
-        chosen = slice(*shards.range_of(shard))
-        for name, found in sums.items():
-            values = dataset[name].isel(chip=chosen).values
-            finite = np.isfinite(values)
-            found["cells"] += values.size
-            if finite.any():
-                found["least"] = min(found["least"], float(values[finite].min()))
-                found["greatest"] = max(found["greatest"], float(values[finite].max()))
-            for part in parts:
-                own = split[chosen] == part
-                totals[name, part] += finite[own].sum(), values[own].sum(dtype=float, where=finite[own])
-    for name, found in sums.items():
-        count, total = sum(totals[name, part] for part in parts)
-        found["means"] = {part: _ratio(*totals[name, part][::-1]) for part in parts}
-        found |= {"mean": _ratio(total, count), "without": 1 - count / found["cells"]}
-    return sums
-
-
-def _ratio(total, count):
-    return float(total / count) if count else np.nan
+def ranges_of(dataset, length):
+    """Range, mean and missing share of the variables of chips by name, read in pieces of some chips."""
+    split, found = dataset["split"].values, {}
+    for name, variable in dataset.chunk(chip=length).data_vars.items():
+        values = variable.data
+        row = {"least": da.nanmin(values), "greatest": da.nanmax(values), "mean": da.nanmean(values, dtype=float)}
+        means = {part: da.nanmean(values[split == part], dtype=float) for part in dict.fromkeys(split.tolist())}
+        found[str(name)] = row | {"without": da.isnan(values).mean(), "means": means}
+    with warnings.catch_warnings():
+        # A variable without data has no range.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return dask.compute(found)[0]
 
 
 def datasheet_page(dataset, chips, ranges, sheet):

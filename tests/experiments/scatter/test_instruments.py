@@ -3,7 +3,6 @@
 import importlib
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
@@ -29,20 +28,6 @@ def test_an_instrument_is_flown_with_all_that_is_known_of_it():
     assert msi.sensor.offset == pytest.approx([0.33, 0.33]) and msi.sensor.noise == ["all"]
     mss = instrument_scenario("MSS")
     assert mss.sensor.offset == [0.0, 0.0] and mss.sensor.noise == [] and mss.terrain.dem == "flat"
-
-
-def test_blur_and_place_take_the_most_from_sentinel_2(make_instruments):
-    """At 10 m over burned-grazed ground, beside counts of twelve bits and the noise that they have."""
-    found = make_instruments.compare_instruments(["MSI"], arps=(0.15,), realisations=2)
-    assert list(found["response"].unique()) == ["system", "sharpest", "softest"]
-    found = found[found["response"] == "system"]
-    assert set(found["instrument"]) == {"MSI"} and found["blur"].all() and found["noise"].all() and found["place"].all()
-    shares = found[found["variable"] == "lai"].set_index("stage")["share"]
-    parts = shares.drop(["total", "sub-pixel variation"], errors="ignore")
-    assert parts.sum() == pytest.approx(shares["total"], abs=1e-9)
-    assert min(shares["point spread"], shares["registration"]) > 5 * max(shares["quantisation"], shares["noise"])
-    sharp = fifesim.instrument("OLI")
-    assert not np.isnan(shares["total"]) and sharp.geolocation == 8.5
 
 
 def test_terms_that_no_source_states_are_unknown_and_so_is_their_total(make_instruments):

@@ -9,7 +9,6 @@ import xarray as xr
 
 from fifesim.output.chips import datasheet
 from fifesim.output.chips.datasheet import contact_sheet
-from fifesim.output.chips.store import Shards
 from fifesim.output.colours import dark_and_bright
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.scenario import parse_scenario
@@ -35,14 +34,8 @@ def dataset(chips):
     return found.assign_attrs(title="11 simulated chips")
 
 
-def shards_of_four():
-    shards = Shards(COUNT, 1, 4)
-    shards.length = 4
-    return shards
-
-
 def test_ranges_are_those_of_all_chips(dataset, chips):
-    (found,) = datasheet.ranges_of(dataset, shards_of_four()).values()
+    (found,) = datasheet.ranges_of(dataset, 4).values()
     values = dataset["lai"].values.astype(float)
     assert (found["least"], found["greatest"]) == (np.nanmin(values), np.nanmax(values))
     assert found["mean"] == pytest.approx(np.nanmean(values), rel=1e-12)
@@ -51,14 +44,9 @@ def test_ranges_are_those_of_all_chips(dataset, chips):
         assert found["means"][part] == pytest.approx(np.nanmean(values[chips.split == part]), rel=1e-12)
 
 
-def test_what_has_no_data_has_no_range(dataset):
-    (found,) = datasheet.ranges_of(dataset * np.nan, shards_of_four()).values()
-    assert found["without"] == 1 and np.isnan(found["mean"])
-
-
 @pytest.fixture(scope="module")
 def page(dataset, chips):
-    return datasheet.datasheet_page(dataset, chips, datasheet.ranges_of(dataset, shards_of_four()), b"picture")
+    return datasheet.datasheet_page(dataset, chips, datasheet.ranges_of(dataset, 4), b"picture")
 
 
 def test_page_names_what_is_drawn_and_how(page, chips):
@@ -83,7 +71,7 @@ def test_page_counts_chips_and_landscapes(page, chips):
 def test_page_says_why_a_part_has_no_chips(count, said, dataset):
     chips = chips_of(Study(parse_scenario(SMALL), DRAWS, landscapes=3), count)
     part = dataset.isel(chip=range(count))
-    page = datasheet.datasheet_page(part, chips, datasheet.ranges_of(part, Shards(count, 1, 4)), b"")
+    page = datasheet.datasheet_page(part, chips, datasheet.ranges_of(part, 4), b"")
     empty = [name for name in ("train", "validation", "test") if name not in chips.split]
     assert ("fewer chips than landscapes" in page) is bool(said)
     assert "none</b>" not in page if said is None else said.format(" and ".join(empty)) in page
@@ -109,13 +97,6 @@ def test_a_few_chips_of_each_part_in_its_order():
     assert titles == ["train\nchip 1", "\nchip 2", "\nchip 3", "\nchip 4", "test\nchip 0", "\nchip 6"]
     labels = [axis.get_ylabel() for axis in figure.axes if axis.get_ylabel()]
     assert labels == ["NDVI\nof the image", "LAI", "FPAR"]
-
-
-def test_one_band_is_grey():
-    figure = contact_sheet(dataset_of(["TM5"], [1.65]).drop_vars("ndvi"), ["train"])
-    assert figure.axes[0].get_ylabel() == "image: TM5"
-    picture = figure.axes[0].images[0].get_array()
-    np.testing.assert_array_equal(picture[..., 0], picture[..., 2])
 
 
 def test_pixels_without_data_are_clear():

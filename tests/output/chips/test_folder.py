@@ -1,13 +1,9 @@
 """Datasets: whole or not there, and the same bits whatever stopped them and whoever made them."""
 
 import os
-import random
 import re
 import shutil
-import signal
-import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -103,14 +99,6 @@ def test_a_stopped_run_goes_on_to_the_same_bits(after, study, whole, tmp_path, m
     assert contents(folder) == contents(whole)
 
 
-@pytest.mark.parametrize("text", ["[]", "{", '{"chips": "many"}', "[" * 100_000])
-def test_a_state_that_no_run_wrote_gives_no_number_of_chips(study, tmp_path, text):
-    (tmp_path / UNFINISHED).mkdir()
-    (tmp_path / UNFINISHED / "run.toml").write_text(study.to_toml())
-    (tmp_path / UNFINISHED / "run.json").write_text(text)
-    assert study_to_resume(tmp_path) == (study, None)
-
-
 def test_a_finished_dataset_is_resumed_without_work(study, whole, tmp_path, monkeypatch):
     folder = tmp_path / "chips.zarr"
     shutil.copytree(whole, folder)
@@ -147,23 +135,6 @@ def test_nothing_is_left_of_a_run_that_cannot_end_well(study, tmp_path, monkeypa
     with pytest.raises(ValueError, match=r"chip \d: cannot be"):
         dataset_to_folder(study, tmp_path / "chips.zarr", COUNT)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("count", "draws", "message"),
-    [(9, DRAWS, "was started with 7 chips"), (7, {"visibility": {"uniform": [10, 50]}}, "has another scenario, with")],
-)
-def test_another_run_is_not_gone_on_with(count, draws, message, study, tmp_path, monkeypatch):
-    folder = tmp_path / "chips.zarr"
-    with monkeypatch.context() as patch:
-        stopping(patch, 3)
-        with pytest.raises(KeyboardInterrupt):
-            dataset_to_folder(study, folder, COUNT)
-    before = contents(folder)
-    other = Study(study.scenario, draws, landscapes=3, seed=5)
-    with pytest.raises(ValueError, match=message):
-        dataset_to_folder(other, folder, count, resume=True)
-    assert contents(folder) == before
 
 
 def test_an_earlier_dataset_is_replaced_with_all_its_arrays(whole, study, tmp_path):
@@ -285,34 +256,3 @@ def test_workers_of_a_cluster_make_the_same_bits(study, whole, tmp_path):
     with cluster(workers=2) as client:
         dataset_to_folder(study, tmp_path / "chips.zarr", COUNT, client=client)
     assert contents(tmp_path / "chips.zarr") == contents(whole)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_run_killed_at_any_moment_goes_on_to_the_same_bits(workers, study, whole, tmp_path):
-    """Five times, at moments drawn over the time that a run takes."""
-    (tmp_path / "study.toml").write_text(study.to_toml())
-    code = (
-        "import sys; from matplotlib.figure import Figure; from fifesim.output.chips import datasheet, store; "
-        "store._FEWEST = 2; datasheet.contact_sheet = lambda dataset, parts: Figure((1, 1)); "
-        "from fifesim.cli import app; "
-        f"app(['dataset', 'study.toml', '-n', '{COUNT}', '--workers', '{workers}', *sys.argv[1:]])"
-    )
-    run = [sys.executable, "-c", code]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    start = time.monotonic()
-    subprocess.run([*run, "-o", "first.zarr"], cwd=tmp_path, env=environment, check=True)
-    length = time.monotonic() - start
-    assert contents(tmp_path / "first.zarr") == contents(whole)
-    moments = random.Random(1)
-    for _ in range(5):
-        process = subprocess.Popen([*run, "-o", "chips.zarr", "--resume"], cwd=tmp_path, env=environment)
-        time.sleep(moments.uniform(0.3, 1.0) * length)
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        if (tmp_path / "chips.zarr" / "zarr.json").exists():
-            break
-    else:
-        subprocess.run([*run, "-o", "chips.zarr", "--resume"], cwd=tmp_path, env=environment, check=True)
-    found = contents(tmp_path / "chips.zarr")
-    assert {name: value for name, value in found.items() if not name.startswith(UNFINISHED)} == contents(whole)

@@ -115,15 +115,6 @@ def test_processes_make_the_same_bits_and_end(chips, layout, shards):
     assert not any(process.is_alive() for process in begun)
 
 
-def test_processes_end_at_once_where_nobody_waits_for_them(chips, layout, shards):
-    with pytest.raises(KeyboardInterrupt), processes(1) as makers:
-        for _ in range(3):
-            makers.executor.submit(signal.pause)
-        (process,) = multiprocessing.active_children()
-        raise KeyboardInterrupt
-    assert not process.is_alive()
-
-
 def test_a_process_that_is_killed_is_told(chips, layout, shards):
     with pytest.raises(RuntimeError, match="ended unexpectedly, perhaps from lack of memory"), processes(1) as makers:
         for _ in made_shards(chips, layout, shards, [0, 1, 2], [].append, makers):

@@ -143,14 +143,6 @@ def test_green_leaves_are_all_leaves_where_none_is_dead(chips, arrays):
     np.testing.assert_array_equal(alike, brown == 0)
 
 
-def test_layout_says_shapes_and_types(layout, arrays):
-    for name, (dims, dtype) in layout.variables.items():
-        assert arrays[name].shape == (5, *layout.shape(dims)) and arrays[name].dtype == dtype
-    assert layout.size == sum(each.nbytes for each in arrays.values()) / 5
-    assert layout.pixels == (6, 6) and layout.pixel == 30
-    assert layout.bands["band"].values.tolist() == ["TM3", "TM4"]
-
-
 def test_a_truth_that_others_have_not_names_its_chip(chips, layout):
     without = layout._replace(truth=("lai", "fpar"))
     with pytest.raises(ValueError, match=r"chip \d: has a true property that others lack, green_fpar"):

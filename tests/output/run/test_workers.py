@@ -168,19 +168,6 @@ def test_a_task_that_ends_its_workers_is_told_and_the_others_are_cancelled(monke
     assert stub.cancelled == stub.futures[1:]
 
 
-def test_a_failed_delivery_cancels_the_other_tasks_at_once(monkeypatch):
-    stub = Stub(monkeypatch, AssertionError("the second is not asked for"))
-
-    def deliver(*output):
-        raise OSError("disk full")
-
-    tasks, outputs = tasks_of({"ones": da.ones(3, chunks=1)}, [("ones", (n,)) for n in range(3)])
-    with pytest.raises(OSError, match="disk full") as caught:
-        run_on_client(tasks, outputs, deliver, stub)
-    # The frames are alive, so that the collection of garbage has cancelled nothing.
-    assert caught.traceback and stub.cancelled == stub.futures[1:]
-
-
 FLAT = {"terrain": {"dem": "flat"}}
 
 
@@ -345,12 +332,3 @@ def test_blocks_are_delivered_as_they_are_wanted():
     backwards = wanted(array)[::-1]
     run_on_threads(*tasks_of({"means": array}, backwards), lambda name, index, block: found.append((name, index)), 2)
     assert found == backwards
-
-
-def test_an_error_of_a_task_is_raised_as_it_is():
-    def broken(block):
-        raise OSError("no such cells")
-
-    array = da.ones((4, 4), chunks=2).map_blocks(broken, dtype=float, meta=np.empty((0, 0)))
-    with pytest.raises(OSError, match="no such cells"):
-        run_on_threads(*tasks_of({"a": array}, wanted(array, "a")), lambda *block: None, 2)
