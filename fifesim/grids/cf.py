@@ -107,7 +107,7 @@ QUANTITIES = {
     "optical_thickness": Quantity("1", "atmosphere_optical_thickness_due_to_cloud", "optical thickness of clouds",
         "vertical, toward the sensor where cast onto the ground", lowest=0, highest=100, colours="Blues_r"),
     "shadow_thickness": Quantity("1", "", "optical thickness of clouds toward the sun", "vertical",
-        lowest=0, highest=100, colours="gray_r"),
+        label="cloud thickness toward the sun", lowest=0, highest=100, colours="gray_r"),
     "overhead_thickness": Quantity("1", "", "optical thickness of clouds overhead", lowest=0, highest=100),
     "cloud": Quantity("1", "", "cloud", "1 where a cloud hides the ground from the sensor, or the share of a pixel",
         lowest=0, highest=1, colours="Blues_r"),
