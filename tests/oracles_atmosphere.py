@@ -162,7 +162,7 @@ def mixed_stokes(atmosphere, wavelength, sza, vza, raa, *, at_ground=False, grou
         depths = (
             float(depth(at)[0]) for depth in (atmosphere.rayleigh_optical_depth, atmosphere.aerosol_optical_depth)
         )
-        *aerosol, phase = engines._aerosol(atmosphere, at, cosine, True)
+        *aerosol, phase = engines.scatterers(atmosphere, at, cosine, True)
         none = np.zeros(cosine.shape)
         polarization = aerosols.aerosol_polarization(atmosphere.aerosol, cosine, at[0]) if atmosphere.aot else none
         optics = *depths, *aerosol, phase, polarization

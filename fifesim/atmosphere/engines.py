@@ -58,7 +58,7 @@ def _light(atmosphere, wavelength, sza, vza, raa, polarized):
     at = np.array([wavelength])
     tau_r, tau_a = float(atmosphere.rayleigh_optical_depth(at)[0]), float(atmosphere.aerosol_optical_depth(at)[0])
     cosine = scattering_angle_cosine(sza, np.array(vza)[:, None], np.array(raa))
-    albedo, moments, phase = _aerosol(atmosphere, at, cosine, polarized)
+    albedo, moments, phase = scatterers(atmosphere, at, cosine, polarized)
 
     options = {"polarized": polarized, "vertical": aerosols.vertical(atmosphere.aerosol)}
 
@@ -90,7 +90,7 @@ def _at_wavelength(atmosphere, wavelength, sza, vza, raa, polarized):
     )
 
 
-def _aerosol(atmosphere, wavelength, cosine, polarized):
+def scatterers(atmosphere, wavelength, cosine, polarized):
     """Single scattering albedo, moments of the scattering matrix, and phase function of the aerosol."""
     if atmosphere.aot == 0:
         return 0.0, np.eye(1, _MOMENTS)[0], np.zeros(cosine.shape)

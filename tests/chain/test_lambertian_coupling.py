@@ -15,6 +15,7 @@ import fifesim
 from fifesim.atmosphere.column import matrix_moments
 from fifesim.atmosphere.coupling import apparent_reflectance
 from fifesim.atmosphere.engines import band_terms, whole_scattering
+from fifesim.atmosphere.skylight import atmospheric_sky, directional_coupling, ground_streams
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance, stokes_reflectance
 from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
@@ -252,3 +253,26 @@ def test_lambertian_ground_needs_no_integration():
     )
     found = coupled_reflectance(air, even, 45.0, 30.0, 0.0)
     assert found == pytest.approx(air.over_lambertian(0.3), rel=1e-9)
+
+
+@pytest.mark.parametrize(("visibility", "sza", "vza"), [(45.0, 28.5, 0.0), (10.0, 60.0, 0.0), (10.0, 60.0, 45.0)])
+def test_directional_coupling_is_the_sum_over_the_sky(visibility, sza, vza):
+    """A canopy with a hot spot, in both bands and in NDVI."""
+    air, found = fifesim.Atmosphere(visibility=visibility), []
+    for wavelength, *optics in BANDS.values():
+        above = air_of(visibility, wavelength, sza, vza, 0.0)
+        exact = coupled_reflectance(above, canopy(1.0, *optics, hotspot=0.05), sza, vza, 0.0)
+        *leaf, soil = optics
+
+        def surface(s, v, a, leaf=leaf, soil=soil):
+            return with_background(sail(1.0, *leaf, sza=s, vza=v, raa=a, hotspot=0.05), soil)
+
+        skies = (atmospheric_sky(air, wavelength, zenith) for zenith in (sza, vza))
+        streams = ground_streams(surface, *skies, sza, vza, 0.0)
+        direct, out = above.direct_down, above.direct_up
+        through = direct, above.down - direct, out, above.up - out, above.albedo, above.path
+        found.append((float(np.squeeze(exact)), float(directional_coupling(streams, *through))))
+    red, infrared = np.array(found)
+    for exact, coupled in (red, infrared):
+        assert coupled == pytest.approx(exact, rel=1e-3)
+    assert np.subtract(*(infrared - red) / (infrared + red)) == pytest.approx(0, abs=5e-4)

@@ -1,0 +1,175 @@
+"""Coupling of an atmosphere with ground that is not Lambertian: exact systems, conservation and reciprocity."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.polynomial.legendre import leggauss
+
+import fifesim
+from fifesim.atmosphere.column import matrix_moments
+from fifesim.atmosphere.coupling import apparent_reflectance
+from fifesim.atmosphere.skylight import (
+    GroundStreams,
+    atmospheric_sky,
+    directional_coupling,
+    four_stream_coupling,
+    ground_streams,
+    mixed_sky,
+)
+from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
+from fifesim.base.geometry import scattering_angle_cosine
+from fifesim.base.surface_kernels import RPV, ross_li, rpv
+from fifesim.experiments.verification.benchmarks import _between
+
+DATA = Path(__file__).parents[1] / "data"
+AIR = fifesim.Atmosphere(visibility=15)
+
+
+@cache
+def sky(sza):
+    return atmospheric_sky(AIR, 0.66, sza)
+
+
+def test_four_streams_solve_the_system_of_fluxes():
+    t = pd.read_csv(DATA / "four_stream.csv", comment="#")
+    ground = t.rso, t.rdo, t.rsd, t.rdd
+    found = four_stream_coupling(*ground, t.tss, t.tsd, t.too, t.tdo, t.spherical_albedo, t.path)
+    np.testing.assert_allclose(found, t.toa, rtol=0, atol=1e-12)
+
+
+def test_equal_reflectances_are_lambertian():
+    rng = np.random.default_rng(5)
+    r, tss, tsd, too, tdo, albedo, path, gas = rng.uniform(0.05, 0.45, (8, 50))
+    expected = apparent_reflectance(r, path, tss + tsd, too + tdo, albedo, gas)
+    air = tss, tsd, too, tdo, albedo, path, gas
+    np.testing.assert_allclose(four_stream_coupling(r, r, r, r, *air), expected, rtol=1e-12)
+    np.testing.assert_allclose(directional_coupling(GroundStreams(*[r] * 9), *air), expected, rtol=1e-12)
+
+
+def test_weights_are_normal():
+    for zenith in (0.0, 35.0, 60.0):
+        streams = ground_streams(lambda sza, vza, raa: 0.3 + 0 * raa, sky(zenith), sky(45.0), zenith, 45.0, 70.0)
+        np.testing.assert_allclose(streams, 0.3, rtol=1e-12)
+
+
+@pytest.mark.parametrize("surface", ["ross-li", "rpv"])
+def test_sun_and_view_may_be_exchanged(surface):
+    def ground(sza, vza, raa):
+        if surface == "rpv":
+            return rpv(0.1, 0.7, -0.15, 0.2, sza=sza, vza=vza, raa=raa)
+        return ross_li(0.3, 0.15, 0.02, sza=sza, vza=vza, raa=raa)
+
+    there = ground_streams(ground, sky(20.0), sky(50.0), 20.0, 50.0, 40.0)
+    back = ground_streams(ground, sky(50.0), sky(20.0), 50.0, 20.0, 40.0)
+    one = directional_coupling(there, 0.6, 0.2, 0.5, 0.25, 0.15, 0.03)
+    other = directional_coupling(back, 0.5, 0.25, 0.6, 0.2, 0.15, 0.03)
+    assert one == pytest.approx(other, abs=1e-10)
+
+
+def test_returned_light_and_sky_are_the_means_of_their_definitions():
+    """Against sums over a fine grid of the sky, of light that varies with both angles."""
+    own, other = sky(35.0), sky(50.0)
+
+    def ground(sza, vza, raa):
+        s, v = np.radians(sza), np.radians(vza)
+        return 0.2 + 0.1 * np.cos(s) * np.cos(v) + 0.05 * np.sin(s) * np.sin(v) * np.cos(np.radians(raa))
+
+    found = ground_streams(ground, own, other, 35.0, 50.0, 110.0)
+    for weights, direct, both in ((own.light, found.sky_view, found.sky_sky), (own.returned, found.air_view, None)):
+        at = own.zenith[:, None], np.concatenate([own.azimuth, -own.azimuth])
+        w = np.concatenate([weights, weights], axis=1) / 2
+        assert direct == pytest.approx((w * ground(at[0], 50.0, at[1] - 110.0)).sum(), rel=1e-12)
+        if both is None:
+            continue
+        cos_of, east = (
+            (w * np.cos(np.radians(at[0]))).sum(),
+            (w * np.sin(np.radians(at[0])) * np.cos(np.radians(at[1]))),
+        )
+        away = other.light.sum(axis=1) @ np.cos(np.radians(other.zenith))
+        turned = (other.light * np.sin(np.radians(other.zenith))[:, None] * np.cos(np.radians(other.azimuth))).sum()
+        expected = 0.2 + 0.1 * cos_of * away + 0.05 * east.sum() * turned * np.cos(np.radians(110.0))
+        assert both == pytest.approx(expected, rel=2e-4)
+
+
+def test_white_ground_below_air_without_absorption_returns_all_light():
+    """The ground reflects all light from each direction, most of it near its own zenith angle."""
+    tau, sza = 0.3, 35.0
+
+    def white(sza, vza, raa):
+        return 1 + 0.4 * (3 * np.cos(np.radians(sza)) - 2) * (3 * np.cos(np.radians(vza)) - 2)
+
+    points, weights = leggauss(12)
+    mu = (points + 1) / 2
+    views, share = np.degrees(np.arccos(mu)), mu * weights
+
+    def none(cosine):
+        return np.zeros((2, *cosine.shape))
+
+    total, albedo = flux_transmittance(tau, 0.0, 0.0, [1.0], [sza, *views])
+    own = mixed_sky(tau, 0.0, 0.0, [1.0], none, sza)
+    up = 0.0
+    azimuths = 180 * (np.arange(4) + 0.5) / 4
+    for view, each, through in zip(views, share, total[1:], strict=True):
+        air = tau, 0.0, 0.0, [1.0], np.zeros((1, 4)), sza, [view], azimuths
+        path = path_reflectance(*air).mean()
+        streams = ground_streams(white, own, mixed_sky(tau, 0.0, 0.0, [1.0], none, view), sza, view, 90.0)
+        direct, seen = np.exp(-tau / np.cos(np.radians([sza, view])))
+        up += each * directional_coupling(streams, direct, total[0] - direct, seen, through - seen, albedo, path)
+    # The rest is the discretisation of the solver: 60 layers and 16 directions.
+    assert up == pytest.approx(1.0, abs=2e-5)
+
+
+# Optical depth at 664.6 nm over that at 550 nm and single scattering albedo; other means for the cases without gases.
+RAMI = {"c": (0.706768, 0.96821), "d": (0.903349, 0.936366)}
+RAMI_0 = {"c": (0.7077, 0.96823), "d": (0.9037, 0.93635)}
+NAMES = {"c": "continental", "d": "desert"}
+
+
+@cache
+def rami_matter(case):
+    """Optical depths, albedo, moments and phase function of a case."""
+    molecules, aerosol, depth = case[4], case[5], int(case[6]) / 10
+    tau = 0.045159 if molecules in "es" else 0.0
+    if aerosol == "0":
+        return (tau, 0.0, 0.0, np.array([1.0])), lambda cosine: 0 * cosine
+    ratio, albedo = (RAMI_0 if molecules == "0" else RAMI)[aerosol]
+    table = pd.read_csv(DATA / "rami4atm_phase.csv", comment="#")
+    knots, phase = table["cosine"].to_numpy(), table[NAMES[aerosol]].to_numpy()
+    nodes, weights = _between(knots, 4)
+    moments = matrix_moments(np.interp(nodes, knots, phase), np.zeros(nodes.size), nodes, weights, 48)
+    return (tau, depth * ratio, albedo, moments), lambda cosine: np.interp(cosine, knots, phase)
+
+
+def rami_case(case, vza, raa):
+    """Reflectance at the top of a case, with the sky of the atmosphere, and with one reflectance factor."""
+    (*matter, moments), phase = rami_matter(case)
+    options, sza = {"depolarization": 0.0, "vertical": (0.0, 2.0)}, 30.0
+
+    def sky_at(zenith):
+        return mixed_sky(*matter, moments, lambda cosine: (phase(cosine), 0 * cosine), zenith, **options)
+
+    intensity = moments if moments.ndim == 1 else moments[:, 0]
+    seen = phase(scattering_angle_cosine(sza, np.array([[vza]]), np.array([raa])))
+    air = *matter, intensity
+    path = path_reflectance(*air, seen, sza, [vza], [raa], polarized=False, **options)[0, 0]
+    (down, up), albedo = flux_transmittance(*air, [sza, vza], polarized=False, **options)
+    direct, out = np.exp(-sum(matter[:2]) / np.cos(np.radians([sza, vza])))
+    streams = ground_streams(RPV(0.017051, 0.95, -0.1, 0.017051).reflectance, sky_at(sza), sky_at(vza), sza, vza, raa)
+    through = direct, down - direct, out, up - out, albedo, path
+    mixed = (direct * streams.sun_view + (down - direct) * streams.sky_view) / down
+    gases = np.exp(-0.0201 * (1 / np.cos(np.radians(sza)) + 1 / np.cos(np.radians(vza)))) if case[4] in "ea" else 1.0
+    return [gases * directional_coupling(each, *through) for each in (streams, GroundStreams(*[mixed] * 9))]
+
+
+@pytest.mark.parametrize("case", ["rpv_0d2s", "rpv_0d6s", "rpv_ec2s", "rpv_sc2s", "rpv_sd2s", "rpv_e00s"])
+def test_ground_below_the_sky_agrees_with_eradiate(case):
+    """In every eighth view within the noise, which one reflectance factor does not reach."""
+    table = pd.read_csv(DATA / "rami4atm_toa.csv", comment="#").query("case == @case").iloc[3::8]
+    found = np.array([rami_case(case, abs(float(row.vza)), float(row.raa)) for row in table.itertuples()]).T
+    away, noise = 100 * (found / table["brf"].to_numpy() - 1), 100 * (table["sd"] / table["brf"]).to_numpy()
+    assert np.sqrt((away[0] ** 2).mean()) < 1.5 * np.sqrt((noise**2).mean())
+    assert abs(away[0].mean()) < max(0.3, 3 * np.sqrt((noise**2).sum()) / noise.size)
+    assert (away[0] ** 2).mean() < (away[1] ** 2).mean()
