@@ -1,4 +1,4 @@
-"""Every public function with eight kinds of wrong argument: one line that names it, and no raw message of a library."""
+"""Wrong arguments of every public function: one line that names it, and no raw message of a library."""
 
 from __future__ import annotations
 
@@ -12,17 +12,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_type_hints
 
+import dask.array as da
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from odc.geo.geobox import GeoBox
+from scipy import stats
 
 import fifesim
 from fifesim.accessor import PUBLIC
-from fifesim.base.annotations import FilePath, Metres, Names
-from fifesim.base.arguments import NUMBER, Kind, check_fields, checked, kind_of
+from fifesim.analysis.regression import Regression
+from fifesim.base import arguments as kinds
+from fifesim.base.annotations import Array, FilePath, FrozenDistribution, Metres, Names
+from fifesim.base.arguments import NUMBER, Kind, Method, check_fields, checked, kind_of
 from fifesim.grids import grid as grids
+from fifesim.ground.canopy.description import LEAF
 from fifesim.ground.canopy.properties import PROPERTIES
+from fifesim.sensor.description.instrument_file import InstrumentLike
 
 PACKAGE = str(Path(fifesim.__file__).parent)
 
@@ -582,3 +589,49 @@ def test_a_class_names_the_function_that_gives_its_objects(lai):
         fifesim.invert(lai, 5)
     with pytest.raises(TypeError, match=r"^setup must be a fifesim\.Setup, got 5$"):
         fifesim.compare(lai, ["TM"], 5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "fits", "others"),
+    [
+        (kinds.NUMBER, [1, 2.5, np.float32(1), np.array(3.0)], [True, "1", None, [1.0], np.ones(2), np.array("a")]),
+        (kinds.NUMBERS, [1, [1.0, 2.0], np.ones((2, 2)), xr.DataArray([1.0])], [None, "1", ["1"], np.array(["a"])]),
+        (kinds.PAIR, [30, (30, 15)], [(1, 2, 3), "30", np.ones((2, 2)), ("a", "b")]),
+        (kinds.FLAG, [True, np.bool_(False)], [1, 0, None, "no"]),
+        (kinds.CHUNKS, [256, "auto", "64MB", {"y": 2}, (2, 2), None], ["many", xr.Dataset(), np.ones(2)]),
+        (LEAF, [fifesim.Leaf(), {"TM3": (0.1, 0.1)}, (0.1, 0.1)], [0.1, (0.1,), 5]),
+        (kind_of(InstrumentLike), ["TM", fifesim.instrument("TM")], [None, ["TM"], 5]),
+    ],
+)
+def test_kinds_know_their_own(kind, fits, others):
+    assert all(kind.fits(value) for value in fits)
+    assert not any(kind.fits(value) for value in others)
+
+
+def test_a_value_is_told_in_a_few_words(lai):
+    values = [lai, lai.to_dataset(), lai.values, "x" * 900, list(range(900)), lai.odc.geobox, np.ma.ones(3), object]
+    for value in values:
+        text = kinds.described(value)
+        assert len(text) <= 120 and "\n" not in text
+    assert kinds.described(lai) == "an xarray.DataArray (y: 45, x: 54)"
+    assert kinds.described(np.ma.ones(3)) == "a masked numpy array (3,)"
+
+
+def test_a_method_is_the_public_function_and_its_object_comes_first():
+    line = Regression(2.0, 1.0, 0.9, 10, 0.1, 0.5, 1.0)
+    assert line.plot.__func__ is fifesim.plot_fit and line.plot.__self__ is line
+    assert Regression.plot is fifesim.plot_fit
+    assert isinstance(vars(Regression)["plot"], Method)
+
+
+MEMBERS = {Array: ["__array__"], FrozenDistribution: ["ppf", "cdf", "pdf", "mean", "std", "support"]}
+
+
+def test_protocols_have_the_members_that_are_looked_for():
+    for protocol, names in MEMBERS.items():
+        assert [name for name in vars(protocol) if name in names or not name.startswith("_")] == names
+    for array in (np.ones(2), da.ones(2), pd.Series([1.0]), xr.DataArray([1.0])):
+        assert all(hasattr(array, name) for name in MEMBERS[Array])
+    for source in (stats.gamma(4, scale=0.4), "burned-grazed"):
+        found = fifesim.lai_distribution(source)
+        assert all(callable(getattr(found, name)) for name in MEMBERS[FrozenDistribution])

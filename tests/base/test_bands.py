@@ -1,3 +1,5 @@
+"""Bands: spectral means, solar irradiance, nearest bands, and their digital numbers."""
+
 import numpy as np
 import pytest
 from pyrsr.rsr import RSR_reader
@@ -9,6 +11,8 @@ from fifesim.base.bands import (
     NEAR_INFRARED,
     RED,
     Band,
+    check_counts,
+    counts,
     nearest_band,
     solar_irradiance,
     solar_irradiance_steps,
@@ -18,38 +22,24 @@ from fifesim.base.bands import (
 BOX = Band("box", (0.6, 0.6001, 0.6999, 0.7), (0.0, 1.0, 1.0, 0.0))
 
 
-def test_mean_of_a_constant_is_the_constant():
-    assert BOX.mean(np.full(3, 0.25), [0.5, 0.65, 0.8]) == pytest.approx(0.25, rel=1e-14)
-
-
-def test_mean_of_a_line_is_its_value_at_the_center():
-    wavelength = np.array([0.5, 0.8])
-    assert BOX.mean(2 * wavelength, wavelength) == pytest.approx(2 * BOX.center, rel=1e-12)
-    assert BOX.center == pytest.approx(0.65, abs=1e-12)
-
-
-def test_weight_draws_the_mean_toward_it():
+def test_means_of_constants_and_lines():
     wavelength = np.linspace(0.5, 0.8, 301)
-    assert BOX.mean(wavelength, wavelength, weight=wavelength**-4) < BOX.center
-
-
-def test_mean_keeps_leading_dimensions():
+    assert BOX.center == pytest.approx(0.65, abs=1e-12)
+    assert BOX.mean(np.full(3, 0.25), [0.5, 0.65, 0.8]) == pytest.approx(0.25, rel=1e-14)
+    assert BOX.mean(2 * wavelength[::300], wavelength[::300]) == pytest.approx(2 * BOX.center, rel=1e-12)
+    # The integral of 1 / w over 0.6 to 0.7 um, compared with the integral of w^-2.
+    expected = np.log(0.7 / 0.6) / (1 / 0.6 - 1 / 0.7)
+    assert BOX.mean(wavelength, wavelength, weight=wavelength**-2) == pytest.approx(expected, rel=1e-4)
     assert BOX.mean(np.ones((2, 3, 4)), [0.5, 0.6, 0.7, 0.8]).shape == (2, 3)
-
-
-def test_spectrum_that_misses_the_band_is_refused():
     with pytest.raises(ValueError, match=r"band box spans 0.6 to 0.7 um, the spectrum only 0.65 to 0.8 um"):
         BOX.mean([1.0, 1.0], [0.65, 0.8])
 
 
-@pytest.mark.parametrize("wavelength, response", [((0.5, 0.5), (1, 1)), ((0.5, 0.6), (1, -1)), ((0.5, 0.6), (0, 0))])
-def test_impossible_response_is_refused(wavelength, response):
-    with pytest.raises(ValueError, match="band odd"):
-        Band("odd", wavelength, response)
-
-
-def test_bands_are_hashable_and_equal_by_content():
+def test_bands_are_equal_by_content_and_refuse_impossible_responses():
     assert hash(Band("a", [0.5, 0.6], [1, 1])) == hash(Band("a", (0.5, 0.6), (1.0, 1.0)))
+    for wavelength, response in (((0.5, 0.5), (1, 1)), ((0.5, 0.6), (1, -1)), ((0.5, 0.6), (0, 0))):
+        with pytest.raises(ValueError, match="band odd"):
+            Band("odd", wavelength, response)
 
 
 def test_solar_irradiance_over_all_wavelengths_is_the_solar_constant():
@@ -122,3 +112,17 @@ def test_common_names_have_their_middle_where_landsat_and_sentinel_2_have_a_band
     )
     for name in set(COMMON_NAMES) - {"yellow"}:
         assert np.abs(centres - COMMON_NAMES[name].best).min() < 3e-3
+
+
+@pytest.mark.parametrize(("dn", "said"), [(-1.0, "-1"), (256, "256"), (1.5, "1.5"), (-1, "-1"), (np.inf, "inf")])
+def test_values_that_no_instrument_records_are_refused(dn, said):
+    with pytest.raises(ValueError, match=f"digital number of {said} is not a whole number from 0 to 255: give nodata="):
+        counts(np.array([dn]), 0, 255, "give nodata=")
+
+
+def test_counts_are_kept_and_no_data_are_0():
+    np.testing.assert_array_equal(counts(np.array([-9999, 7, 255], np.int16), -9999, 255, ""), [0, 7, 255])
+    np.testing.assert_array_equal(counts(np.array([7, 254, 255]), 0, 255, "", saturated=255), [7, 254, 0])
+    check_counts(np.array([np.nan, 0.0, 255.0]), 255, "")
+    assert counts(np.array([300]), 0, 65535, "").dtype == np.uint16
+    assert counts(np.array([30]), 0, 255, "").dtype == np.uint8

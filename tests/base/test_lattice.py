@@ -1,9 +1,11 @@
-"""Windows of a lattice of tiles."""
+"""Windows of a lattice of tiles, and the seeds and streams of random numbers on it."""
 
 import numpy as np
 import pytest
 
-from fifesim.base.lattice import assemble
+import fifesim
+from fifesim.base.lattice import assemble, generator
+from fifesim.ground.landscape.autoregression import periodic_field, streaming_field
 
 TILE = 5
 
@@ -34,3 +36,63 @@ def test_each_tile_is_made_once_and_no_other():
 
 def test_empty_window_makes_no_tile():
     assert assemble(None, TILE, 3, 3, (0, 4)).shape == (0, 4)
+
+
+GRID = fifesim.fife_site(30 / 9, window=((90, 108), (180, 198)))
+
+
+@pytest.fixture(scope="module")
+def toa():
+    return fifesim.lai_scene(GRID).fifesim.surface_reflectance("TM", bands=["TM4"]).fifesim.to_toa()
+
+
+@pytest.fixture(params=["lai_scene", "periodic", "flint_hills", "streaming_field", "periodic_field", "sense"])
+def draw(request, toa):
+    """A public function that takes a seed."""
+    return {
+        "lai_scene": lambda seed: fifesim.lai_scene(GRID, seed=seed),
+        "periodic": lambda seed: fifesim.lai_scene(GRID, seed=seed, method="periodic"),
+        "flint_hills": lambda seed: fifesim.flint_hills(GRID, seed),
+        "streaming_field": lambda seed: streaming_field(seed, 0.1, 0, 0, (3, 3)),
+        "periodic_field": lambda seed: periodic_field(seed, 0.1, (3, 3)),
+        "sense": lambda seed: toa.fifesim.sense(
+            fifesim.instrument("TM", response="paper"),
+            noise="thermal",
+            noise_models=fifesim.NoiseModel(thermal=5.0, shot=0.0),
+            seed=seed,
+            quantise=False,
+        ),
+    }[request.param]
+
+
+@pytest.mark.parametrize("seed", [7.0, 1.5, None, True, np.True_, "7", [7]])
+def test_what_is_no_whole_number_is_no_seed(draw, seed):
+    with pytest.raises(TypeError, match=r"seed must be a whole number from 0 to 2\*\*63 - 1, got .*: give for inst"):
+        draw(seed)
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63, 2**64 - 1, np.int8(-3), np.uint64(2**63)])
+def test_a_number_that_scenarios_cannot_hold_is_no_seed(draw, seed):
+    with pytest.raises(ValueError, match=rf"seed must be a whole number from 0 to 2\*\*63 - 1, got {seed}: give"):
+        draw(seed)
+
+
+def test_a_whole_number_of_any_type_is_the_seed(draw):
+    np.testing.assert_array_equal(draw(np.uint16(9)), draw(9))
+    last, before = draw(np.int64(2**63 - 1)), draw(2**63 - 2)
+    assert not np.array_equal(last, before)
+
+
+def test_scenarios_hold_the_same_seeds():
+    for section in ("ground", "terrain", "sensor"):
+        assert fifesim.Scenario(**{section: {"seed": 2**63 - 1}})
+        with pytest.raises(ValueError, match="seed"):
+            fifesim.Scenario(**{section: {"seed": 2**63}})
+
+
+def test_places_streams_and_seeds_are_unrelated():
+    """Neighbouring numbers from 2**63 up are the same in double precision; places are words of 64 bits."""
+    keys = [(seed, stream, (0, 0, place, 0)) for seed in (0, 2**63 - 1) for stream in (1, 2**63) for place in (0, -1)]
+    keys += [(2**63 - 2, 1, (0, 0, 0, 0)), (0, 2**63 + 1, (0, 0, 0, 0)), (0, 1, (0, 0, -2, 0)), (0, 1, (0, 0, 0, -1))]
+    drawn = [generator(*key).standard_normal(40_000) for key in keys]
+    np.testing.assert_allclose(np.corrcoef(drawn), np.eye(len(keys)), rtol=0, atol=4.5 / 200)

@@ -1,10 +1,11 @@
-"""What comes from outside: no file makes a reader wait, and no value spoils a message."""
+"""Files from outside and tables of the package: no file makes a reader wait, and no value spoils a message."""
 
 import os
 import socket
 
 import pytest
 
+from fifesim.base import files
 from fifesim.base.files import check_regular, in_a_line, read_toml, shown
 
 
@@ -86,3 +87,13 @@ def test_short_values_are_shown_as_python_writes_them(value):
 def test_the_end_of_a_long_line_stays():
     line = in_a_line("key: " + "a\n" * 1000 + ": type another")
     assert line.startswith("key: a\\n") and line.endswith(": type another") and len(line) <= 400
+
+
+def test_tables_are_copies_that_may_be_changed():
+    files.table("lai_distributions.csv").loc[:, "mean"] = -1.0
+    assert (files.table("lai_distributions.csv")["mean"] > 0).all()
+
+
+def test_missing_table_is_named():
+    with pytest.raises(FileNotFoundError, match=r"'no_such\.csv'"):
+        files.path("no_such.csv")

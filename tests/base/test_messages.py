@@ -1,0 +1,122 @@
+"""Messages: misspelt names, refusals of pydantic, warnings at the user's line, and a logger."""
+
+import inspect
+import logging
+import pickle
+import warnings
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import pytest
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError
+
+import fifesim
+from fifesim.base.messages import LOG, in_own_words, is_quiet, nearest, quiet, spelled, unknown_argument, warn
+
+
+def test_the_nearest_is_named_and_none_where_none_is_near():
+    assert nearest("sens", ["sense", "slope"]) == "did you mean 'sense'? "
+    assert nearest("zzz", ["sense", "slope"]) == ""
+
+
+def test_known_arguments_are_nothing_wrong():
+    signature = inspect.signature(lambda toa, offset=0: None)
+    assert unknown_argument("sense", signature, {"toa": 1, "offset": 2}) == ""
+    said = "sense has no argument 'ofset': did you mean 'offset'? There are toa, offset"
+    assert unknown_argument("sense", signature, {"toa": 1, "ofset": 2}) == said
+
+
+@dataclass(frozen=True)
+class Plain:
+    visibility: float = 45.0
+
+
+def test_a_class_keeps_its_signature_and_says_which_argument_is_misspelt():
+    before = inspect.signature(Plain)
+    assert spelled(Plain) is Plain and inspect.signature(Plain) == before
+    assert Plain(23.0) == Plain(visibility=23.0) == pickle.loads(pickle.dumps(Plain(23.0)))
+    with pytest.raises(TypeError, match=r"^Plain has no argument 'visibilty': did you mean 'visibility'\? There are v"):
+        Plain(visibilty=23.0)
+
+
+def test_what_a_user_misspells(lai):
+    typed = [
+        (lambda: fifesim.sens, AttributeError, "no attribute 'sens': did you mean 'sense'"),
+        (lambda: lai.fifesim.sens, AttributeError, "no method 'sens' of an xarray.DataArray: did you mean 'sense'"),
+        (lambda: lai.fifesim.fife_site, AttributeError, "fife_site is no method of a raster.* fifesim.fife_site is"),
+        (lambda: lai.fifesim.fpar(canpoy=fifesim.Canopy()), TypeError, "fpar has no .* did you mean 'canopy'"),
+        (lambda: fifesim.Canopy(leaf_angels="spherical"), TypeError, "Canopy has no .* did you mean 'leaf_angles'"),
+        (
+            lambda: lai.fifesim.fpar(leaf_angles="spherical"),
+            TypeError,
+            r"type canopy=fifesim.Canopy\(leaf_angles=...\)",
+        ),
+        (lambda: fifesim.Atmosphere(visibilty=23), TypeError, "Atmosphere has no .* did you mean 'visibility'"),
+    ]
+    for call, kind, said in typed:
+        with pytest.raises(kind, match=said) as caught:
+            call()
+        assert len(str(caught.value)) <= 500
+
+
+def test_a_method_of_another_kind_of_raster_is_told(lai):
+    (name,) = [name for name, public in fifesim.accessor.PUBLIC.items() if public.methods_of == ("DataTree",)][:1]
+    with pytest.raises(AttributeError, match=f"{name} is a method of an xarray.DataTree, this is an xarray.DataArray"):
+        getattr(lai.fifesim, name)
+
+
+class Table(BaseModel):
+    number: float = 1.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "said"),
+    [
+        (bool, "x", "must be true or false"),
+        (bool, [], "must be true or false"),
+        (dict[str, float], 3, "must be a table of keys"),
+        (Table, 3, "must be a table of keys"),
+        (Annotated[float, Field(allow_inf_nan=False)], float("nan"), "must be a finite number"),
+        (float, "x", "must be a number"),
+        (float, [], "must be a number"),
+        (Annotated[float, Field(gt=0.25)], 0.25, "must be above 0.25"),
+        (Annotated[float, Field(ge=5)], 4, "must be at least 5"),
+        (Annotated[float, Field(lt=0.25)], 0.25, "must be below 0.25"),
+        (Annotated[float, Field(le=100)], 101, "must be at most 100"),
+        (int, 1.5, "must be a whole number"),
+        (int, "x", "must be a whole number"),
+        (int, [], "must be a whole number"),
+        (list[str], True, "must be a list, in brackets"),
+        (tuple[str, ...], 3, "must be a list, in brackets"),
+        (Literal["streaming", "periodic"], "quick", "must be 'streaming' or 'periodic'"),
+        (str, 3, "must be text, in quotes"),
+        (Annotated[str, Field(max_length=2)], "abc", "must have at most 2 characters"),
+        (Annotated[str, Field(min_length=2)], "a", "must have at least 2 characters"),
+        (Annotated[list[float], Field(min_length=2)], [1.0], "needs 2 of them or more"),
+        (Annotated[list[float], Field(max_length=1)], [1.0, 2.0], "takes 1 of them at most"),
+    ],
+)
+def test_each_refusal_says_what_the_value_must_be(kind, value, said):
+    with pytest.raises(ValidationError) as caught:
+        TypeAdapter(kind).validate_python(value)
+    assert in_own_words(caught.value.errors()[0]) == said
+
+
+def test_a_warning_points_outside_of_the_package():
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        warn("careful")
+    assert [(str(each.message), each.filename) for each in said] == [("careful", __file__)]
+
+
+def test_the_logger_is_called_fifesim_and_has_no_handlers():
+    assert LOG is logging.getLogger("fifesim") and not LOG.handlers
+
+
+def test_quiet_ends_with_its_context():
+    with quiet():
+        assert is_quiet()
+        with quiet(False):
+            assert not is_quiet()
+        assert is_quiet()
+    assert not is_quiet()
