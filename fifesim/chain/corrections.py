@@ -102,7 +102,12 @@ def topographic_correction(
     >>> bool(abs(corrected - level).max() < 1e-6)
     True
     """
-    image = as_bands_of(planetary_reflectance(reflectance), instrument, "toa_reflectance").transpose("band", "y", "x")
+    if method not in _REFERENCES:
+        raise ValueError(f"method must be one of {', '.join(_REFERENCES)}, got {method!r}")
+    for name, value, methods in (("c", c, ("c", "scs+c")), ("k", k, ("minnaert",))):
+        if value is not None and method not in methods:
+            raise ValueError(f"{name} is for method {' or '.join(methods)}, got method={method!r}: leave {name} out")
+    image = _with_bands(as_bands_of(planetary_reflectance(reflectance), instrument, "toa_reflectance"))
     if method == "kt":
         cf.check_quantity(image, "surface_reflectance")
         air = air_bands_and_geometry(image, atmosphere, geometry, instrument, time)
@@ -161,6 +166,13 @@ def _corrected(image, method, slopes, sza, c, k):
         found[name] = xr.Variable("band", values, cf.attributes(f"topographic_{name}"))
         arguments.append(found[name])
     return chunks.pointwise(kernels[method], image, *arguments), found
+
+
+def _with_bands(image):
+    """Image with dims (band, y, x)."""
+    if "band" not in image.dims:
+        raise ValueError("reflectance has no dimension band: type .expand_dims('band')")
+    return image.transpose("band", "y", "x")
 
 
 def _per_band(given, image, name):
@@ -241,7 +253,7 @@ def brdf_normalise(
     >>> float(nadir.vza), bool((nadir < rho).all())
     (0.0, True)
     """
-    image = as_bands_of(reflectance, None, "surface_reflectance").transpose("band", "y", "x")
+    image = _with_bands(as_bands_of(reflectance, None, "surface_reflectance"))
     cf.check_quantity(image, "surface_reflectance")
     geometry = directions.given_geometry(geometry, image, time)
     to = directions.checked_geometry(_at_nadir(geometry) if to is None else to)

@@ -11,6 +11,7 @@ from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.annotations import Interval, Names, NoiseKinds, Offset, Surroundings, WholeNumber
 from fifesim.base.arguments import check_fields
 from fifesim.base.files import in_a_line
+from fifesim.base.lattice import check_seed
 from fifesim.chain import steps
 from fifesim.grids.directions import Directions
 from fifesim.grids.inputs import Horizon
@@ -80,7 +81,8 @@ class Setup:
     quantise: bool = True
 
     def __post_init__(self):
-        check_fields(self, "canopy")
+        check_fields(self)
+        check_seed(self.seed)
         if self.canopy is None:
             object.__setattr__(self, "canopy", TALLGRASS)
 

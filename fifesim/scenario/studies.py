@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeAlias
 
 from fifesim.base.annotations import FilePath
-from fifesim.base.arguments import Kind
+from fifesim.base.arguments import Kind, check_fields
 from fifesim.base.files import shown
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import nearest
@@ -86,9 +86,8 @@ class Study:
     split: Mapping[str, float] = field(default_factory=lambda: dict(_SPLIT))
 
     def __post_init__(self):
-        if not isinstance(self.scenario, Scenario):
-            raise TypeError(f"a study needs a Scenario, got {type(self.scenario).__name__}: see fifesim.read_scenario")
         check_seed(self.seed)
+        check_fields(self, "scenario", "draws", "sequence", "landscapes", "split")
         _check_ground(self.scenario)
         _check_plan(self)
         drawn = dict(_draws(self.draws, self.scenario))
