@@ -1,8 +1,8 @@
 """Caches of intermediate results, with their contents and sizes, and a function that clears all of them."""
 
-from collections.abc import Callable
 from functools import lru_cache
-from typing import NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 
 class Cache(NamedTuple):
@@ -10,7 +10,7 @@ class Cache(NamedTuple):
 
     what: str
     size: int | None
-    function: Callable
+    function: Any
 
 
 CACHES: list[Cache] = []
@@ -26,6 +26,24 @@ def cached(size, what):
         return kept
 
     return decorate
+
+
+class Results(dict):
+    """Cache that a function fills itself, because threads wait for each other's results; the latest are kept."""
+
+    def __init__(self, size, what):
+        super().__init__()
+        self._size, self.cache_clear = size, self.clear
+        CACHES.append(Cache(what, size, self))
+
+    def __setitem__(self, key, result):
+        super().__setitem__(key, result)
+        for old in list(self)[: -self._size]:
+            del self[old]
+
+    def cache_info(self):
+        """Number of results, as `functools.lru_cache` states it."""
+        return SimpleNamespace(currsize=len(self))
 
 
 def clear_caches() -> None:
@@ -47,4 +65,4 @@ def clear_caches() -> None:
     >>> fifesim.clear_caches()
     """
     for cache in CACHES:
-        cache.function.cache_clear()  # type: ignore[attr-defined]
+        cache.function.cache_clear()

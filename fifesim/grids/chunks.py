@@ -14,6 +14,7 @@ import xarray as xr
 from dask.base import tokenize
 from dask.graph_manipulation import bind
 
+from fifesim.base.caches import Results
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import with_crs_of
 from fifesim.grids.windows import array_from_windows, gather, slices
@@ -299,7 +300,7 @@ class _Sealed:
         return self.name
 
 
-_known: dict = {}
+_known = Results(_KEPT, "samples of rasters")
 _asked = Lock()
 
 
@@ -311,8 +312,6 @@ def _computed(sealed):
         found = _known.get(sealed.name)
         if mine := found is None:
             found = _known[sealed.name] = Future()
-            for name in list(_known)[:-_KEPT]:
-                del _known[name]
     if mine:
         try:
             found.set_result(_made(sealed))

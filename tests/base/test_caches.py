@@ -8,7 +8,7 @@ import pytest
 
 import fifesim
 from fifesim.base import caches
-from fifesim.base.caches import CACHES, cached, clear_caches
+from fifesim.base.caches import CACHES, Results, cached, clear_caches
 
 # Functions that check arguments or find public names keep no results. Those of a lattice go with it.
 OTHERS = {"accessor.py", "base/arguments.py", "base/lattice.py", "base/caches.py"}
@@ -34,6 +34,16 @@ def test_no_more_is_kept_than_the_cache_may_hold(own):
     double = cached(3, "doubles")(lambda number: 2 * number)
     assert [double(number) for number in range(9)][-1] == 16
     assert double.cache_info().currsize == own[0].size == 3
+
+
+def test_results_that_threads_share_are_bounded_and_cleared(own):
+    shared = Results(2, "shared results")
+    for number in range(4):
+        shared[number] = number**2
+    assert shared == {2: 4, 3: 9} and [each[:2] for each in own] == [("shared results", 2)]
+    assert shared.cache_info().currsize == 2
+    clear_caches()
+    assert not shared
 
 
 def test_every_cache_of_the_package_is_listed():
