@@ -186,6 +186,7 @@ def varying_parts(setup):
     found = {
         "relief": setup.dem is not None,
         "adjacency": setup.adjacency,
+        "clouds": setup.clouds is not None,
         "angles by cell": not isinstance(setup.geometry, Geometry),
         "a drifting offset": any(np.ndim(each) for each in setup.offset),
     }

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
+from fifesim.atmosphere.clouds.labels import cast_clouds
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.annotations import Interval, Names, NoiseKinds, Offset, Surroundings, WholeNumber
 from fifesim.base.arguments import check_fields
@@ -45,6 +46,8 @@ class Setup:
         As in `fifesim.surface_reflectance`; without a dem the ground is level.
     adjacency, surroundings : optional
         As in `fifesim.to_toa`.
+    clouds : xarray.Dataset, optional
+        Cloud field, as in `fifesim.cast_clouds`; the same sky for all instruments.
     onto, interval, offset, min_valid : optional
         Position of pixels and minimum valid fraction, as in `fifesim.sense`.
     noise, noise_models, seed, quantise : optional
@@ -71,6 +74,7 @@ class Setup:
     upwelling: bool = True
     adjacency: bool = False
     surroundings: Surroundings | None = None
+    clouds: xr.Dataset | None = None
     onto: GeoBox | None = None
     interval: Interval | None = None
     offset: Offset = (0.0, 0.0)
@@ -114,7 +118,9 @@ def reflectance_of(setup, lai):
 
 def image_of(setup, reflectance):
     """Image of a surface reflectance by the instrument of a setup, dims (band, y, x), lazy if an input is."""
-    toa = steps.to_toa(reflectance, instrument=setup.instrument, **_of(setup, ("adjacency", "surroundings")))
+    clouds = None if setup.clouds is None else cast_clouds(reflectance, setup.clouds, dem=setup.dem)
+    own = {"clouds": clouds, **_of(setup, ("adjacency", "surroundings"))}
+    toa = steps.to_toa(reflectance, instrument=setup.instrument, **own)
     return sensor.sense(toa, setup.instrument, **_of(setup, _SENSOR))
 
 

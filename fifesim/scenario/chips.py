@@ -187,7 +187,7 @@ def _drawn(study, count, landscape):
 
 def is_of_a_landscape(key):
     """Whether a key is drawn once for each landscape, because it determines the random field shared by its chips."""
-    return key.key in ("arp", "arps") or (key.key == "seed" and key.place != ("sensor",))
+    return key.key in ("arp", "arps") or (key.key == "seed" and key.place not in (("sensor",), ("clouds",)))
 
 
 def _seeds(study, count, landscape):
@@ -198,4 +198,6 @@ def _seeds(study, count, landscape):
         found[NamedKey(("terrain",), "seed")] = [scenario.terrain.seed + int(at) for at in landscape]
     if scenario.sensor.noise or any(key.path == ("sensor", "noise") for key in study.drawn):
         found[NamedKey(("sensor",), "seed")] = [scenario.sensor.seed + chip for chip in range(count)]
+    if scenario.clouds.cloud_cover or any(key.path == ("clouds", "cloud_cover") for key in study.drawn):
+        found[NamedKey(("clouds",), "seed")] = [scenario.clouds.seed + chip for chip in range(count)]
     return found

@@ -368,6 +368,24 @@ class AirKeys(Section):
         return values | {"visibility": values.get("visibility")} if by_aot else values
 
 
+class CloudKeys(Section):
+    """Water clouds and their shadows."""
+
+    cloud_cover: float = number(0.0, "1", "cover of clouds over 100 km; 0 is a clear sky", ge=0, le=1)
+    thickness: float = number(8.0, "1", "mean optical thickness within clouds", gt=0, le=100)
+    deviation: float | None = number(None, "1", "its standard deviation; by default the mean", gt=0, le=100)
+    length: float = number(2000.0, "m", "distance at which the correlation has fallen to 0.05", ge=100, le=20_000)
+    base: float = number(1200.0, "m", "height of the base above the altitude of the atmosphere", ge=0, le=20_000)
+    top: float = number(1800.0, "m", "height of the top", ge=0, le=20_000)
+    seed: int = seed(7, "seed of the clouds; each date has an independent sky")
+
+    @model_validator(mode="after")
+    def _base_below_top(self):
+        if self.base > self.top:
+            raise ValueError(f"base = {self.base:g} is above top = {self.top:g}: swap them")
+        return self
+
+
 OFFSET_PARTS = ("down", "across")
 """Names of the two parts of ``sensor.offset``, each of which a study may draw."""
 
@@ -448,6 +466,7 @@ class Keys(Section):
     terrain: TerrainKeys = TerrainKeys()
     geometry: SunAndViewKeys = SunAndViewKeys()
     atmosphere: AirKeys = AirKeys()
+    clouds: CloudKeys = CloudKeys()
     sensor: SensorKeys = SensorKeys()  # type: ignore[call-arg]
 
     @field_validator("classes")

@@ -272,14 +272,14 @@ class Scenario(Keys):
     def sun_and_view(self) -> geometry.Geometry:
         """Directions of sun and sensor, a `fifesim.base.geometry.Geometry`."""
         self._check_place()
-        given, time = self.geometry, self._time()
+        given, time = self.geometry, self.overpass_time()
         distance = 1.0 if time is None else geometry.earth_sun_distance(time)
         if given.sza is not None:
             return geometry.Geometry(given.sza, given.saa, given.vza, given.vaa, distance)
         sun = geometry.sun_geometry(time, *self.sun_place(), 1000 * self.atmosphere.altitude)
         return geometry.Geometry(sun.sza, sun.saa, given.vza, given.vaa, distance)
 
-    def _time(self):
+    def overpass_time(self) -> str | None:
         """Date and time as given; by default the FIFE overpass if the scene is on the site."""
         return self.geometry.time or (times.TIME if on_fife_site(self.geobox()) else None)
 
@@ -339,7 +339,7 @@ class Scenario(Keys):
         check_leaf_area(self)
         ground = self.ground.model_copy(update=self.ground.complete_optics(bands))
         sensor = own.model_copy(update={"pixel": own.size, "bands": [band.name for band in bands]})
-        own_time = self.geometry.model_copy(update={"time": self._time()})
+        own_time = self.geometry.model_copy(update={"time": self.overpass_time()})
         update = {"grid": grid_keys(box), "ground": ground, "geometry": own_time, "sensor": sensor}
         return self.model_copy(update=update).with_paths(full_path)
 

@@ -9,6 +9,7 @@ import xarray as xr
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
+from fifesim.atmosphere.clouds.labels import cast_clouds, cloud_field
 from fifesim.base.annotations import Chunks
 from fifesim.chain.comparison import shows_ndvi
 from fifesim.chain.landscapes import aggregate
@@ -42,7 +43,8 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
         ``image`` has digital numbers ``dn`` and ``ndvi``. ``truth`` has means of ``lai`` and ``fpar`` over the pixels
         of the gridded product, for any sampling interval. With terrain, ``terrain`` has ``dem``, ``slope`` and ``kt``
         averaged in the same way, with the known extent of the elevation in its attributes; ``level`` has the digital
-        numbers for level ground.
+        numbers for level ground. With clouds, ``truth`` has the fractions ``cloud`` and ``shadow``, and the mean
+        ``optical_thickness``.
 
     Raises
     ------
@@ -64,6 +66,7 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
     def means(rasters):
         return aggregate(rasters, scenario.sensor.size, min_valid=setup.min_valid)
 
+    setup = replace(setup, clouds=sky_of(scenario, ground, chunks))
     dem, horizon, reach = elevation(scenario, ground, chunks)
     land = ground_scene(scenario, ground, chunks, dem)
     level, scene = reflectance_of(setup, land), land.isel(inside)
@@ -77,12 +80,34 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
         nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt.isel(inside))}
         nodes["level"] = {"dn": image_of(setup, level)}
     nodes["scene"]["surface_reflectance"] = reflectance.isel(inside)
-    image = image_of(setup, reflectance)
+    if setup.clouds is not None:
+        hidden = cast_clouds(reflectance, setup.clouds, dem=dem)[["cloud", "shadow", "optical_thickness"]]
+        nodes["truth"] |= means(hidden.isel(inside)).data_vars
+    image = image_of(replace(setup, dem=dem), reflectance)
     nodes["image"] = {"dn": image} | ({"ndvi": ndvi(image)} if shows_ndvi(image) else {})
     tree = xr.DataTree.from_dict({name: xr.Dataset(arrays) for name, arrays in nodes.items()})
     if reach:
         tree["terrain"].attrs = {f"reach_{side}": distance for side, distance in reach.items()}
     return tree
+
+
+def sky_of(scenario, grid, chunks="auto"):
+    """Cloud field of a scenario on a grid and within reach of it; None if the sky is clear."""
+    own, geometry = scenario.clouds, scenario.sun_and_view()
+    if own.cloud_cover == 0:
+        return None
+    reach = own.top * (np.tan(np.radians(geometry.sza)) + np.tan(np.radians(geometry.vza)))
+    return cloud_field(
+        grid,
+        own.cloud_cover,
+        thickness=(own.thickness, own.thickness if own.deviation is None else own.deviation),
+        length=own.length,
+        height=(own.base, own.top),
+        seed=own.seed,
+        time=scenario.overpass_time(),
+        margin=float(reach),
+        chunks=chunks,
+    )
 
 
 def setup_of(scenario):
@@ -97,6 +122,7 @@ def setup_of(scenario):
         canopy=canopy_of(scenario),
         upwelling=scenario.terrain.upwelling,
         adjacency=scenario.atmosphere.adjacency,
+        clouds=sky_of(scenario, scenario.geobox()),
         onto=grids.aligned_grid(scenario.geobox(), own.size) if aligned else None,
         interval=None if aligned else own.interval,
         offset=tuple(own.offset),

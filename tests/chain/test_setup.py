@@ -32,12 +32,15 @@ def test_every_field_reaches_its_step(lai, site):
     dem = fifesim.flint_hills(site.pad(1), seed=7)
     horizon = fifesim.horizon(fifesim.flint_hills(site.pad(40), seed=7))
     air = {"adjacency": True, "surroundings": 0.3}
-    setup = Setup(instrument="TM", dem=dem, horizon=horizon, **GROUND, **air, **SENSOR)
+    sky = fifesim.cloud_field(site, 0.8, seed=2, length=300, height=100, margin=500)
+    setup = Setup(instrument="TM", dem=dem, horizon=horizon, clouds=sky, **GROUND, **air, **SENSOR)
     rho = fifesim.surface_reflectance(lai, "TM", dem=dem, horizon=horizon, **GROUND)
     xr.testing.assert_identical(reflectance_of(setup, lai), rho)
-    image = fifesim.sense(fifesim.to_toa(rho, **air), "TM", **SENSOR)
+    cells = fifesim.cast_clouds(rho, sky, dem=dem)
+    assert cells.cloud.any()
+    image = fifesim.sense(fifesim.to_toa(rho, **air, clouds=cells), "TM", **SENSOR)
     xr.testing.assert_identical(image_of(setup, rho), image)
-    told = {"instrument", "dem", "horizon", *GROUND, *air, *SENSOR}
+    told = {"instrument", "dem", "horizon", "clouds", *GROUND, *air, *SENSOR}
     assert {field.name for field in fields(Setup)} - told == {"onto"}
 
 

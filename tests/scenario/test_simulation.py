@@ -297,3 +297,44 @@ def test_a_map_of_cover_is_read_and_shares_are_drawn(tmp_path):
     cover = fifesim.simulate(parse_scenario(drawn))["scene"]["cover"]
     # Some 600 patches: the share's standard error is about .02.
     assert 0.1 < float((cover == 2).mean()) < 0.3
+
+
+def test_clouds_of_a_scenario_are_those_of_its_key_and_the_truth_is_their_share():
+    sky = {"cloud_cover": 0.5, "length": "800 m", "base": 900.0, "top": 900.0, "seed": 4}
+    scenario = fifesim.Scenario(grid={"width": 1800, "height": 1800, "cell": 10}, terrain={"dem": "flat"})
+    clouded = fifesim.Scenario(grid=scenario.grid, terrain=scenario.terrain, clouds=sky)
+    clear, clouded = fifesim.simulate(scenario), fifesim.simulate(clouded)
+    grid = scenario.geobox()
+    field = fifesim.cloud_field(
+        grid, 0.5, length=800, height=900, seed=4, margin=600, time=scenario.complete().geometry.time
+    )
+    cells = clear["scene"]["surface_reflectance"].fifesim.cast_clouds(field)
+    for name in ("cloud", "shadow"):
+        expected = cells[name].fifesim.aggregate(30)
+        np.testing.assert_array_equal(clouded["truth"][name].values, expected.values)
+    hidden = cells.optical_thickness + cells.shadow_thickness + cells.overhead_thickness
+    # Footprints of TM reach two pixels.
+    far = (hidden.fifesim.aggregate(30).rolling(y=7, x=7, center=True).max() == 0).values
+    assert far.any()
+    np.testing.assert_array_equal(clouded["image"]["dn"].values[:, far], clear["image"]["dn"].values[:, far])
+    bright = cells.optical_thickness.fifesim.aggregate(30).values > 20
+    assert (clouded["image"]["dn"].values[0][bright] > 1.2 * clear["image"]["dn"].values[0].max()).mean() > 0.5
+    with pytest.raises(ValueError, match="base = 2000 is above top = 1000"):
+        fifesim.Scenario(clouds={"cloud_cover": 0.1, "base": 2000, "top": 1000})
+
+
+def test_sensors_see_the_same_sky():
+    """0.2 points of the cloud fraction: pixels of MSI, TM, OLI, MODIS and AVHRR, each aggregated to about 1 km."""
+    grid = fifesim.fife_site(10, window=((0, 800), (0, 800)))
+    lai = fifesim.lai_scene(grid, seed=7, chunks="auto")
+    sky = fifesim.cloud_field(grid, 0.4, seed=8, margin=900)
+    cells = lai.fifesim.cast_clouds(sky)
+    whole = {
+        size: cells.cloud.isel(y=slice(0, 660), x=slice(0, 660)).fifesim.aggregate(size) for size in (10, 30, 1100)
+    }
+    fractions = [float(each.fifesim.aggregate(1100).mean()) for each in whole.values()]
+    assert np.ptp(fractions) < 0.002
+    images = lai.fifesim.compare(["TM", "OLI"], fifesim.Setup(clouds=sky, quantise=False))
+    red = [images[name]["toa_radiance"].isel(band=0).values.ravel() for name in ("TM", "OLI")]
+    # The blur differs, the sky does not.
+    assert np.corrcoef(*(each[np.isfinite(sum(red))] for each in red))[0, 1] > 0.97
