@@ -66,7 +66,7 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
     def means(rasters):
         return aggregate(rasters, scenario.sensor.size, min_valid=setup.min_valid)
 
-    setup = replace(setup, clouds=sky_of(scenario, ground, chunks))
+    setup = replace(setup, clouds=clouds_of(scenario, ground, chunks))
     dem, horizon, reach = elevation(scenario, ground, chunks)
     land = ground_scene(scenario, ground, chunks, dem)
     level, scene = reflectance_of(setup, land), land.isel(inside)
@@ -91,7 +91,7 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
     return tree
 
 
-def sky_of(scenario, grid, chunks="auto"):
+def clouds_of(scenario, grid, chunks="auto"):
     """Cloud field of a scenario on a grid and within reach of it; None if the sky is clear."""
     own, geometry = scenario.clouds, scenario.sun_and_view()
     if own.cloud_cover == 0:
@@ -122,7 +122,7 @@ def setup_of(scenario):
         canopy=canopy_of(scenario),
         upwelling=scenario.terrain.upwelling,
         adjacency=scenario.atmosphere.adjacency,
-        clouds=sky_of(scenario, scenario.geobox()),
+        clouds=clouds_of(scenario, scenario.geobox()),
         onto=grids.aligned_grid(scenario.geobox(), own.size) if aligned else None,
         interval=None if aligned else own.interval,
         offset=tuple(own.offset),
