@@ -1,4 +1,4 @@
-"""Impossible scenarios, studies, distributions and sweeps of `data/scenario_mistakes.jsonl`."""
+"""Impossible scenarios, studies and inputs of experiments, from tables of JSON lines in `data`."""
 
 import json
 from pathlib import Path
@@ -10,9 +10,9 @@ def lines(name):
     return [json.loads(line) for line in text.splitlines()[1:]]
 
 
-def mistakes(*stages):
-    """Stage, values and beginning of the message of each mistake of some stages."""
-    return [each for each in lines("scenario_mistakes") if each[0] in stages]
+def mistakes(*stages, name="scenario_mistakes"):
+    """Stage, values and a part of the message of each mistake of some stages."""
+    return [each for each in lines(name) if each[0] in stages]
 
 
 def check_message(message, start):

@@ -32,7 +32,6 @@ from fifesim.ground.landscape.coarse_lattice import check_coarser
 from fifesim.ground.landscape.covariance import flat
 from fifesim.ground.terrain.slope import rise
 from fifesim.output.report import plus_minus
-from fifesim.output.stac import collection
 from fifesim.scenario.toml import full_path
 from fifesim.sensor.description.fields import key
 from fifesim.sensor.description.instruments import instrument
@@ -120,13 +119,6 @@ def test_rise_continues_past_a_missing_end():
 
 def test_standard_error_follows_its_number():
     assert plus_minus(0.25, 2) == " ± 0.25" and plus_minus(float("nan")) == ""
-
-
-def test_collection_covers_its_items():
-    one = {"id": "a", "bbox": [0.0, 1.0, 2.0, 3.0], "properties": {"datetime": "2022-06-01T10:00:00Z"}}
-    whole, linked = collection("trial", "Two scenes.", {"a/item.json": one})
-    assert whole["extent"]["spatial"]["bbox"] == [[0.0, 1.0, 2.0, 3.0]]
-    assert linked["a/item.json"]["links"][0]["href"] == "../collection.json"
 
 
 def test_names_of_the_quantity_pass():

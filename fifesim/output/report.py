@@ -194,12 +194,6 @@ def histogram_figures(image, truth, detail):
     return figures
 
 
-def reflectance_change(dn, level, band):
-    """Planetary reflectance of an image minus the reflectance for level ground, dims (y, x). [1]"""
-    with_terrain, flat = (to_reflectance(each.sel(band=[band])) for each in (dn, level))
-    return (with_terrain - flat).isel(band=0)
-
-
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
 # Resolution of figures, twice the displayed resolution. [dots per inch]
 _DPI = 200
@@ -375,7 +369,8 @@ def _terrain_maps(image, terrain, level):
     """Maps of elevation, slope, Kt, and the difference of the image from level ground."""
     band = str(image["dn"]["band"].values[-1])
     dn = image["dn"].sel(y=level["y"], x=level["x"]).compute()
-    change = reflectance_change(dn, level, band)
+    with_terrain, flat = (to_reflectance(each.sel(band=[band])) for each in (dn, level))
+    change = (with_terrain - flat).isel(band=0)
     return [
         relief_map(terrain["dem"], f"{capital(axis_label('dem'))}, lit from the north-west"),
         value_map(terrain["slope"], f"{capital(axis_label('slope'))}, mean of the cells"),

@@ -74,11 +74,12 @@ def item(scenario, folder, title):
     }
 
 
-def collection(identifier, description, items):
-    """STAC collection, and its items with links to it, by path."""
+def write_collection(folder, identifier, description, items):
+    """Write a STAC collection, ``collection.json``, and its items by path, with links to each other."""
     boxes = np.array([each["bbox"] for each in items.values()])
     whole = [*boxes[:, :2].min(axis=0).tolist(), *boxes[:, 2:].max(axis=0).tolist()]
     starts, ends = zip(*(_times(each["properties"]) for each in items.values()), strict=True)
+    links = [_link("root", "./collection.json")]
     found = {
         "type": "Collection",
         "stac_version": VERSION,
@@ -86,22 +87,13 @@ def collection(identifier, description, items):
         "description": description,
         "license": "other",
         "extent": {"spatial": {"bbox": [whole]}, "temporal": {"interval": [[min(starts), max(ends)]]}},
-        "links": [_link("root", "./collection.json")]
-        + [_link("item", f"./{path}", "application/geo+json") for path in items],
+        "links": links + [_link("item", f"./{path}", "application/geo+json") for path in items],
     }
-    linked = {}
+    write_stac(found, folder / "collection.json")
     for path, each in items.items():
         up = "../" * path.count("/") + "collection.json"
         links = [_link(relation, up) for relation in ("collection", "parent", "root")]
-        linked[path] = each | {"collection": identifier, "links": links}
-    return found, linked
-
-
-def write_collection(folder, identifier, description, items):
-    """Write a collection, ``collection.json``, and its items."""
-    found, linked = collection(identifier, description, items)
-    for path, each in {"collection.json": found, **linked}.items():
-        write_stac(each, folder / path)
+        write_stac(each | {"collection": identifier, "links": links}, folder / path)
 
 
 def write_stac(thing, path):

@@ -1,6 +1,7 @@
 """What the nine scenarios share, and what each of them says."""
 
 import pytest
+from mistakes import mistakes
 
 from fifesim.experiments.friedl1995 import case
 from fifesim.experiments.friedl1995.case import ALIGNED, NATIVE, READINGS, Case, beside, case_of
@@ -28,19 +29,8 @@ def test_inputs_of_a_readers_own_are_in_the_scenario(folders):
     assert shares.ground.background_spectra == {"soil_dry": 0.4, "shade": 0.6} and not shares.ground.background
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"west": 600000.0}, "is not on the FIFE site"),
-        ({"cells": 50}, "at least 90, 10 pixels"),
-        ({"dem": "nowhere.tif"}, "a raster file of elevation"),
-        ({"sensor": "SuperDove"}, "smaller than a ground cell"),
-        ({"sensor": "NOPE"}, "unknown instrument"),
-        ({"reading": "mine"}, "must be one of native, aligned, narrow"),
-        ({"reading": "narrow", "sensor": "OLI"}, "for OLI use native, aligned, offset"),
-    ],
-)
-def test_what_cannot_be_is_refused_before_anything_is_computed(options, said):
+@pytest.mark.parametrize(("stage", "options", "said"), mistakes("case", name="experiment_mistakes"), ids=str)
+def test_what_cannot_be_is_refused_before_anything_is_computed(stage, options, said):
     with pytest.raises(ValueError, match=said):
         case_of(**options)
 
@@ -95,34 +85,16 @@ def test_optics_and_background_of_a_file(folders):
     assert case.background_of(None, BANDS) is None
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("band,leaf_reflectance,leaf_transmittance\nTM3,0.1,0.1\n", "no line for band TM4: it has TM3"),
-        ("band,reflectance\nTM3,0.1\n", "lacks the column leaf_reflectance and leaf_transmittance"),
-        ("band,leaf_reflectance,leaf_transmittance\nTM3,x,0.1\nTM4,0.4,0.4\n", "band 'TM3' has no number"),
-        ("band,leaf_reflectance,leaf_transmittance\nTM3,0.7,0.4\nTM4,0.4,0.4\n", "add up to more than 1"),
-        ("", "optics file mine.csv"),
-    ],
-)
-def test_optics_that_are_not_right_are_one_line(tmp_path, text, said):
+@pytest.mark.parametrize(("stage", "text", "said"), mistakes("optics", name="experiment_mistakes"), ids=str)
+def test_optics_that_are_not_right_are_one_line(tmp_path, stage, text, said):
     (tmp_path / "mine.csv").write_text(text)
     with pytest.raises(ValueError, match=said) as told:
         case.optics_by_band(tmp_path / "mine.csv", BANDS, case.OPTICS, "optics")
     assert "\n" not in str(told.value) and len(str(told.value)) < 500
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ("nofile.csv", "there is no background file nofile.csv"),
-        ("soil:0.5+shade:0.5", "no spectrum 'soil'"),
-        ("soil_dry:half", "type shares such as"),
-        ({"TM3": 0.1}, "no line for band TM4"),
-        ({"TM3": 0.1, "TM4": 1.5}, "must be in"),
-    ],
-)
-def test_background_that_is_not_right_is_named(given, said):
+@pytest.mark.parametrize(("stage", "given", "said"), mistakes("background", name="experiment_mistakes"), ids=str)
+def test_background_that_is_not_right_is_named(stage, given, said):
     with pytest.raises(ValueError, match=said):
         case.background_of(given, BANDS)
 

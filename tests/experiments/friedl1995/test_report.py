@@ -5,6 +5,7 @@ import re
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
+from mistakes import mistakes
 from typer.testing import CliRunner
 
 from fifesim.cli import app
@@ -171,21 +172,8 @@ def given(folders):
     return [word for name, path in folders.items() for word in (f"--{name}", str(path))]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--cells", 50), "at least 90, 10 pixels"),
-        (("--realisations", 0), "at least 1"),
-        (("--seed", -1), "seed must be"),
-        (("--reading", "mine"), "must be one of native, aligned"),
-        (("--densities", "."), "lacks a file of burned-grazed and"),
-        (("--optics", "mine.csv"), "there is no optics file mine.csv"),
-        (("--sensor", "OLI", "--background", "soil.csv"), "no background file soil.csv"),
-        (("--sensor", "NOPE"), "unknown instrument"),
-        (("--dem", "hills.tif"), "a raster file of elevation"),
-    ],
-)
-def test_mistake_is_one_line_and_leaves_nothing(quick, tmp_path, arguments, said):
+@pytest.mark.parametrize(("stage", "arguments", "said"), mistakes("reproduce", name="experiment_mistakes"), ids=str)
+def test_mistake_is_one_line_and_leaves_nothing(quick, tmp_path, stage, arguments, said):
     result = quick("-o", "out", *arguments)
     assert result.exit_code == 2
     assert said in result.stderr and len(result.stderr.strip().splitlines()) == 1

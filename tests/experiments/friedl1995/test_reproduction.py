@@ -1,10 +1,12 @@
 """The experiment as one call."""
 
+import builtins
 import json
 
 import numpy as np
 import pytest
 import rasterio
+from mistakes import mistakes
 from scipy import stats
 
 import fifesim
@@ -46,19 +48,9 @@ def test_relief_another_sensor_and_another_seed_change_the_numbers(small):
     assert case_of(sensor="OLI").drift < 0.1 < case_of().drift
 
 
-@pytest.mark.parametrize(
-    ("options", "error", "said"),
-    [
-        ({"realisations": 0}, ValueError, "realisations must be at least 1"),
-        ({"seed": -1}, ValueError, "seed must be"),
-        ({"dem": 3}, TypeError, "dem must be 'flat', 'flint-hills'"),
-        ({"densities": 4}, TypeError, "densities must be a folder"),
-        ({"optics": {"TM3": (0.07, 0.04)}}, ValueError, "no line for band TM4"),
-        ({"reading": "mine"}, ValueError, "reading must be one of native"),
-    ],
-)
-def test_mistake_is_told_by_its_name(options, error, said):
-    with pytest.raises(error, match=said):
+@pytest.mark.parametrize(("error", "options", "said"), mistakes("ValueError", "TypeError", name="experiment_mistakes"))
+def test_mistake_is_told_by_its_name(error, options, said):
+    with pytest.raises(getattr(builtins, error), match=said):
         fifesim.reproduce(**options)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from mistakes import mistakes
 from typer.testing import CliRunner
 
 from fifesim.cli import app
@@ -86,17 +87,9 @@ def test_one_realisation_has_no_error(command, tmp_path):
     assert "nan" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8").split("base64")[0]
 
 
-@pytest.mark.parametrize(
-    ("text", "arguments", "said"),
-    [
-        ("", ("--realisations", 0), "realisations must be at least 1, got 0"),
-        ("", ("--cells", 50), "holds 5 x 5 pixels of 30 m"),
-        ("[sensor]\nbands = ['TM3']", (), "no near infrared band"),
-        ("[sensor]\noffset = 3.0", (), "sensor.offset"),
-        ("[sensor]\ninstrument = 'AVHRR'\nbands = ['AVHRR1', 'AVHRR2']", (), "1 x 1 pixels of 1100 m"),
-    ],
-)
-def test_mistake_is_one_line_and_leaves_nothing(command, tmp_path, text, arguments, said):
+@pytest.mark.parametrize(("stage", "given", "said"), mistakes("budget", name="experiment_mistakes"), ids=str)
+def test_mistake_is_one_line_and_leaves_nothing(command, tmp_path, stage, given, said):
+    text, *arguments = given
     (tmp_path / "wrong.toml").write_text(text)
     result = command("wrong.toml", "-o", "out", *arguments)
     assert result.exit_code == 2
