@@ -8,6 +8,8 @@ S2A_MSIL2A_20221005T115411_N0400_R023_T29UNU_20221005T164454 (ESA); the images a
 
 import json
 import re
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import rasterio
@@ -18,64 +20,10 @@ from fifesim.grids import grid as grids
 
 SHAPE = 12, 18
 
-TM = {
-    "product": "LT05_L1TP_058014_20110312_20200823_02_T1",
-    "image": {
-        "SPACECRAFT_ID": "LANDSAT_5",
-        "SENSOR_ID": "TM",
-        "DATE_ACQUIRED": "2011-03-12",
-        "SCENE_CENTER_TIME": "19:54:32.6950560Z",
-        "SUN_AZIMUTH": "165.60131631",
-        "SUN_ELEVATION": "20.49968487",
-        "EARTH_SUN_DISTANCE": "0.9936974",
-    },
-    "crs": "EPSG:32609",
-    "corner": (339300.0, 7392900.0),
-    "dtype": "uint8",
-    "thermal": ["6"],
-    # By band: radiance and reflectance, largest and smallest, then reflectance of a count and of 0.
-    "bands": {
-        "1": (193.000, -1.520, 0.307978, -0.002426, 1.2221e-03, -0.003648),
-        "2": (365.000, -2.840, 0.643703, -0.005009, 2.5540e-03, -0.007563),
-        "3": (264.000, -1.170, 0.549637, -0.002436, 2.1735e-03, -0.004609),
-        "4": (221.000, -1.510, 0.663667, -0.004535, 2.6307e-03, -0.007165),
-        "5": (30.200, -0.370, 0.446965, -0.005476, 1.7813e-03, -0.007257),
-        "7": (16.500, -0.150, 0.622385, -0.005658, 2.4726e-03, -0.008131),
-    },
-}
-
-OLI = {
-    "product": "LC08_L1TP_047027_20201204_20210313_02_T1",
-    "image": {
-        "SPACECRAFT_ID": "LANDSAT_8",
-        "SENSOR_ID": "OLI_TIRS",
-        "NADIR_OFFNADIR": "NADIR",
-        "DATE_ACQUIRED": "2020-12-04",
-        "SCENE_CENTER_TIME": "19:02:11.1944860Z",
-        "ROLL_ANGLE": "-0.001",
-        "SUN_AZIMUTH": "164.91405951",
-        "SUN_ELEVATION": "18.80722985",
-        "EARTH_SUN_DISTANCE": "0.9854607",
-    },
-    "crs": "EPSG:32610",
-    "corner": (353700.0, 5374200.0),
-    "dtype": "uint16",
-    "thermal": ["10", "11"],
-    "bands": {
-        number: (*radiance, 1.210700, -0.099980, 2.0e-5, -0.1)
-        for number, radiance in {
-            "1": (782.65582, -64.63197),
-            "2": (801.44910, -66.18393),
-            "3": (738.52850, -60.98792),
-            "4": (622.76880, -51.42845),
-            "5": (381.10345, -31.47165),
-            "6": (94.77696, -7.82671),
-            "7": (31.94491, -2.63802),
-            "8": (704.80292, -58.20285),
-            "9": (148.94388, -12.29983),
-        }.items()
-    },
-}
+DATA = Path(__file__).parent / "data" / "products"
+NUMBERS = tomllib.loads((DATA / "products.toml").read_text(encoding="utf-8"))
+TM, OLI = (NUMBERS[name] | {"corner": tuple(NUMBERS[name]["corner"])} for name in ("TM", "OLI"))
+MEAN_VIEWS = {number: tuple(angles) for number, angles in NUMBERS["MEAN_VIEWS"].items()}
 
 
 def digital_numbers(kind, number, shape=SHAPE):
@@ -245,9 +193,8 @@ def landsat(folder, kind, level=1, form="txt", groups=None):
     return files
 
 
-_SOLAR = (1884.69, 1959.66, 1823.24, 1512.06, 1424.64, 1287.61, 1162.08, 1041.63, 955.32, 812.92, 367.15, 245.59, 85.25)
-_BANDS = ("B1", "B2", "B3", "B4", "B5", "B6", "B7", "B8", "B8A", "B9", "B10", "B11", "B12")
-_SIZES = (60, 10, 10, 10, 20, 20, 20, 10, 20, 60, 60, 20, 20)
+_BANDS = tuple(NUMBERS["SENTINEL2"])
+_SIZES, _SOLAR = zip(*NUMBERS["SENTINEL2"].values(), strict=True)
 
 # By level: product, granule and image.
 SENTINEL2 = {
@@ -315,42 +262,10 @@ def product_xml(level, baseline, spacecraft="Sentinel-2A", offset=-1000, granule
         "</Spectral_Information>\n"
         for k, (band, size) in enumerate(zip(_BANDS, _SIZES, strict=True))
     )
-    return f"""<?xml version="1.0" encoding="UTF-8" standalone="no"?>
-<n1:{kind}_User_Product xmlns:n1="https://psd-14.sentinel2.eo.esa.int/PSD/User_Product_{kind}.xsd">
-    <n1:General_Info>
-        <Product_Info>
-            <PRODUCT_URI>{name}.SAFE</PRODUCT_URI>
-            <PROCESSING_LEVEL>{kind}</PROCESSING_LEVEL>
-            <PROCESSING_BASELINE>{baseline}</PROCESSING_BASELINE>
-            <Datatake datatakeIdentifier="GS2A_20210908T042701_032448_N03.01">
-                <SPACECRAFT_NAME>{spacecraft}</SPACECRAFT_NAME>
-                <SENSING_ORBIT_DIRECTION>DESCENDING</SENSING_ORBIT_DIRECTION>
-            </Datatake>
-            <Product_Organisation>
-{listed}            </Product_Organisation>
-        </Product_Info>
-        <Product_Image_Characteristics>
-            <Special_Values>
-                <SPECIAL_VALUE_TEXT>NODATA</SPECIAL_VALUE_TEXT>
-                <SPECIAL_VALUE_INDEX>0</SPECIAL_VALUE_INDEX>
-            </Special_Values>
-            <Special_Values>
-                <SPECIAL_VALUE_TEXT>SATURATED</SPECIAL_VALUE_TEXT>
-                <SPECIAL_VALUE_INDEX>65535</SPECIAL_VALUE_INDEX>
-            </Special_Values>
-            {quantification}
-            {offsets}
-            <Reflectance_Conversion>
-                <U>{U}</U>
-                <Solar_Irradiance_List>
-{solar}                </Solar_Irradiance_List>
-            </Reflectance_Conversion>
-            <Spectral_Information_List>
-{spectral}            </Spectral_Information_List>
-        </Product_Image_Characteristics>
-    </n1:General_Info>
-</n1:{kind}_User_Product>
-"""
+    return (DATA / "MTD.xml").read_text(encoding="utf-8").format(
+        kind=kind, name=name, baseline=baseline, spacecraft=spacecraft, listed=listed, quantification=quantification,
+        offsets=offsets, u=U, solar=solar, spectral=spectral,
+    )  # fmt: skip
 
 
 def sun_grid():
@@ -375,23 +290,6 @@ def _values(grid):
     return f"{steps}<Values_List>\n{rows}</Values_List>\n"
 
 
-MEAN_VIEWS = {
-    "1": (9.15788418738189, 288.982250210564),
-    "0": (9.32691441309293, 290.548502307998),
-    "2": (9.18042027119417, 289.322659181282),
-    "11": (9.2518326546145, 289.925196797726),
-    "8": (9.29720722278376, 290.404528980152),
-    "12": (9.31372831482695, 290.387034371828),
-    "4": (9.23175466895102, 289.841086423314),
-    "7": (9.16802328443828, 289.152280231504),
-    "5": (9.25275280222894, 290.023792446257),
-    "6": (9.27186704990764, 290.220346776653),
-    "9": (9.35169900667466, 290.738701553191),
-    "3": (9.21309289311719, 289.672012506847),
-    "10": (9.19979381184165, 289.494893154363),
-}
-
-
 def tile_xml(level):
     """MTD_TL.xml."""
     zenith, azimuth = sun_grid()
@@ -407,38 +305,7 @@ def tile_xml(level):
         for k, (z, a) in MEAN_VIEWS.items()
     )
     kind = "Level-1C" if level == 1 else "Level-2A"
-    return f"""<?xml version="1.0" encoding="UTF-8" standalone="no"?>
-<n1:{kind}_Tile_ID xmlns:n1="https://psd-14.sentinel2.eo.esa.int/PSD/S2_PDI_{kind}_Tile_Metadata.xsd">
-  <n1:General_Info>
-    <TILE_ID metadataLevel="Brief">S2A_OPER_MSI_TL_ATOS_20221005T164454_A038058_T29UNU_N04.00</TILE_ID>
-    <SENSING_TIME metadataLevel="Standard">2022-10-05T11:56:49.581767Z</SENSING_TIME>
-  </n1:General_Info>
-  <n1:Geometric_Info>
-    <Tile_Geocoding metadataLevel="Brief">
-      <HORIZONTAL_CS_CODE>EPSG:32629</HORIZONTAL_CS_CODE>
-      <Geoposition resolution="10">
-        <ULX>499980</ULX>
-        <ULY>5900040</ULY>
-        <XDIM>10</XDIM>
-        <YDIM>-10</YDIM>
-      </Geoposition>
-    </Tile_Geocoding>
-    <Tile_Angles metadataLevel="Standard">
-      <Sun_Angles_Grid>
-{sun}
-      </Sun_Angles_Grid>
-      <Mean_Sun_Angle>
-        <ZENITH_ANGLE unit="deg">57.820574357679</ZENITH_ANGLE>
-        <AZIMUTH_ANGLE unit="deg">172.840206897213</AZIMUTH_ANGLE>
-      </Mean_Sun_Angle>
-{views}
-      <Mean_Viewing_Incidence_Angle_List>
-{means}
-      </Mean_Viewing_Incidence_Angle_List>
-    </Tile_Angles>
-  </n1:Geometric_Info>
-</n1:{kind}_Tile_ID>
-"""
+    return (DATA / "MTD_TL.xml").read_text(encoding="utf-8").format(kind=kind, sun=sun, views=views, means=means)
 
 
 def sentinel2(folder, level=1, baseline="04.00", width=120, **options):
