@@ -1,6 +1,7 @@
 """Scans on labelled rasters: view angles, light of the view, images by line and sample, and sweeps."""
 
 from dataclasses import replace
+from functools import cache
 
 import dask.array as da
 import numpy as np
@@ -272,6 +273,7 @@ def test_lines_and_samples_are_all_those_whose_centres_lie_in_the_scene():
         np.testing.assert_array_equal(image[name], within)
 
 
+@cache
 def lit(reflectance=(0.05, 0.4)):
     """A uniform ground seen as the scan sees it, in Track's own directions."""
     grid = grids.geobox(scene((60, 66)))
@@ -279,12 +281,13 @@ def lit(reflectance=(0.05, 0.4)):
     ground = grids.place(ground.assign_coords(band=["TM3", "TM4"]), grid)
     away = {"nadir_offset": -60e3, "heading": 193.6}
     view = fifesim.scan_geometry("TM", grid, **away).assign(sza=30.0, saa=120.0)
-    return fifesim.to_toa(ground, fifesim.Atmosphere(), geometry=view, instrument="TM"), away
+    toa = fifesim.to_toa(ground, fifesim.Atmosphere(), geometry=view, instrument="TM")
+    return toa, away, fifesim.sense_swath(toa, "TM", **away)
 
 
 def test_a_scan_goes_back_to_the_ground_that_it_was_made_of():
     """Through radiance, planetary reflectance and air, in the scan's own directions: what was put in comes out."""
-    toa, away = lit()
+    toa, away, _ = lit()
     image = fifesim.sense_swath(toa, "TM", quantise=False, **away)
     surface = image.fifesim.to_surface()
     assert surface.dims == ("band", "line", "sample") and surface.name == "surface_reflectance"
@@ -301,8 +304,7 @@ def test_a_scan_goes_back_to_the_ground_that_it_was_made_of():
 
 
 def test_verbs_of_a_lazy_scan_are_lazy_and_the_same():
-    toa, away = lit()
-    image = fifesim.sense_swath(toa, "TM", **away)
+    *_, image = lit()
     fit = Regression(3.0, -0.5, 0.9, 100, 0.1, 0.5, 10.0)
     for verb in (fifesim.to_radiance, fifesim.to_surface, lambda array: fifesim.index(array, "EVI2"),
                  lambda array: fifesim.invert(fifesim.ndvi(array), fit)["lai"]):  # fmt: skip
@@ -313,8 +315,7 @@ def test_verbs_of_a_lazy_scan_are_lazy_and_the_same():
 
 
 def test_what_takes_maps_names_the_way_to_one(tmp_path):
-    toa, away = lit()
-    image = fifesim.sense_swath(toa, "TM", **away)
+    toa, _, image = lit()
     ndvi = image.fifesim.ndvi()
     with pytest.raises(ValueError, match=r"\.fifesim\.grid_swath\(grid\)"):
         fifesim.regress(ndvi, ndvi)
@@ -326,7 +327,7 @@ def test_what_takes_maps_names_the_way_to_one(tmp_path):
 
 
 def test_sun_that_varies_over_the_scene_is_that_of_each_pixel():
-    toa, away = lit()
+    toa, away, _ = lit()
     angles = np.linspace(20.0, 40.0, 66)
     varied = toa.assign_coords(sza=(("y", "x"), np.broadcast_to(angles, (60, 66)), cf.attributes("sza")))
     image = fifesim.sense_swath(varied, "TM", quantise=False, **away)
@@ -336,8 +337,7 @@ def test_sun_that_varies_over_the_scene_is_that_of_each_pixel():
 
 
 def test_a_scan_is_written_as_netcdf_and_read_again(tmp_path):
-    toa, away = lit()
-    image = fifesim.sense_swath(toa, "TM", **away)
+    *_, image = lit()
     image.to_netcdf(tmp_path / "scan.nc")
     with xr.open_dataarray(tmp_path / "scan.nc", decode_coords="all", mask_and_scale=False) as back:
         xr.testing.assert_equal(back, image)
@@ -349,7 +349,7 @@ def test_a_scan_is_written_as_netcdf_and_read_again(tmp_path):
 
 
 def test_what_lies_on_a_map_is_not_spread_over_a_scan():
-    toa, away = lit()
+    toa, away, _ = lit()
     image = fifesim.sense_swath(toa, "TM", quantise=False, **away)
     height = toa.isel(band=0, drop=True).drop_vars(["vza", "vaa"]).drop_attrs() * 0 + 400
     for option in ({"elevation": height}, {"adjacency": True}):
@@ -379,9 +379,10 @@ def wide_scene(name, values=plane):
     return directions.with_geometry(grids.place(array, GRID), Geometry(40.0, 120.0))
 
 
-def swept(name, angle, values=plane, **options):
+@cache
+def swept(name, angle):
     view = {"nadir_offset": OFFSETS[name][angle], "heading": 180.0, "view_tolerance": 180, "min_valid": 0.0}
-    return fifesim.sense_swath(wide_scene(name, values), name, quantise=False, **view, **options)
+    return fifesim.sense_swath(wide_scene(name), name, quantise=False, **view)
 
 
 def scan_angle_of(image, name):

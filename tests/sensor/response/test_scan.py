@@ -317,6 +317,7 @@ def test_blur_of_viirs_is_that_of_one_sample_before_aggregation(name, sample):
         found = float(item.line_spreads(band, count).across.mtf(0.5 / (count * step)))
         assert found == pytest.approx(expected, rel=1e-6)
     spread = item.line_spreads(band)
+    assert spread == item.line_spreads(band, 3) != item.line_spreads(band, 2), "three samples at nadir"
     assert float(spread.along.mtf(0.5 / item.ground_intervals(band).along)) == pytest.approx(0.42, rel=1e-9)
 
 
