@@ -102,6 +102,7 @@ def test_groups_are_scored_one_by_one(estimate, truth):
     xr.testing.assert_allclose(found.isel(cover=0, drop=True), west, rtol=1e-12)
     bins = estimate.fifesim.score(truth, [0, 1, 2, 5])
     assert bins.lai_bin.values.tolist() == [0.5, 1.5, 3.5]
+    assert estimate.fifesim.score(truth, [-9, 9]).lai_bin.values.tolist() == [0.0]
     inside = ((truth >= 1) & (truth < 2)).values
     assert int(bins.n[1]) == inside.sum()
     assert float(bins.bias[1]) == pytest.approx(float((estimate["lai"] - truth).values[inside].mean()), rel=1e-12)
@@ -165,6 +166,8 @@ def test_maps_are_paired_by_their_places(lai):
     assert float(found.coverage.sel(level=0.9)) == pytest.approx(float(old.coverage), rel=1e-12)
     part = in_chunks(true[1:], {"y": 2, "x": 3})
     assert int(estimate.fifesim.score(part).n) < int(found.n)
+    with pytest.raises(ValueError, match=r"has dimensions .*: select one"):
+        fifesim.score(true.expand_dims(member=2, model=3), true)
 
 
 @pytest.mark.parametrize(
@@ -178,6 +181,8 @@ def test_maps_are_paired_by_their_places(lai):
         (lambda given: given.isel(y=0), None, "of the estimate has dimensions"),
         (lambda given: given * np.nan, None, "no pixel has both"),
         (lambda given: given, [2, 1], "increasing edges"),
+        (lambda given: given, [2], "increasing edges"),
+        (lambda given: given.assign_coords(level=[0.0, 0.5, 0.8]), None, "level must be between 0 and 1, got .*0.0"),
         (lambda given: given, xr.DataArray([1, 2], dims="z"), "bring it onto its grid"),
     ],
 )

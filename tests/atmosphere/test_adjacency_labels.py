@@ -18,7 +18,7 @@ from fifesim.atmosphere import adjacency_labels as adjacency_raster
 from fifesim.atmosphere.coupling import BandTerms
 from fifesim.grids import grid as grids
 
-SIXS = pd.read_csv(Path(__file__).parents[2] / "data" / "sixs_adjacency.csv", comment="#")
+SIXS = pd.read_csv(Path(__file__).parents[1] / "data" / "sixs_adjacency.csv", comment="#")
 CRS = "EPSG:26914"
 
 

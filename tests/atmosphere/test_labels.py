@@ -1,4 +1,4 @@
-"""The atmosphere on rasters whose geometry, altitude or surroundings vary."""
+"""The atmosphere on labelled rasters, of one geometry and of varying ones, and its spectrum."""
 
 import dataclasses
 
@@ -8,8 +8,10 @@ import xarray as xr
 from lazy import check_raster_function, in_chunks
 
 import fifesim
-from fifesim.atmosphere import lookup
+from fifesim.atmosphere import coupling, engines, lookup
+from fifesim.atmosphere.engines import band_terms
 from fifesim.atmosphere.labels import surface_from_toa, toa_from_surface
+from fifesim.base.bands import Band
 from fifesim.base.geometry import ANGLES, Geometry
 from fifesim.grids import directions
 from fifesim.sensor.description.instruments import instrument
@@ -17,11 +19,57 @@ from fifesim.sensor.description.instruments import instrument
 AIR = fifesim.Atmosphere(visibility=23.0)
 SUN = Geometry(40.0, 120.0, 5.0, 200.0)
 BANDS = tuple(band.response for band in instrument("TM").select(["TM3", "TM4"]))
+TERMS = engines.band_terms(AIR, BANDS, SUN.sza, SUN.vza, SUN.raa)
+FACTORS = [
+    getattr(TERMS, name)[:, None, None]
+    for name in ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
+]
 
 
 @pytest.fixture
 def ground(lai_with_hole):
     return fifesim.surface_reflectance(lai_with_hole, bands=["TM3", "TM4"], atmosphere=AIR, geometry=SUN)
+
+
+def upward(array):
+    return toa_from_surface(array, AIR, BANDS, SUN)
+
+
+def downward(array):
+    return surface_from_toa(array, AIR, BANDS, SUN)
+
+
+def test_to_toa_keeps_its_word_and_equals_the_kernel(ground):
+    result = check_raster_function(upward, ground, quantity="toa_reflectance")
+    np.testing.assert_array_equal(result, coupling.apparent_reflectance(ground.values, *FACTORS))
+    np.testing.assert_array_equal(np.isnan(result), np.isnan(ground))
+    assert result["band"].values.tolist() == ["TM3", "TM4"]
+    assert "wavelength" in result.coords
+    assert directions.geometry_of(result) == SUN
+    assert fifesim.Atmosphere.parse(result.attrs["atmosphere"]) == AIR
+
+
+def test_to_surface_keeps_its_word_and_equals_the_kernel(ground):
+    toa = upward(ground)
+    result = check_raster_function(downward, toa, quantity="surface_reflectance")
+    np.testing.assert_array_equal(result, coupling.corrected_reflectance(toa.values, *FACTORS))
+
+
+def test_there_and_back_is_the_same(ground):
+    """Algebra in double precision: a few roundings of numbers below 1."""
+    np.testing.assert_allclose(downward(upward(ground)), ground, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(upward(downward(upward(ground))), upward(ground), rtol=0, atol=1e-12)
+
+
+def test_wrong_units_raise(ground):
+    for function in (upward, downward):
+        with pytest.raises(ValueError, match="has units 'percent'"):
+            function(ground.assign_attrs(units="percent"))
+    with pytest.raises(ValueError, match="surface_reflectance needs '1'"):
+        upward(ground.assign_attrs(units="W m-2 sr-1 um-1"))
+
+
+# ------------------------------------------------------------------------------------------ varying geometry
 
 
 def ramp(ground, low, high):
@@ -68,12 +116,13 @@ def test_a_raster_of_one_value_is_that_value(ground):
     )
 
 
-def test_carried_angles_are_used(ground, swath):
-    toa = toa_from_surface(ground, AIR, BANDS, swath)
-    np.testing.assert_allclose(toa.fifesim.to_surface(), ground, rtol=0, atol=1e-12)
-
-
 def test_swath_and_relief_there_and_back(ground, swath):
+    """Also by the angles and the instrument that the image carries."""
+    np.testing.assert_allclose(
+        toa_from_surface(ground, AIR, BANDS, swath).fifesim.to_surface(), ground, rtol=0, atol=1e-12
+    )
+    bare = ground.drop_attrs(deep=False).assign_attrs(units="1").fifesim.to_toa(AIR, geometry=SUN, instrument="TM")
+    np.testing.assert_allclose(bare.fifesim.to_surface(), ground, rtol=0, atol=1e-12)
     relief = ramp(ground, 0.0, 900.0).assign_attrs(units="m")
     toa = toa_from_surface(ground, AIR, BANDS, swath, elevation=relief)
     np.testing.assert_allclose(surface_from_toa(toa, AIR, BANDS, swath, elevation=relief), ground, rtol=0, atol=1e-12)
@@ -104,23 +153,11 @@ def test_adjacency_keeps_its_word_and_leads_back(ground):
     np.testing.assert_allclose(back, ground, rtol=0, atol=1e-4)
 
 
-def test_bright_surroundings_brighten(ground):
-    dark, bright = (toa_from_surface(ground, AIR, BANDS, SUN, adjacency=True, surroundings=rho) for rho in (0.05, 0.5))
-    assert bool((bright > dark).where(ground.notnull(), True).all())
-
-
-@pytest.mark.parametrize(
-    "options, message",
-    [
-        ({"surroundings": 0.2}, "surroundings have an effect only with adjacency=True"),
-        ({"adjacency": True, "elevation": True}, "adjacency needs a single geometry and altitude, got elevation"),
-    ],
-)
-def test_options_that_do_not_go_together_are_named(ground, options, message):
-    if "elevation" in options:
-        options = options | {"elevation": ramp(ground, 0, 100)}
-    with pytest.raises(ValueError, match=message):
-        toa_from_surface(ground, AIR, BANDS, SUN, **options)
+def test_options_that_do_not_go_together_are_named(ground):
+    with pytest.raises(ValueError, match="surroundings have an effect only with adjacency=True"):
+        toa_from_surface(ground, AIR, BANDS, SUN, surroundings=0.2)
+    with pytest.raises(ValueError, match="adjacency needs a single geometry and altitude, got elevation"):
+        toa_from_surface(ground, AIR, BANDS, SUN, adjacency=True, elevation=ramp(ground, 0, 100))
 
 
 def test_swath_needs_a_table(ground, swath):
@@ -141,7 +178,36 @@ def test_angles_in_radians_are_refused(ground, swath):
         ground.fifesim.to_toa(AIR, geometry=radians)
 
 
-def test_instrument_that_is_given_is_carried(ground):
-    bare = ground.drop_attrs(deep=False).assign_attrs(units="1")
-    toa = bare.fifesim.to_toa(AIR, geometry=SUN, instrument="TM")
-    np.testing.assert_allclose(toa.fifesim.to_surface(), ground, rtol=0, atol=1e-12)
+# ------------------------------------------------------------------------------------------ spectrum
+
+
+def test_spectrum_is_what_narrow_bands_see():
+    """A band of one step between the knots of the gas table's curves has the terms of its wavelength."""
+    spectrum = fifesim.atmosphere.spectrum(geometry=SUN)
+    for centre in (0.45, 0.65, 0.86, 1.65):
+        band = Band("narrow", (centre - 0.0025, centre, centre + 0.0025), (0, 1, 0))
+        terms = band_terms(fifesim.Atmosphere(), [band], SUN.sza, SUN.vza, SUN.raa)
+        at = spectrum.sel(wavelength=centre, method="nearest")
+        for name in ("transmittance_down", "transmittance_up", "spherical_albedo", "direct_transmittance_up"):
+            assert float(at[name]) == pytest.approx(getattr(terms, name)[0], rel=1e-4)
+
+
+def test_depths_add_up():
+    spectrum = fifesim.atmosphere.spectrum(geometry=SUN)
+    depth = spectrum["molecules_optical_depth"] + spectrum["aerosol_optical_depth"]
+    # Interpolated between the aerosol's wavelengths in one and not in the other.
+    np.testing.assert_allclose(spectrum["direct_transmittance_up"], np.exp(-depth / SUN.mu_v), rtol=2e-3)
+    np.testing.assert_allclose(spectrum["gas_transmittance"], spectrum["transmittance_of_gas"].prod("gas"), rtol=1e-12)
+
+
+def test_everything_has_a_name_and_a_unit():
+    spectrum = fifesim.atmosphere.spectrum()
+    for variable in spectrum.data_vars.values():
+        assert {"long_name", "units"} <= set(variable.attrs)
+    assert spectrum["wavelength"].attrs["units"] == "um"
+    assert fifesim.Atmosphere.parse(spectrum.attrs["atmosphere"]) == fifesim.Atmosphere()
+
+
+def test_bands_only_engine_is_named():
+    with pytest.raises(ValueError, match="engine must be one of 5S, successive-orders"):
+        fifesim.atmosphere.spectrum(fifesim.Atmosphere(engine="6S"))

@@ -1,3 +1,5 @@
+"""6S as an engine, beside its own output."""
+
 import re
 import subprocess
 import sys
@@ -31,7 +33,7 @@ def reason_not_to_run():
 if reason := reason_not_to_run():
     pytest.skip(reason, allow_module_level=True)
 
-DATA = Path(__file__).parents[2] / "data"
+DATA = Path(__file__).parents[1] / "data"
 FIFE = pd.read_csv(DATA / "sixs_fife.csv", comment="#")
 GRID = pd.read_csv(DATA / "sixs_grid.csv", comment="#")
 RESPONSES = RSR_reader("Landsat-5", "TM")

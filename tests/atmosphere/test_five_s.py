@@ -1,3 +1,5 @@
+"""The closed forms of 5S, one by one and put together."""
+
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +13,16 @@ from fifesim.atmosphere.five_s import (
     conservative_spherical_albedo,
     conservative_transmittance,
     delta_eddington,
+    five_s_scattering,
     sobolev_conservative_reflectance,
     sobolev_reflectance,
     spherical_albedo,
 )
 from fifesim.atmosphere.gases import rayleigh_phase
+from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.geometry import scattering_angle_cosine
 
-SIXS = pd.read_csv(Path(__file__).parents[2] / "data" / "sixs_grid.csv", comment="#")
+SIXS = pd.read_csv(Path(__file__).parents[1] / "data" / "sixs_grid.csv", comment="#")
 MU_S, MU_V = (np.cos(np.radians(SIXS[name].to_numpy())) for name in ("sza", "vza"))
 COSINE = scattering_angle_cosine(SIXS["sza"], SIXS["vza"], SIXS["raa"]).to_numpy()
 WAVELENGTH = SIXS["wavelength"].to_numpy()
@@ -92,11 +96,6 @@ def test_removable_pole_is_smooth():
     assert around[1] == pytest.approx((around[0] + around[2]) / 2, rel=1e-6)
 
 
-def test_sobolev_is_reciprocal_for_molecules():
-    forth = sobolev_conservative_reflectance(0.2, 1.1, 0.5, 0.9)
-    assert forth == pytest.approx(sobolev_conservative_reflectance(0.2, 1.1, 0.9, 0.5), rel=1e-13)
-
-
 def test_rayleigh_terms_agree_with_6s():
     """Scalar successive orders: Sobolev's reflectance is 1 % (near infrared) to 10 % (blue, slant view) low."""
     ours = sobolev_conservative_reflectance(TAU_R, rayleigh_phase(COSINE), MU_S, MU_V)[VISIBLE]
@@ -118,3 +117,51 @@ def test_aerosol_terms_agree_with_6s():
     np.testing.assert_allclose(transmittance, SIXS["aerosol_transmittance_down"], atol=2e-3)
     ours = spherical_albedo(TAU_A, ALBEDO, ASYMMETRY)
     np.testing.assert_allclose(ours, SIXS["aerosol_spherical_albedo"], atol=4e-3)
+
+
+# ------------------------------------------------------------------------------------------ together
+
+
+SPECTRUM = np.array([0.45, 0.65, 0.85, 1.65])
+SZA, VZA, RAA = 50.0, np.array([0.0, 35.0]), np.array([0.0, 90.0, 180.0])
+COS_S, COS_V = np.cos(np.radians(SZA)), np.cos(np.radians(VZA))[:, None, None]
+HAZE = Atmosphere(visibility=8.0)
+
+
+def scattering(atmosphere):
+    return five_s_scattering(atmosphere, SPECTRUM, SZA, VZA, RAA)
+
+
+def test_light_that_is_not_scattered_falls_off_with_the_depth():
+    light = scattering(HAZE)
+    depth = HAZE.rayleigh_optical_depth(SPECTRUM) + HAZE.aerosol_optical_depth(SPECTRUM)
+    np.testing.assert_allclose(light.optical_depth, depth, rtol=1e-14)
+    np.testing.assert_allclose(light.direct_transmittance_down, np.exp(-depth / COS_S), rtol=1e-14)
+    np.testing.assert_allclose(light.direct_transmittance_up, np.exp(-depth / COS_V), rtol=1e-14)
+
+
+def test_air_without_aerosol_has_the_molecules_alone():
+    light = scattering(Atmosphere(aerosol="none"))
+    np.testing.assert_array_equal(light.reflectance, light.molecules_reflectance)
+    np.testing.assert_allclose(light.diffuse_up_aerosol, 0, atol=1e-15)
+    np.testing.assert_allclose(
+        light.diffuse_up_molecules, light.transmittance_up - light.direct_transmittance_up, rtol=1e-12
+    )
+
+
+def test_molecules_and_aerosol_are_added_without_a_cross_term():
+    both, air = scattering(HAZE), scattering(Atmosphere(aerosol="none"))
+    assert np.all(both.reflectance > air.reflectance) and np.all(both.spherical_albedo > air.spherical_albedo)
+    np.testing.assert_array_equal(both.molecules_reflectance, air.molecules_reflectance)
+    ratio = both.transmittance_up / air.transmittance_up
+    tau = HAZE.aerosol_optical_depth(SPECTRUM)
+    np.testing.assert_allclose(both.diffuse_up_aerosol, ratio - np.exp(-tau / COS_V), rtol=1e-9)
+
+
+def test_sun_and_view_may_be_exchanged():
+    """The transmittance knows one angle."""
+    there, back = (
+        five_s_scattering(HAZE, SPECTRUM, sza, np.array([vza]), RAA) for sza, vza in ((20.0, 55.0), (55.0, 20.0))
+    )
+    np.testing.assert_allclose(there.transmittance_down, back.transmittance_up[0, 0], rtol=1e-14)
+    assert there.molecules_reflectance == pytest.approx(back.molecules_reflectance, rel=1e-12)

@@ -1,0 +1,107 @@
+"""Description of an atmosphere: amounts, text, mistakes and summary."""
+
+import numpy as np
+import pytest
+
+import fifesim
+from fifesim.atmosphere import ENGINES, mixtures, models
+from fifesim.atmosphere.models import Atmosphere, atmosphere_in_words
+
+
+def test_columns_are_the_published_ones():
+    """McClatchey et al. (1972): 2.93 g cm-2 and .319 cm-atm, last digit."""
+    atmosphere = Atmosphere(altitude=0)
+    assert atmosphere.water_vapour == pytest.approx(2.93, abs=0.005)
+    assert atmosphere.ozone == pytest.approx(0.319, abs=0.0006)
+    assert atmosphere.pressure == pytest.approx(1013, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "visibility, aot", [(5, 0.77998), (8, 0.51913), (10, 0.43208), (15, 0.31584), (23, 0.23472), (45, 0.15974)]
+)
+def test_visibility_gives_the_optical_thickness_of_6s(visibility, aot):
+    """The same number profiles: to the last digit."""
+    assert Atmosphere(visibility=visibility).aot == pytest.approx(aot, abs=5e-6)
+
+
+def test_text_reads_well():
+    assert Atmosphere().text == "profile=midlatitude-summer aerosol=continental visibility=45 km altitude=0.4 km"
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        ({"profile": "midlat_summer"}, r"profile must be one of .*'midlat_summer': type profile='midlatitude-sum"),
+        ({"profile": "standard"}, r"profile must be one of tropical, .*, us-1962, got 'standard'$"),
+        ({"aerosol": "continentl"}, r"aerosol must be one of .*, got 'continentl': type aerosol='continental'"),
+        ({"engine": "6s"}, "engine must be one of 5S, successive-orders, .*, got '6s': type engine='6S'"),
+        ({"visibility": 2}, r"visibility must be from 5 to 100 km, got 2$"),
+        ({"visibility": float("nan")}, r"visibility must be from 5 to 100 km, got nan"),
+        ({"altitude": 5}, r"altitude must be from 0 to 4 km, got 5"),
+        ({"altitude": 400}, "where that is metres, type altitude=0.4$"),
+        ({"visibility": 23e3}, "where that is metres, type visibility=23$"),
+        ({"h2o": -1}, "h2o must be from 0 to 10 g cm-2, got -1"),
+        ({"o3": 300}, "o3 must be from 0 to 1 cm-atm, got 300"),
+        ({"aot": -0.1}, "aot must be from 0 to 2 optical thickness at 0.55 um, got -0.1"),
+        ({"visibility": 23, "aot": 0.1}, r"give visibility or aot, not both: 23 km is an aot of 0\.2347, got 0\.1"),
+        ({"aerosol": "none", "aot": 0.1}, r"aot must be 0 without aerosol, got 0\.1"),
+    ],
+)
+def test_a_mistake_is_named(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        Atmosphere(**arguments)
+
+
+def test_text_where_a_number_or_another_form_belongs_is_refused():
+    with pytest.raises(TypeError, match=r"visibility must be a number from 5 to 100 \[km\], got '45'"):
+        Atmosphere(visibility="45")
+    with pytest.raises(ValueError, match="atmosphere must read like 'profile=midlatitude-summer"):
+        Atmosphere.parse("midlatitude summer, 45 km")
+
+
+def test_columns_of_the_user_scale_the_profile():
+    dry, own = Atmosphere(), Atmosphere(h2o=1.2, o3=0.4)
+    assert (own.water_vapour, own.ozone) == pytest.approx((1.2, 0.4), rel=1e-12)
+    ratio = own.levels.h2o / dry.levels.h2o
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-12)
+
+
+def test_amount_by_optical_thickness():
+    assert Atmosphere(aot=0.3).visibility is None
+    assert Atmosphere(aot=0.3).aerosol_optical_depth(np.array([0.55]))[0] == pytest.approx(0.3, rel=1e-6)
+    assert Atmosphere(aerosol="none").aot == 0
+
+
+@pytest.mark.parametrize(
+    "arguments", [{"aot": 0.25, "h2o": 2.5}, {"o3": 0.3, "engine": "successive-orders"}, {"aerosol": "none"}]
+)
+def test_text_tells_everything(arguments):
+    atmosphere = Atmosphere(**arguments)
+    assert Atmosphere.parse(atmosphere.text) == atmosphere
+
+
+def test_documentation_names_all_that_may_be_asked_for():
+    said = Atmosphere.__doc__
+    names = (*models.PROFILES, *mixtures.MODELS, *mixtures.COMPONENTS, *ENGINES)
+    assert [name for name in names if name not in said] == []
+
+
+# ------------------------------------------------------------------------------------------ summary
+
+
+def rows(atmosphere):
+    """Numbers of each row, by its name."""
+    lines = atmosphere_in_words(atmosphere).splitlines()[4:]
+    return {line[:31].strip(): np.array(line[31:].split(), float) for line in lines}
+
+
+@pytest.mark.parametrize("aerosol", ["continental", "none"])
+def test_rows_agree_with_each_other(aerosol):
+    """Four digits are printed, and means over a band of products are not products of means."""
+    found = rows(fifesim.Atmosphere(aerosol=aerosol))
+    depth = found["optical depth, molecules"] + found["optical depth, aerosol"]
+    np.testing.assert_allclose(found["transmittance, direct"], np.exp(-depth), atol=2e-3)
+    assert np.all(found["transmittance, with skylight"] > found["transmittance, direct"])
+    parts = np.minimum(found["transmittance, water vapour"], found["transmittance, ozone"])
+    assert np.all(found["transmittance, all gases"] <= parts)
+    assert np.all(found["optical depth, aerosol"] > 0) == (aerosol != "none")
