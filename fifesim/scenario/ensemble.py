@@ -1,4 +1,8 @@
-"""Many realisations of scenarios in memory. Small scenes are computed as plain arrays, without dask graphs."""
+"""
+Many realisations of scenarios in memory. Small scenes are computed as plain arrays, without dask graphs.
+
+A scene of 20 x 20 pixels takes 5 ms of processor time. `fifesim.simulate` in memory takes 25 ms for the same result.
+"""
 
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple

@@ -113,6 +113,8 @@ def test_the_spiral_goes_step_by_step_through_all_places():
     assert set(places) == set(itertools.product(range(-7, 8), repeat=2))
     steps = [abs(a - c) + abs(b - d) for (a, b), (c, d) in itertools.pairwise(places)]
     assert set(steps) == {1}
+    # A ring begins up its right side; chips that are larger than a tile lie in such rings, north above south.
+    assert [first_cell_of_chip(number, (13, 14), (0, 0), 10) for number in (0, 1, 2)] == [(0, 0), (0, 14), (-13, 14)]
 
 
 @pytest.mark.parametrize("size", [(4, 5), (3, 5), (10, 3), (13, 4)])
