@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import xarray as xr
 
 from fifesim.analysis import indices
-from fifesim.analysis.indices import date_of_maximum, values_of_date
+from fifesim.analysis.indices import date_of_maximum, date_of_median, values_of_date
 from fifesim.base.bands import BLUE, COMMON_NAMES, GREEN, NEAR_INFRARED, RED, SHORTWAVE_INFRARED, nearest_band
 from fifesim.base.geometry import ANGLES
 from fifesim.grids import cf, chunks, swaths
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import with_crs_of
+from fifesim.grids.inputs import MASKS_TOO
 
 # The kernel of each index, and the bands that it takes. Names are those of the spyndex catalogue.
 INDICES = {
@@ -86,38 +87,49 @@ def _wavelengths(reflectance):
     )
 
 
+_METHODS = ("maximum-value", "median", "nadir-most", "mean-of-clear")
 _REFERENCE = "Holben (1986), doi:10.1080/01431168608948945"
 
 
 def composite(
-    images: xr.DataArray, method: Literal["maximum-value"] = "maximum-value", *, by: xr.DataArray | None = None
+    images: xr.DataArray,
+    method: Literal["maximum-value", "median", "nadir-most", "mean-of-clear"] = "maximum-value",
+    *,
+    by: xr.DataArray | None = None,
+    clear: Annotated[xr.DataArray, MASKS_TOO] | None = None,
 ) -> xr.DataArray:
     """
-    Composite images of several dates by the maximum NDVI of each cell, which avoids clouds and haze.
+    Composite images of several dates, by default by the maximum NDVI of each cell, which avoids clouds and haze.
 
     Parameters
     ----------
     images : xarray.DataArray, dims (time, y, x) or (time, band, y, x)
         NDVI, or reflectance in bands with a coordinate ``wavelength``.
-    method : {"maximum-value"}, optional
+    method : {"maximum-value", "median", "nadir-most", "mean-of-clear"}, optional
+        The date of the largest NDVI, of the median NDVI (the lower of two), or of the smallest ``vza``; or the mean of
+        the clear dates.
     by : xarray.DataArray, dims (time, y, x), optional
-        Index whose maximum selects the date; by default the images if they have no bands, else their NDVI. It is
-        required unless the images are NDVI or reflectance.
+        Index whose maximum or median selects the date; by default the images if they have no bands, else their NDVI. It
+        is required unless the images are NDVI or reflectance.
+    clear : xarray.DataArray, dims (time, y, x), optional
+        True, or 1, where an image is clear; other pixels count as missing. "mean-of-clear" needs it.
 
     Returns
     -------
     composite : xarray.DataArray, dims (y, x) or (band, y, x)
         Values of the selected date; NaN if no date has data. Coordinates over (y, x) are ``date`` and, if they differ
-        between dates, the angles of sun and view. The distance to the sun is dropped. Lazy if the images are.
+        between dates, the angles of sun and view. A mean has ``dates`` instead, the number of clear dates. The distance
+        to the sun is dropped. Lazy if the images are.
 
     Raises
     ------
     ValueError
-        If there is no dimension time, the method is unknown, or ``by`` has other dates or cells.
+        If there is no dimension time, the method is unknown, ``by`` or ``clear`` has other dates or cells, or the
+        method needs views or clear dates that are not given.
 
     Notes
     -----
-    The maximum of noisy values is biased high: see `fifesim.analysis.indices.date_of_maximum`.
+    The maximum of noisy values is biased high: see `fifesim.analysis.indices.maximum_of_normals`.
 
     References
     ----------
@@ -140,8 +152,8 @@ def composite(
     >>> bool((best.date == dates[1])[1:-1, 1:-1].all())
     True
     """
-    if method != "maximum-value":
-        raise ValueError(f"method must be 'maximum-value', got {method!r}")
+    if method not in _METHODS:
+        raise ValueError(f"method must be one of {', '.join(map(repr, _METHODS))}, got {method!r}")
     if images.dtype.kind != "f" or cf.QUANTITIES["toa_radiance"].units == images.attrs.get("units"):
         raise ValueError(
             "a composite needs reflectance or NDVI, as digital numbers and radiance depend on the sun of each date: "
@@ -153,13 +165,26 @@ def composite(
             "xarray.concat([...], dim='time')"
         )
     grid = grids.geobox(images.isel(time=0))
-    index = _index(images) if by is None else _checked(by, images)
-    chosen = _along_time(date_of_maximum, index.drop_vars(list(index.coords)), dtype=np.int64)
+    if clear is not None:
+        clear = _checked(clear, images, "clear")
+        images = images.where(clear.drop_vars(list(clear.coords)) == 1)
     plain = images.drop_vars(list(images.coords))
-    out = _along_time(values_of_date, plain, chosen, dtype=images.dtype, missing=np.nan)
+    if method == "mean-of-clear":
+        if clear is None:
+            raise ValueError("mean-of-clear needs to know where the images are clear: give clear=, 1 where they are")
+        known = plain.isel(band=0) if "band" in plain.dims else plain
+        out, about = plain.mean("time"), {"dates": known.notnull().sum("time")}
+        about["dates"].attrs = {"long_name": "number of clear dates"}
+    else:
+        index = _nearness(images) if method == "nadir-most" else _index(images) if by is None else _checked(by, images)
+        index = index.drop_vars(list(index.coords))
+        index = index if clear is None else index.where(clear.drop_vars(list(clear.coords)) == 1)
+        chosen = _along_time(date_of_median if method == "median" else date_of_maximum, index, dtype=np.int64)
+        out = _along_time(values_of_date, plain, chosen, dtype=images.dtype, missing=np.nan)
+        about = _of_date(images, chosen)
     out = out.transpose(*(name for name in images.dims if name != "time"))
     kept = {name: value for name, value in images.coords.items() if not {"time", "y", "x"} & set(value.dims)}
-    out = grids.place(out.assign_coords(kept), grid).assign_coords(_of_date(images, chosen))
+    out = grids.place(out.assign_coords(kept), grid).assign_coords(about)
     history = f"composite: {method} of {images.sizes['time']} dates"
     out.attrs = dict(images.attrs) | {"composite": method, "references": _REFERENCE}
     out.attrs["history"] = "\n".join(filter(None, [images.attrs.get("history", ""), history]))
@@ -176,14 +201,26 @@ def _index(images):
     return xr.concat([each.drop_vars(list(each.coords)) for each in dates], "time")
 
 
-def _checked(by, images):
-    """Check that `by` has the dates and cells of the images, and align it."""
+def _nearness(images):
+    """View zenith angle with a negative sign, NaN where a date has no data, dims (time, y, x). [degree]"""
+    if "vza" not in images.coords or "time" not in images["vza"].dims:
+        raise ValueError(
+            "nadir-most needs the view of each date: assign a coordinate vza [degree] along time, such as "
+            ".assign_coords(vza=('time', [12.0, 40.0]))"
+        )
+    plain = images.drop_vars(list(images.coords))
+    known = plain.notnull().any("band") if "band" in images.dims else plain.notnull()
+    return xr.DataArray(-images["vza"].variable.to_base_variable()).where(known).transpose("time", "y", "x")
+
+
+def _checked(by, images, name="by"):
+    """Check that a raster has the dates and cells of the images, and align it."""
     if by.dims != ("time", "y", "x") or by.sizes["time"] != images.sizes["time"]:
-        raise ValueError(f"by has dimensions (time, y, x) with the dates of the images, got {dict(by.sizes)}")
+        raise ValueError(f"{name} has dimensions (time, y, x) with the dates of the images, got {dict(by.sizes)}")
     if {"time"} <= set(by.coords) & set(images.coords) and not np.array_equal(by["time"], images["time"]):
-        raise ValueError("by has other dates than the images, or in another order: sort both with .sortby('time')")
+        raise ValueError(f"{name} has other dates than the images, or in another order: sort both with .sortby('time')")
     one = images.isel(time=0, drop=True)
-    chunks.aligned([one, with_crs_of(by.isel(time=0, drop=True), one).rename("by")])
+    chunks.aligned([one, with_crs_of(by.isel(time=0, drop=True), one).rename(name)])
     return by
 
 

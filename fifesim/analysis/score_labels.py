@@ -15,7 +15,7 @@ from fifesim.analysis.regression_labels import check_same_quantity, matched, sou
 from fifesim.base.annotations import Pairing
 from fifesim.base.arguments import Kind, described, is_a
 from fifesim.base.messages import warn
-from fifesim.grids.inputs import AnyDimensions, RasterOrDataset
+from fifesim.grids.inputs import MASKS_TOO, AnyDimensions, RasterOrDataset
 from fifesim.grids.reductions import computed, sums_by_row
 
 _BINS = 10
@@ -35,7 +35,7 @@ By = Annotated[
 
 
 def score(
-    estimate: RasterOrDataset,
+    estimate: Annotated[xr.DataArray | xr.Dataset, MASKS_TOO],
     truth: AnyDimensions,
     by: By | None = None,
     *,
@@ -51,7 +51,8 @@ def score(
         A map; or a Dataset with a variable named like the truth and any of: ``sd``, its standard deviation; ``low`` and
         ``high``, the ends of central intervals, with a dimension or coordinate ``level``. The name of the variable may
         come first, as in ``lai_sd``. An ensemble has a dimension ``member``. Mask pixels that must not count, for
-        instance with ``estimate.where(estimate.flag == 0)``.
+        instance with ``estimate.where(estimate.flag == 0)``. A raster of bool is a mask, such as of clouds; its truth
+        is a mask or the share of each pixel.
     truth : xarray.DataArray, dims (y, x), or any that the estimate has
         In the unit of the estimate.
     by : xarray.DataArray or sequence of float, optional
@@ -70,8 +71,9 @@ def score(
         bias. If the estimate has intervals, by ``level``: ``coverage``, the share of true values inside, its standard
         error ``coverage_se``, the mean ``width``, and ``interval_score``. With ``sd`` or members: ``crps``, of a normal
         distribution or of the ensemble, and ``pit``, the density of the probability integral transform in ten bins,
-        which is 1 for a calibrated estimate. With ``by``, a first dimension of that name. The same to the bit under any
-        chunking.
+        which is 1 for a calibrated estimate. For a mask, ``n``, ``omission``, the share of the true area that it lacks,
+        and ``commission``, the share of it that is wrong. With ``by``, a first dimension of that name. The same to the
+        bit under any chunking.
 
     Raises
     ------
@@ -98,6 +100,8 @@ def score(
     >>> round(float(found.rmse), 1), bool(abs(found.pit - 1).max() < 0.2)
     (0.3, True)
     """
+    if isinstance(estimate, xr.DataArray) and estimate.dtype.kind == "b":
+        return _mask_scores(estimate, truth, by, pair)
     given = _parts(estimate, truth)
     check_same_quantity(given["value"], truth, ("estimate", "truth"))
     unit = truth.attrs.get("units", given["value"].attrs.get("units", "1"))
@@ -110,8 +114,28 @@ def score(
     found = _dataset(sums, levels, "crps" in values, unit)
     if by is None:
         return found.isel(group=0)
-    name = str(by.name or "group") if isinstance(by, xr.DataArray) else f"{truth.name or 'truth'}_bin"
-    return found.assign_coords(group=labels).rename(group=name)
+    return found.assign_coords(group=labels).rename(group=_group_name(by, truth))
+
+
+def _mask_scores(mask, truth, by, pair):
+    """Number of pixels, omission and commission of a mask, by group."""
+    given, truth = _paired({"value": mask.astype(float)}, truth.astype(float), pair)
+    group, labels = _groups(by, truth)
+    detected, true, number = (each.transpose(*truth.dims).values for each in computed(given["value"], truth, group))
+    if np.any((true < 0) | (true > 1)):
+        raise ValueError(f"the truth of a mask is a share from 0 to 1, got {np.nanmin(true):g} to {np.nanmax(true):g}")
+    found = np.array([scores.mask_errors(detected[number == at], true[number == at]) for at in range(len(labels))])
+    n = [int(np.sum((number == at) & ~np.isnan(detected + true))) for at in range(len(labels))]
+    if not sum(n):
+        raise ValueError("no pixel has both an estimate and a true value: do the rasters overlap?")
+    words = {"omission": "share of the true area that the mask lacks", "commission": "share of the mask that is wrong"}
+    columns = [("n", n, "number of pixels"), *zip(words, found.T, words.values(), strict=True)]
+    out = xr.Dataset({name: ("group", each, {"long_name": text, "units": "1"}) for name, each, text in columns})
+    return out.isel(group=0) if by is None else out.assign_coords(group=labels).rename(group=_group_name(by, truth))
+
+
+def _group_name(by, truth):
+    return str(by.name or "group") if isinstance(by, xr.DataArray) else f"{truth.name or 'truth'}_bin"
 
 
 def inversion_error(estimate: RasterOrDataset, truth: xr.DataArray, *, pair: Pairing = "coordinates") -> xr.Dataset:

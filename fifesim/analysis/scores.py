@@ -104,6 +104,41 @@ def ensemble_crps(members, truth, *, fair=False):
     return error - 0.5 * pairs / (n * (n - 1) if fair else n * n)
 
 
+def mask_errors(mask, truth):
+    r"""
+    Omission and commission of a mask, with true shares of pixels.
+
+    .. math:: o = \frac{\sum f (1 - m)}{\sum f}, \qquad c = \frac{\sum (1 - f) m}{\sum m}
+
+    Parameters
+    ----------
+    mask : array, shape (...)
+        Detected pixels, :math:`m`, 0 or 1. [1]
+    truth : array, shape (...)
+        True share of each pixel, :math:`f`, 0 to 1. [1]
+
+    Returns
+    -------
+    omission, commission : float
+        Share of the true area that the mask lacks, and share of the mask that is wrong; NaN for no area. Pixels with a
+        NaN do not count. [1]
+
+    References
+    ----------
+    [Congalton1991]_
+
+    Examples
+    --------
+    >>> [float(each) for each in mask_errors([1, 1, 0, 0], [1.0, 0.5, 0.5, 0.0])]
+    [0.25, 0.25]
+    """
+    mask, truth = np.broadcast_arrays(np.asarray(mask, float), np.asarray(truth, float))
+    known = ~np.isnan(mask + truth)
+    mask, truth = mask[known], truth[known]
+    with np.errstate(invalid="ignore"):
+        return np.sum(truth * (1 - mask)) / np.sum(truth), np.sum((1 - truth) * mask) / np.sum(mask)
+
+
 def ensemble_pit(members, truth):
     """
     Rank of the truth in an ensemble, as a share; ties count half.

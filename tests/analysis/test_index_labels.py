@@ -162,7 +162,13 @@ def test_images_are_composed_by_their_ndvi_or_by_what_is_given(stack):
             r"sun of each date: convert them with \.fifesim\.to_reflect",
         ),
         (lambda ndvi: ndvi.isel(time=0), {}, "images along time, got dimensions"),
-        (lambda ndvi: ndvi, {"method": "median"}, "method must be 'maximum-value', got 'median'"),
+        (
+            lambda ndvi: ndvi,
+            {"method": "mode"},
+            "method must be one of 'maximum-value', 'median', 'nadir-most', 'mean-of-clear', got 'mode'",
+        ),
+        (lambda ndvi: ndvi, {"method": "nadir-most"}, "nadir-most needs the view of each date"),
+        (lambda ndvi: ndvi, {"method": "mean-of-clear"}, "mean-of-clear needs to know where the images are clear"),
         (lambda ndvi: ndvi, {"by": xr.DataArray(np.zeros((2, 2, 2)), dims=("time", "y", "x"))}, "dates of the images"),
         (lambda ndvi: ndvi.assign_attrs(standard_name="leaf_area_index"), {}, "leaf area index by its standard_name"),
     ],
@@ -218,3 +224,46 @@ def test_a_composite_comes_back_from_netcdf_and_zarr(stack, tmp_path, kind, chun
         again = xr.open_zarr(path, decode_coords="all", consolidated=False)
     with again:
         xr.testing.assert_identical(again["ndvi"].load(), found.compute())
+
+
+@pytest.mark.parametrize("lazy", [False, True])
+def test_composites_select_by_median_view_or_clear_dates(lai, lazy):
+    """Expected values by numpy, of five dates with gaps, clouds and views."""
+    rng = np.random.default_rng(4)
+    grid = grids.geobox(lai)
+    values = rng.random((5, *grid.shape))
+    values[rng.random(values.shape) < 0.2] = np.nan
+    cloudless = rng.random(values.shape) < 0.7
+    vza = np.array([40.0, 5.0, 20.0, 50.0, 30.0])
+    dates = np.arange("1987-06-01", "1987-06-06", dtype="M8[D]").astype("M8[ns]")
+
+    def stack(array):
+        layers = grids.place(xr.DataArray(array, dims=("time", "y", "x"), coords={"time": dates}), grid)
+        return layers.chunk({"y": 7, "x": 11}) if lazy else layers
+
+    ndvi = stack(values).rename("ndvi").assign_coords(vza=("time", vza))
+    clear = stack(cloudless)
+    seen = np.where(cloudless, values, np.nan)
+    some = np.isfinite(seen).any(axis=0)
+    with np.errstate(all="ignore"):
+        ordered = np.sort(seen, axis=0)
+    middle = np.maximum(np.isfinite(seen).sum(axis=0) - 1, 0) // 2
+    expected = {
+        "median": np.take_along_axis(ordered, middle[None], axis=0)[0],
+        "nadir-most": np.take_along_axis(
+            seen, np.argmin(np.where(np.isnan(seen), 99, vza[:, None, None]), axis=0)[None], 0
+        )[0],
+        "mean-of-clear": np.where(some, np.nansum(seen, axis=0) / np.maximum(np.isfinite(seen).sum(axis=0), 1), np.nan),
+        "maximum-value": ordered[np.maximum(np.isfinite(seen).sum(axis=0) - 1, 0), *np.indices(grid.shape)],
+    }
+    for method, each in expected.items():
+        found = ndvi.fifesim.composite(method, clear=clear)
+        assert (found.chunks is not None) == lazy
+        np.testing.assert_allclose(found.values, each, rtol=1e-12)
+        assert found.attrs["composite"] == method
+    nearest = ndvi.fifesim.composite("nadir-most", clear=clear)
+    np.testing.assert_array_equal(
+        nearest.vza.values[some], np.where(np.isnan(seen), 99, vza[:, None, None]).min(axis=0)[some]
+    )
+    mean = ndvi.fifesim.composite("mean-of-clear", clear=clear)
+    np.testing.assert_array_equal(mean.dates.values, np.isfinite(seen).sum(axis=0))

@@ -2,8 +2,10 @@
 
 from itertools import pairwise
 from math import asin, pi, sqrt
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from fifesim.analysis import indices
@@ -82,3 +84,20 @@ def test_composite_of_noisy_ndvi_is_high_by_the_largest_of_normal_numbers(n):
 def test_missing_dates_are_passed_over_and_equal_ones_are_the_first():
     index = np.array([[np.nan, -0.2, -0.1], [0.3, 0.3, np.nan], [np.nan, -np.inf, np.nan], [np.nan] * 3])
     assert date_of_maximum(index).tolist() == [2, 0, 1, -1]
+
+
+def test_maximum_of_normals_is_that_of_the_table():
+    """1e-9: the digits of the quadrature of the table."""
+    known = pd.read_csv(Path(__file__).parents[1] / "data" / "clouds" / "maximum_of_normals.csv", comment="#")
+    found = [indices.maximum_of_normals(dates) for dates in known["dates"]]
+    np.testing.assert_allclose(found, known[["mean", "sd"]], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("dates", [2, 5, 10, 14])
+def test_bias_of_a_maximum_composite_is_that_of_the_maximum_of_normals(dates):
+    """Within 3 standard errors, for independent errors of NDVI."""
+    ndvi = 0.5 + 0.03 * np.random.default_rng(dates).standard_normal((40_000, dates))
+    best = indices.values_of_date(ndvi, indices.date_of_maximum(ndvi), np.nan)
+    mean, sd = indices.maximum_of_normals(dates)
+    assert abs((best.mean() - 0.5) / 0.03 - mean) < 3 * sd / 200
+    assert abs(best.std() / 0.03 / sd - 1) < 0.02

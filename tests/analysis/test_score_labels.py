@@ -196,3 +196,20 @@ def test_other_quantities_are_refused(estimate, truth):
     other = estimate.assign(lai=estimate["lai"].assign_attrs(standard_name="surface_altitude"))
     with pytest.raises(ValueError, match="must be the same quantity"):
         fifesim.score(other, fpar)
+
+
+def test_mask_scores_count_omitted_and_committed_area_by_thickness():
+    """Expected shares by hand: pixels of known cloud, half cloud and clear sky in two classes of thickness."""
+    dims = ("landscape", "pixel")
+    truth = xr.DataArray([[1.0, 1.0, 0.5, 0.0, 1.0, 1.0, 0.0, np.nan]], dims=dims, name="cloud")
+    mask = xr.DataArray([[True, False, True, True, True, True, False, True]], dims=dims)
+    thick = xr.DataArray([[0, 0, 0, 0, 1, 1, 1, 1]], dims=dims, name="thickness")
+    found = fifesim.score(mask, truth)
+    assert int(found.n) == 7
+    np.testing.assert_allclose([found.omission, found.commission], [1 / 4.5, 1.5 / 5])
+    by = fifesim.score(mask, truth, by=thick)
+    np.testing.assert_allclose(by.omission, [1 / 2.5, 0.0])
+    np.testing.assert_allclose(by.commission, [1.5 / 3, 0.0])
+    assert by.omission.dims == ("thickness",) and by.n.values.tolist() == [4, 3]
+    with pytest.raises(ValueError, match="truth of a mask is a share from 0 to 1, got 0 to 2"):
+        fifesim.score(mask, 2 * truth)
