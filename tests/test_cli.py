@@ -96,18 +96,15 @@ def test_quiet_says_nothing_and_verbose_each_step(invoke, small, monkeypatch):
     assert "saved block (" not in told.stderr
     assert "saved block (" in invoke("simulate", small, "-o", "all", "-vv").stderr
     assert invoke("simulate", small, "-o", "quiet", "--quiet").exit_code == 2
-
-
-@pytest.mark.parametrize(("name", "command"), typer.main.get_command(app).commands.items())
-def test_what_writes_can_be_quiet(name, command):
-    options = {each for known in command.params for each in known.opts}
-    assert "--output" not in options or {"--quiet", "--verbose"} <= options
-
-
-def test_explore_says_what_to_open_unless_it_is_quiet(invoke, monkeypatch):
     monkeypatch.setattr("fifesim.experiments.explorer.page.explore", lambda scenario, page, overwrite: page)
     assert "open page.html in a browser" in invoke("explore", "-o", "page.html").stdout
     assert invoke("explore", "-o", "page.html", "--quiet").stdout == ""
+
+
+def test_what_writes_can_be_quiet():
+    for command in typer.main.get_command(app).commands.values():
+        options = {each for known in command.params for each in known.opts}
+        assert "--output" not in options or {"--quiet", "--verbose"} <= options, command.name
 
 
 def test_image_lies_where_the_scenario_says(first):
@@ -134,24 +131,31 @@ def test_printed_scenario_is_the_default_one(invoke, tmp_path):
     assert 'cover = "none"' in paper and "[classes." not in paper and 'bands = ["TM3", "TM4"]' in paper
 
 
-def test_the_papers_ground_stands_for_no_file(invoke, tmp_path):
-    (tmp_path / "mine.toml").write_text("[grid]\nwidth = 600\nheight = 600\n")
-    result = invoke("simulate", "mine.toml", "--paper", "-o", "out")
-    assert result.exit_code == 2 and "--paper cannot be combined with a scenario file" in result.output
-    assert not (tmp_path / "out").exists()
-
-
-def test_sensors_lists_every_instrument_in_a_line(invoke):
+def test_sensors_lists_every_instrument_in_a_line_or_the_bands_of_one(invoke):
     lines = invoke("sensors").stdout.splitlines()
     names = [line.split()[0] for line in lines[1:]]
     assert {"TM", "L4TM", "ETM+", "OLI", "OLI2", "MSI", "MSI-B", "HRV", "MODIS", "MODIS-Aqua", "AVHRR"} <= set(names)
     assert max(map(len, lines)) <= 120
-
-
-def test_sensors_lists_the_bands_of_one_with_their_radiances(invoke):
     printed = invoke("sensors", "Landsat-5 TM").stdout
-    assert "TM4" in printed
-    assert "206.20" in printed
+    assert "TM4" in printed and "206.20" in printed
+
+
+def test_mistakes_of_options_and_instruments_are_a_line_with_exit_code_2(invoke, small, tmp_path):
+    text = files.path("instruments/oli.toml").read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text.replace("altitude = 705000.0", "altitude = 705.0"), encoding="utf-8")
+    mistakes = {
+        "mine.toml: altitude = 705: it is in metres": ["sensors", "--check", "mine.toml"],
+        str(tmp_path): ["sensors", "--check", str(tmp_path)],
+        "did you mean TM": ["sensors", "TN"],
+        "no instrument file": ["sensors", "missing.toml"],
+        "give one of them": ["simulate", small, "--workers", 2, "--scheduler", "tcp://nowhere:1"],
+        "--paper cannot be combined with a scenario file": ["simulate", small, "--paper", "-o", "out"],
+    }
+    for said, arguments in mistakes.items():
+        result = invoke(*arguments)
+        assert result.exit_code == 2 and said in result.stderr, result.output
+        assert len(result.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
 
 
 def test_sensors_check_says_what_a_file_is(invoke, tmp_path):
@@ -161,29 +165,6 @@ def test_sensors_check_says_what_a_file_is(invoke, tmp_path):
     assert result.exit_code == 0, result.output
     assert "own interval 1124.880 along x 817.000 across m" in result.stdout
     assert "mine.toml is valid" in result.stdout
-
-
-def test_sensors_check_names_file_key_and_remedy_with_exit_code_2(invoke, tmp_path):
-    text = files.path("instruments/oli.toml").read_text(encoding="utf-8")
-    (tmp_path / "mine.toml").write_text(text.replace("altitude = 705000.0", "altitude = 705.0"), encoding="utf-8")
-    result = invoke("sensors", "--check", "mine.toml")
-    assert result.exit_code == 2
-    assert "mine.toml: altitude = 705: it is in metres" in result.stderr
-    assert len(result.stderr.strip().splitlines()) == 1
-
-
-def test_sensors_check_of_what_is_no_file_is_a_mistake(invoke, tmp_path):
-    result = invoke("sensors", "--check", str(tmp_path))
-    assert result.exit_code == 2
-    assert str(tmp_path) in result.stderr
-    assert len(result.stderr.strip().splitlines()) == 1
-
-
-@pytest.mark.parametrize(("name", "said"), [("TN", "did you mean TM"), ("missing.toml", "no instrument file")])
-def test_sensors_of_no_such_instrument_is_a_mistake(invoke, name, said):
-    result = invoke("sensors", name)
-    assert result.exit_code == 2
-    assert said in result.stderr
 
 
 @pytest.mark.parametrize(
@@ -331,12 +312,6 @@ def test_a_mistake_in_a_study_is_named_and_nothing_is_written(invoke, tmp_path, 
     result = invoke("dataset", *arguments, "-n", 2)
     assert result.exit_code == 2 and said in result.stderr, result.output
     assert len(result.stderr) <= 520 and not (tmp_path / "chips.zarr").exists()
-
-
-def test_workers_and_a_scheduler_are_not_asked_for_together(invoke, small):
-    result = invoke("simulate", small, "--workers", 2, "--scheduler", "tcp://nowhere:1")
-    assert result.exit_code == 2
-    assert "one of them" in result.stderr
 
 
 def test_what_leads_to_other_files_is_opened_where_that_is_allowed(invoke, tmp_path):

@@ -87,7 +87,7 @@ class Study:
 
     def __post_init__(self):
         check_seed(self.seed)
-        check_fields(self, "scenario", "draws", "sequence", "landscapes", "split")
+        check_fields(self, "scenario", "sequence", "landscapes", "split")
         _check_ground(self.scenario)
         _check_plan(self)
         drawn = dict(_draws(self.draws, self.scenario))

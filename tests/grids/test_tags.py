@@ -63,6 +63,13 @@ def test_selected_variables_keep_their_names(truth, tmp_path, opened):
         np.testing.assert_array_equal(found, [truth[name] for name in names])
 
 
+def test_bands_without_names_are_counted_by_their_wavelengths(image, tmp_path):
+    nameless = fifesim.to_reflectance(image)
+    along = [name for name, value in nameless.coords.items() if value.dims == ("band",) and name != "wavelength"]
+    nameless = nameless.drop_vars(along)
+    xr.testing.assert_identical(fifesim.open_image(nameless.fifesim.to_geotiff(tmp_path / "plain.tif")), nameless)
+
+
 @pytest.mark.parametrize(
     ("bands", "names", "said"),
     [
