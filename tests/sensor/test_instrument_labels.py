@@ -9,6 +9,7 @@ import xarray as xr
 import fifesim
 from fifesim.sensor.description.instruments import instrument, instrument_names
 from fifesim.sensor.description.spatial_response import BoxcarResponse, CosineResponse, TwoAxesResponse
+from fifesim.sensor.description.spectral_response import ResponseList
 from fifesim.sensor.instrument_labels import (
     attributes_of,
     carried_instrument,
@@ -17,6 +18,7 @@ from fifesim.sensor.instrument_labels import (
     matching_bands,
     noise_equivalent_radiance,
     snr,
+    warn_of_others,
 )
 
 TM = instrument("TM")
@@ -133,6 +135,25 @@ def test_a_wavelength_finds_the_narrow_band_beside_a_panchromatic_one():
     for name, expected in known.items():
         wavelengths = [band.wavelength for band in TM.select(list(expected))]
         assert matched(named(None, wavelengths), name) == list(expected.values())
+
+
+def test_responses_are_relative_to_their_peak():
+    """A twentieth of the peak is no response, whatever the unit of the response."""
+    table = TM.bands[2].response
+    strong = ResponseList(table.wavelength, tuple(50 * value for value in table.response))
+    own = replace(TM, name="mine", bands=(*TM.bands[:2], replace(TM.bands[2], srf=strong), *TM.bands[3:]))
+    edge = next(w for w, r in zip(table.wavelength, table.response, strict=True) if r >= 0.05 * max(table.response))
+    assert matching_bands(named(["TM3"], [0.66]), own)[0].name == "TM3"
+    with pytest.raises(ValueError, match="contradict each other"):
+        check_wavelengths(named(["TM3"], [edge], **attributes_of(own)), own)
+
+
+def test_bands_of_another_instrument_are_warned_of_and_no_others(recwarn):
+    for array, name in ((named(["TM3"], instrument="TM"), "TM"), (named(["OLI4"], instrument="TM"), "OLI")):
+        warn_of_others(array, instrument(name), matching_bands(array, instrument(name)))
+    assert not recwarn
+    with pytest.warns(UserWarning, match=r"bands TM3 of TM are taken for OLI4 of OLI, as they are: .*adjust_bands"):
+        warn_of_others(named(["TM3"], instrument="TM"), instrument("OLI"), instrument("OLI").select("OLI4"))
 
 
 # ------------------------------------------------------------------------------------------ spread and transfer
