@@ -17,6 +17,7 @@ from fifesim.atmosphere.coupling import apparent_reflectance, apparent_reflectan
 from fifesim.base.annotations import Metres
 from fifesim.base.line_spread import Spread
 from fifesim.base.messages import warn
+from fifesim.chain import coupled_ground
 from fifesim.grids import cf
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
@@ -67,10 +68,17 @@ def warn_of_tallgrass(scene, classes, canopy, cells=MappingProxyType({})):
         )
 
 
-def seen_through_air(reflectance):
+def seen_through_air(reflectance, coupling="lambert", *air):
     """Function that computes the top-of-atmosphere reflectance of a lazy surface reflectance in one pass, or None."""
     # None if cells differ in more than leaf area and background. Results are identical to the two separate steps.
     canopy = origin_of(reflectance)
+    if coupling != "lambert":
+        if not isinstance(canopy, EvenCanopy):
+            raise ValueError(
+                f"coupling={coupling!r} needs the ground in more than one direction, the raster holds one reflectance "
+                "factor: give surface_reflectance(..., streams='directional'), or take coupling='lambert'"
+            )
+        return lambda terms: coupled_ground.toa_of_canopy(canopy, coupling, *air)
     if not isinstance(canopy, EvenCanopy):
         return None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from operator import attrgetter
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -18,7 +18,8 @@ from fifesim.base.arguments import Kind, described
 from fifesim.base.bands import Band
 from fifesim.base.caches import cached
 from fifesim.base.messages import warn
-from fifesim.chain import landscapes
+from fifesim.base.surface_kernels import RPV, RossLi
+from fifesim.chain import coupled_ground, landscapes
 from fifesim.chain.landscapes import seen_through_air, warn_of_tallgrass
 from fifesim.grids import cf, directions
 from fifesim.grids.dates import by_date
@@ -48,6 +49,17 @@ from fifesim.sensor.instrument_labels import (
 # [um]
 _NARROW = 0.0025
 
+
+# Ground below an atmosphere.
+GROUND = Kind(
+    "an xarray.DataArray, an xarray.Dataset, a fifesim.RossLi or a fifesim.RPV",
+    lambda value: isinstance(value, xr.DataArray | xr.Dataset | RossLi | RPV),
+    dimensions=2,
+)
+# Streams of a surface reflectance.
+Streams: TypeAlias = Annotated[
+    bool | str, Kind("True, False or 'directional'", lambda value: value in (True, False, "directional"))
+]
 
 _default_atmosphere = cached(1, "default atmosphere")(Atmosphere)
 
@@ -317,6 +329,7 @@ def surface_reflectance(
     geometry: Directions | None = None,
     time: Time | None = None,
     exact: bool = False,
+    streams: Streams = False,
 ) -> xr.DataArray:
     """
     Reflectance factor of the ground in the bands of an instrument.
@@ -350,10 +363,15 @@ def surface_reflectance(
         Time for the position of the sun at the grid centre, with a nadir view; instead of ``geometry``.
     exact : bool, optional
         Evaluate leaf optics and SAIL at every cell, instead of interpolating a table that is accurate to 1e-6.
+    streams : bool or "directional", optional
+        Return separate reflectances for `to_toa`, of level ground: True from the sun s and an isotropic sky d to the
+        observer o and into all directions d (``so``, ``do``, ``sd``, ``dd``); "directional" for the sky of this
+        atmosphere, >, and for the light that it returns, a (``so``, ``>o``, ``ao``, ``s>``, ``>>``, ``a>``, ``sa``,
+        ``>a``, ``aa``).
 
     Returns
     -------
-    reflectance : xarray.DataArray, dims (band, y, x)
+    reflectance : xarray.DataArray, dims (band, y, x), or (stream, band, y, x) with ``streams``
         Lazy if ``lai`` is. [1]
 
     Raises
@@ -409,6 +427,12 @@ def surface_reflectance(
         level = canopy_labels.level_reflectance(lai, selected, canopies[None], light, exact, provenance)
     else:
         level = canopy_labels.reflectance_of_classes(lai, land.cover, selected, canopies, light, exact, provenance)
+    if streams:
+        if dem is not None:
+            raise ValueError("streams are of level ground: leave dem out, or take streams=False")
+        directions.uniform_geometry(geometry, "streams")
+        skies = coupled_ground.skies_of(atmosphere, responses, geometry) if streams == "directional" else None
+        return coupled_ground.reflectance_streams(land, selected, canopies, light, skies, level)
     if dem is None:
         return level
     light = sunlight(dem, horizon, atmosphere, responses, geometry, "surface_reflectance on slopes")
@@ -417,7 +441,7 @@ def surface_reflectance(
 
 @by_date
 def to_toa(
-    reflectance: RasterOrDataset,
+    reflectance: Annotated[xr.DataArray | xr.Dataset | RossLi | RPV, GROUND],
     atmosphere: Atmosphere | None = None,
     *,
     geometry: Directions | None = None,
@@ -427,15 +451,17 @@ def to_toa(
     adjacency: bool = False,
     surroundings: Surroundings | None = None,
     clouds: xr.Dataset | None = None,
+    coupling: Literal["directional", "four-stream", "lambert"] | None = None,
 ) -> xr.DataArray:
     """
     Apparent reflectance at the top of the atmosphere.
 
     Parameters
     ----------
-    reflectance : xarray.DataArray, dims (band, y, x), or xarray.Dataset of bands
+    reflectance : xarray.DataArray, dims (band, y, x), xarray.Dataset of bands, RossLi or RPV
         Surface reflectance factor, with band names of an instrument or a coordinate ``wavelength`` [um] along band.
-        Integers need an attribute ``scale_factor``. [1]
+        Integers need an attribute ``scale_factor``. Streams of `surface_reflectance` have a dimension ``stream``. A
+        RossLi or RPV needs ``instrument`` and ``geometry``; it is on level ground in all bands. [1]
     atmosphere : Atmosphere, optional
         By default from the array. If it has none: midlatitude summer, continental aerosol, 45 km visibility and 0.4 km
         altitude, with a warning for rasters from other sources.
@@ -457,10 +483,15 @@ def to_toa(
     clouds : xarray.Dataset, dims (y, x), optional
         Clouds from `cast_clouds`, or from `cloud_field`, which are then cast onto the level ground or ``elevation``.
         They need one direction of sun and sensor.
+    coupling : {"directional", "four-stream", "lambert"}, optional
+        Light between ground and atmosphere: with the directions of the sky ("directional"), with an isotropic sky,
+        which is often worse than one reflectance factor ("four-stream"), or with one reflectance factor ("lambert").
+        The default is "lambert" for a reflectance, and "directional" for streams of this coupling, RossLi and RPV.
+        Without streams, "directional" needs a lazy reflectance of a scene whose cells differ in leaf area only.
 
     Returns
     -------
-    reflectance : xarray.DataArray, dims (band, y, x)
+    reflectance : xarray.DataArray, dims (band, y, x), or (band) for RossLi and RPV
         Lazy if the input is. [1]
 
     Raises
@@ -496,15 +527,42 @@ def to_toa(
     >>> (toa - rho).mean(["y", "x"]).round(3).values
     array([ 0.01, -0.03])
     """
+    if isinstance(reflectance, RossLi | RPV):
+        return _toa_of_surface(reflectance, coupling or "directional", atmosphere, geometry, instrument)
+    streams = isinstance(reflectance, xr.DataArray) and "stream" in reflectance.dims
+    if streams or coupling in ("directional", "four-stream"):
+        given = {"elevation": elevation, "adjacency": adjacency or None, "clouds": clouds}
+        if others := [name for name, each in given.items() if each is not None]:
+            raise ValueError(f"{', '.join(others)} needs coupling='lambert' and one reflectance factor: leave it out")
+    if streams:
+        air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
+        return _of(instrument, coupled_ground.toa_of_streams(reflectance, coupling, *air))
     reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
     air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
     toa = atmosphere_labels.toa_from_surface(
-        directions.dated(reflectance, time), *air,
-        elevation=elevation, adjacency=adjacency, surroundings=surroundings, made=seen_through_air(reflectance),
+        directions.dated(reflectance, time), *air, elevation=elevation, adjacency=adjacency, surroundings=surroundings,
+        made=seen_through_air(reflectance, coupling or "lambert", *air),
     )  # fmt: skip
+    if coupling in ("directional", "four-stream"):
+        toa.attrs["history"] += f", {coupling} coupling"
     if clouds is not None:
         toa = with_clouds(toa, clouds, *air, elevation=elevation)
     return _of(instrument, toa)
+
+
+def _toa_of_surface(surface, coupling, atmosphere, geometry, instrument):
+    """Apparent reflectance of a RossLi or RPV in the bands of an instrument, dims (band). [1]"""
+    for name, value in (("instrument", instrument), ("geometry", geometry)):
+        if value is None:
+            raise ValueError(f"a {type(surface).__name__} has no {name}: give {name}=")
+    atmosphere, selected = atmosphere or _default_atmosphere(), find_instrument(instrument).select(None)
+    bands = [each.response for each in selected]
+    geometry = directions.uniform_geometry(directions.checked_geometry(geometry), "to_toa of a surface")
+    values = coupled_ground.toa_of_surface(surface, coupling, atmosphere, bands, geometry)
+    along = {"band": [each.name for each in selected], "wavelength": [each.wavelength for each in selected]}
+    out = xr.DataArray(values, dims="band", coords=cf.band_coordinates(**along) | directions.coordinates_of(geometry))
+    history = f"to_toa: {type(surface).__name__}, {coupling} coupling, {atmosphere.text}"
+    return cf.label(out, "toa_reflectance", history=history, atmosphere=atmosphere.text)
 
 
 @by_date

@@ -78,7 +78,7 @@ def canopy_kernel(lai, bands, stand, light, exact=False):
     """Kernel of canopy reflectance, ``kernel(lai, *blocks)`` of shape (band, ...) [1], and its raster arguments."""
     leaves = stand.leaf + (stand.dead or ())
     if not directions.varying(light.geometry) and xr.DataArray not in map(type, leaves):
-        return _uniform_kernel(partial(scene_reflectance, exact=exact), lai, bands, stand, light)
+        return uniform_kernel(partial(scene_reflectance, exact=exact), lai, bands, stand, light)
     varying, numbers = shares_of(stand.canopy, CELL_SHARES, lai)
     by_band = [_per_band(each) for each in (light.diffuse_fraction, *leaves)]
     rasters = [_per_band(stand.background, bands), by_band[0], *directions.angles(light.geometry), *by_band[1:]]
@@ -95,10 +95,10 @@ def light_kernel(lai, bands, stand, light, weights, part):
             "leaf optics vary by cell, absorbed light needs the same leaves in all cells of a class: use "
             "method='beer', or give leaf_optics of numbers"
         )
-    return _uniform_kernel(partial(scene_light, weights=weights, part=part), lai, bands, stand, light)
+    return uniform_kernel(partial(scene_light, weights=weights, part=part), lai, bands, stand, light)
 
 
-def _uniform_kernel(evaluate, lai, bands, stand, light):
+def uniform_kernel(evaluate, lai, bands, stand, light):
     """Kernel and rasters of a function of leaf area, background and Scene with the same leaves and directions."""
     varying, numbers = shares_of(stand.canopy, CELL_SHARES, lai)
     kernel = partial(_uniform, evaluate, _uniform_scene(stand, light), tuple(varying), numbers)

@@ -1,0 +1,106 @@
+"""Ground that reflects by direction, from leaf area or kernels to the top of the atmosphere."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import no_compute
+
+import fifesim
+from fifesim.atmosphere.coupling import apparent_reflectance
+from fifesim.atmosphere.engines import band_terms
+from fifesim.atmosphere.skylight import atmospheric_sky, directional_coupling, ground_streams
+from fifesim.chain.coupled_ground import STREAMS_OF
+from fifesim.ground.canopy.sail_model import sail, with_background
+
+GRID = fifesim.fife_site(30 / 9, window=((0, 60), (0, 72)))
+BANDS = ["TM3", "TM4"]
+HAZE = fifesim.Atmosphere(visibility=10)
+SLANT = fifesim.Geometry(sza=50.0, saa=120.0, vza=30.0, vaa=160.0)
+LEAF, SOIL = {"TM3": (0.07, 0.04), "TM4": (0.45, 0.42)}, {"TM3": 0.15, "TM4": 0.19}
+GRASS = fifesim.Canopy(leaf_optics=LEAF, background=SOIL, hotspot=0.05)
+LAI = fifesim.lai_scene(GRID, seed=7)
+
+
+def ground(lai=LAI, streams=False, canopy=GRASS, geometry=SLANT):
+    given = {"canopy": canopy, "atmosphere": HAZE, "geometry": geometry}
+    return lai.fifesim.surface_reflectance("TM", bands=BANDS, streams=streams, **given)
+
+
+@pytest.fixture(scope="module")
+def directional():
+    return ground(streams="directional").fifesim.to_toa()
+
+
+def test_cells_have_the_sum_over_the_sky(directional):
+    """SAIL at the leaf area of a cell, without the table."""
+    lai = float(LAI[3, 4])
+    for name in BANDS:
+        (band,) = (each.response for each in fifesim.instrument("TM").select([name]))
+        terms = band_terms(HAZE, [band], SLANT.sza, SLANT.vza, SLANT.raa)
+
+        def surface(sza, vza, raa, name=name):
+            return with_background(sail(lai, *LEAF[name], sza=sza, vza=vza, raa=raa, hotspot=0.05), SOIL[name])
+
+        skies = [atmospheric_sky(HAZE, band.center, zenith) for zenith in (SLANT.sza, SLANT.vza)]
+        streams = ground_streams(surface, *skies, SLANT.sza, SLANT.vza, SLANT.raa)
+        down, up = terms.direct_transmittance_down, terms.direct_transmittance_up
+        through = down, terms.transmittance_down - down, up, terms.transmittance_up - up, terms.spherical_albedo
+        expected = directional_coupling(streams, *through, terms.path_reflectance, terms.gas_transmittance)
+        assert float(directional.sel(band=name)[3, 4]) == pytest.approx(float(expected[0]), abs=2e-6)
+
+
+@pytest.mark.parametrize("coupling", ["directional", "four-stream"])
+def test_one_pass_is_streams_and_coupling(coupling):
+    streams = ground(streams="directional" if coupling == "directional" else True)
+    assert tuple(streams.stream.values) == STREAMS_OF[coupling] and streams.dims == ("stream", "band", "y", "x")
+    with no_compute():
+        lazy = ground(LAI.chunk(y=31, x=29)).fifesim.to_toa(coupling=coupling)
+    toa = streams.fifesim.to_toa()
+    np.testing.assert_allclose(lazy.compute(), toa, rtol=0, atol=1e-6)
+    assert f"{coupling} coupling" in lazy.history and f"{coupling} coupling" in toa.history
+    with no_compute():
+        parts = ground(LAI.chunk(y=31, x=29), streams="directional" if coupling == "directional" else True)
+        parts = parts.fifesim.to_toa()
+    xr.testing.assert_allclose(parts.compute(), toa, rtol=1e-12)
+
+
+def test_equal_streams_are_lambertian():
+    level = ground()
+    even = level.expand_dims(stream=list(STREAMS_OF["directional"]))
+    np.testing.assert_allclose(even.fifesim.to_toa(), level.fifesim.to_toa(), rtol=1e-12)
+    even = level.expand_dims(stream=list(STREAMS_OF["four-stream"]))
+    np.testing.assert_allclose(even.fifesim.to_toa(), level.fifesim.to_toa(), rtol=1e-12)
+
+
+def test_streams_of_a_landscape_and_of_varying_soil():
+    """Classes and a background by cell have the streams of uniform scenes."""
+    soil = xr.DataArray(np.where(np.arange(72) < 36, 0.15, 0.25) * np.ones((60, 1)), dims=("y", "x"))
+    soil = LAI.copy(data=soil.values).rename("background").drop_attrs()
+    both = ground(streams="directional", canopy=GRASS.replace(background=soil))
+    for value, part in ((0.15, slice(0, 36)), (0.25, slice(36, 72))):
+        one = ground(streams="directional", canopy=GRASS.replace(background=value))
+        np.testing.assert_allclose(both[..., part], one[..., part], rtol=1e-12)
+
+
+@pytest.mark.parametrize("surface", [fifesim.RossLi(0.3, 0.0, 0.0), fifesim.RPV([0.1] * 6, 1.0, 0.0, 1.0)])
+def test_lambertian_kernels_have_the_equation_of_the_atmosphere(surface):
+    terms = band_terms(HAZE, [b.response for b in fifesim.instrument("TM").select(None)], 50.0, 30.0, SLANT.raa)
+    rho = float(np.ravel(surface.reflectance(0.0, 0.0, 0.0))[0])
+    for coupling in ("directional", "four-stream", "lambert"):
+        toa = fifesim.to_toa(surface, HAZE, instrument="TM", geometry=SLANT, coupling=coupling)
+        np.testing.assert_allclose(toa, apparent_reflectance(rho, **terms.uniform), rtol=1e-12)
+
+
+def test_refusals():
+    with pytest.raises(ValueError, match="needs stream >o, ao"):
+        ground(streams=True).fifesim.to_toa(coupling="directional")
+    with pytest.raises(ValueError, match="holds one reflectance factor"):
+        ground().fifesim.to_toa(coupling="directional")
+    with pytest.raises(ValueError, match="adjacency needs coupling"):
+        ground(LAI.chunk(y=31)).fifesim.to_toa(coupling="directional", adjacency=True)
+    with pytest.raises(ValueError, match="brown"):
+        ground(streams=True, canopy=GRASS.replace(brown=(0.1 + 0 * LAI).rename("brown")))
+    with pytest.raises(ValueError, match="no geometry"):
+        fifesim.to_toa(fifesim.RPV(0.1, 0.8, -0.1, 0.1), HAZE, instrument="TM")
+    with pytest.raises(ValueError, match="reflectance must not be negative"):
+        fifesim.to_toa(fifesim.RossLi(0.05, 0.19, 0.06), HAZE, instrument="TM", geometry=SLANT)
