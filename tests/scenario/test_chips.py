@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fifesim.ground.landscape.autoregression import FIELD_TILE
+from fifesim.scenario import chips as chips_module
 from fifesim.scenario.chips import chips_of, first_cell_of_chip, ring_place
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.studies import Study
@@ -146,3 +147,9 @@ def test_a_tile_holds_the_margins_of_its_chips():
     for row, column in places:
         assert (row - 24) // 1008 == (row + 356) // 1008 and (column - 24) // 1008 == (column + 356) // 1008
     assert len({(row // 1008, column // 1008) for row, column in places}) == 2
+
+
+def test_chips_draw_from_streams_of_their_own():
+    """Streams 1 and 2 are those of the periodic field and of the library of its tiles."""
+    streams = [chips_module._OF_CHIPS, chips_module._OF_LANDSCAPES, chips_module._ORDER, chips_module._SPLIT]
+    assert len(set(streams)) == 4 and not {0, 1, 2} & set(streams)
