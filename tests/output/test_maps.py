@@ -77,6 +77,8 @@ def test_a_frame_lies_where_its_ground_is(lai):
     part = fifesim.grids.grid.geobox(lai[21:, 30:]).boundingbox
     assert value_map(lai, "", frame=part).frame == pytest.approx((50.0, 70.0, 50.0, 30.0))
     assert value_map(lai, "").scale == (pytest.approx(100 / 6), "100 m")
+    wide = fifesim.lai_scene(fifesim.fife_site(cell=100.0, window=((0, 5), (0, 40))), "burned-grazed", seed=1)
+    assert value_map(wide, "").scale == (pytest.approx(25), "1 km")
 
 
 def test_leaves_are_red_and_soil_is_not(dn):

@@ -150,6 +150,6 @@ def test_a_tile_holds_the_margins_of_its_chips():
 
 
 def test_chips_draw_from_streams_of_their_own():
-    """Streams 1 and 2 are those of the periodic field and of the library of its tiles."""
+    """Streams 1 and 2 are those of the periodic field and of the library of spectra."""
     streams = [chips_module._OF_CHIPS, chips_module._OF_LANDSCAPES, chips_module._ORDER, chips_module._SPLIT]
     assert len(set(streams)) == 4 and not {0, 1, 2} & set(streams)
