@@ -214,12 +214,9 @@ def _absorbed(lai, part, canopy, atmosphere, geometry, time):
         directions.uniform_geometry(geometry, "light")
     atmosphere = air_of(atmosphere, area)
     check_spectra(stands_of(land.classes, canopy, land.cells))
-    shares, diffuse = light_at_ground(atmosphere, PAR_BANDS, float(geometry.sza))
-    # Absorption does not depend on the view.
-    sun = Light(Geometry(sza=float(geometry.sza), saa=0.0), diffuse)
-    names, weights = [band.name for band in PAR_BANDS], tuple(shares.tolist())
     stands = canopies_of(land._replace(lai=area), PAR_BANDS, canopy)
-    kernels = {code: ground.light_kernel(area, names, stand, sun, weights, part) for code, stand in stands.items()}
+    sza = float(geometry.sza)
+    kernels = {code: sunlit_kernel(area, stand, atmosphere, sza, part) for code, stand in stands.items()}
     layers_made = len(LIGHT_PARTS) if part == "light" else 1
     if land.cover is None:
         kernel, rasters = kernels[None]
@@ -228,8 +225,16 @@ def _absorbed(lai, part, canopy, atmosphere, geometry, time):
         out = by_class(kernels, land.cover, area, bands=layers_made)
     out = grids.place(out, grids.geobox(area))
     what = "by class" if land.cover is not None else f"{ground.shares_in_words(stands[None].canopy)}".rstrip(", ")
-    words = ["energy balance of SAIL, 0.4 to 0.7 um", *filter(None, [what]), f"sza {float(geometry.sza):.2f}"]
+    words = ["energy balance of SAIL, 0.4 to 0.7 um", *filter(None, [what]), f"sza {sza:.2f}"]
     return out, ", ".join(words), area
+
+
+def sunlit_kernel(lai, stand, atmosphere, sza, part):
+    """Kernel of light absorbed by a stand with optics in `PAR_BANDS`, ``kernel(lai, *blocks)``, and its rasters."""
+    shares, diffuse = light_at_ground(atmosphere, PAR_BANDS, sza)
+    # Absorption does not depend on the view.
+    sun, names = Light(Geometry(sza=sza, saa=0.0), diffuse), [band.name for band in PAR_BANDS]
+    return ground.light_kernel(lai, names, stand, sun, tuple(shares.tolist()), part)
 
 
 def check_spectra(stands):

@@ -15,7 +15,7 @@ from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
 from fifesim.base.caches import cached
 from fifesim.base.footprints import regularize
 from fifesim.base.geometry import Geometry
-from fifesim.chain import landscapes
+from fifesim.chain import absorbed_light, landscapes
 from fifesim.chain.setup import Setup
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import as_carried
@@ -86,10 +86,21 @@ class Driver:
         _check_uniform(self.setup)
         return fpar_kernel(None, self.setup.canopy, self.setup.geometry, fpar_inf, leaves)[0](lai)
 
+    def absorbed(self, lai, canopy, leaves="green"):
+        """Fraction of light absorbed by the leaves of a canopy of numbers, as `absorbed_light.fpar` from energy."""
+        stand = landscapes.canopies_of(landscapes.Land(None), absorbed_light.PAR_BANDS, canopy)[None]
+        kernel, rasters = absorbed_light.sunlit_kernel(None, stand, self.air, float(self.setup.geometry.sza), leaves)
+        return kernel(lai, *(each.values for each in rasters))[0]
+
     def toa(self, reflectance):
         """Apparent reflectance at the top of the atmosphere, as `steps.to_toa`."""
         terms = self._terms.uniform.values()
         return coupling.apparent_reflectance(reflectance, *(_along_first(each, reflectance.ndim) for each in terms))
+
+    def corrected(self, toa):
+        """Reflectance at the ground, as `steps.to_surface`."""
+        terms = self._terms.uniform.values()
+        return coupling.corrected_reflectance(toa, *(_along_first(each, toa.ndim) for each in terms))
 
     def image(self, toa, cells, setup=None):
         """Digital numbers, or radiance without ``quantise``, of reflectance on a grid of cells."""

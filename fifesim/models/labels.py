@@ -52,6 +52,8 @@ class LandModel(NamedTuple):
     function: Callable
     weather: tuple[str, ...]
     words: str
+    of_green_leaves: bool = False
+    """Whether the leaf area is of green leaves, and FPAR has no effect."""
 
 
 def vapour_deficit(temperature, humidity):
@@ -110,8 +112,10 @@ LAND_MODELS = {
         "light-use": LandModel(
             _light_use, ("temperature", "temperature_min", "humidity", "shortwave", "day_length"), "MOD17"
         ),
-        "photosynthesis": LandModel(_photosynthesis, ("shortwave", "day_length"), "Monsi and Saeki"),
-        "farquhar": LandModel(_farquhar, ("temperature", "shortwave", "diffuse_fraction", "day_length"), "two leaves"),
+        "photosynthesis": LandModel(_photosynthesis, ("shortwave", "day_length"), "Monsi and Saeki", True),
+        "farquhar": LandModel(
+            _farquhar, ("temperature", "shortwave", "diffuse_fraction", "day_length"), "two leaves", True
+        ),
     },
     "evapotranspiration": {
         "penman-monteith": LandModel(_penman_monteith, (*_HEAT, "temperature_min"), "Penman-Monteith, canopy"),
@@ -271,7 +275,7 @@ def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time)
     area = checked_scene(north_up(land.lai))
     weather = fife_weather() if weather is None else weather
     geometry = directions.uniform_geometry(directions.given_geometry(geometry, area, time), quantity)
-    if name in ("photosynthesis", "farquhar"):
+    if model.of_green_leaves:
         # Photosynthesis is of green leaves; their shade is that of the whole canopy only if all are alike.
         area, share = _green(area, land, canopy or TALLGRASS), None
     elif fpar is None:

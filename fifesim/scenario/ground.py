@@ -1,5 +1,6 @@
 """Ground of a scenario: leaf area or a landscape, its canopies, elevation and horizon."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import dask
@@ -10,6 +11,7 @@ from fifesim.chain.absorbed_light import fpar
 from fifesim.chain.landscapes import warn_of_tallgrass
 from fifesim.grids import grid as grids
 from fifesim.grids.sites import on_fife_site
+from fifesim.ground.canopy.optics import band_background, band_leaf_optics
 from fifesim.ground.landscape.classes import CoverClass, Field, class_table
 from fifesim.ground.landscape.cover import PATTERNS, Patches
 from fifesim.ground.landscape.distribution import lai_distribution
@@ -206,6 +208,20 @@ def canopy_of(scenario):
     found = scenario.ground.canopy()
     left_out = {name for name in found.given if _all_have(scenario, name)} | set(drawn_properties(scenario))
     return found.replace(**dict.fromkeys(left_out))
+
+
+def spectral_canopy(scenario, canopy):
+    """Canopy of a complete scenario whose optics by band are replaced by spectra if they are the defaults."""
+    own = scenario.sensor
+    bands = [band.response for band in own.description.select(own.bands)]
+    defaults = {"leaf_optics": band_leaf_optics(bands), "background": band_background(bands)}
+    for name, default in defaults.items():
+        given = getattr(canopy, name)
+        if isinstance(given, Mapping) and set(given) == {band.name for band in bands}:
+            values = np.array([given[band.name] for band in bands]).T
+            if np.allclose(values, default, rtol=1e-6):
+                canopy = canopy.replace(**{name: None})
+    return canopy
 
 
 def truth_of(scenario, setup, land):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -14,16 +14,29 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.analysis.scaling import by_itself, shapley, taken_away
 from fifesim.base.annotations import WholeNumber
+from fifesim.base.arguments import Kind
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import warn
+from fifesim.experiments.scatter.errors import check_retrieval, error_shares, fixed_stages, target_of
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
 from fifesim.grids import grid as grids
 from fifesim.grids.opening import raster_file
+from fifesim.models.weather import Weather
 from fifesim.output.progress import steps
+from fifesim.retrieval.description import Retrieval
 from fifesim.scenario.ground import ground_scene
 from fifesim.scenario.scenario import Scenario, grid_keys
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.provenance import DASH, origin_text
+
+Quantity: TypeAlias = Annotated[
+    str | Callable[..., Any],
+    Kind("a name such as 'gpp', or a function of LAI", lambda value: isinstance(value, str) or callable(value)),
+]
+LineOrRetrieval: TypeAlias = Annotated[
+    str | Retrieval,
+    Kind("'line', or a fifesim.Retrieval", lambda value: isinstance(value, str | Retrieval)),
+]
 
 # Further rows of the table: the remainder with all stages ideal, and the total.
 CURVATURE, TOTAL = "curvature", "total"
@@ -39,23 +52,41 @@ _FILLED = 0.5
 def budget(
     scenario: Scenario | None = None,
     *,
+    quantity: Quantity | None = None,
+    retrieval: LineOrRetrieval = "line",
+    weather: Weather | None = None,
     realisations: int = 20,
     cells: int = 333,
     seed: WholeNumber | None = None,
     each: Callable[[Sequence[Any]], Iterable[Any]] | None = None,
 ) -> xr.Dataset:
     r"""
-    Attribute the scatter of LAI and FPAR about their regression lines on NDVI to the stages of a scenario.
+    Attribute the scatter of LAI and FPAR on NDVI, or the error of a quantity, to the stages of a scenario.
 
-    Scatter is :math:`v = 1 - R^2`, the variance of the truth not explained by a line on NDVI. It is computed for each
-    subset of stages, with the other stages ideal, from the same random numbers. The share of a stage is its Shapley
-    value: its contribution averaged over all orders of adding the stages. Shares and curvature sum to the scatter. A
-    share is negative if the stage makes the relation more linear.
+    Without ``quantity``, scatter is :math:`v = 1 - R^2`, the variance of the truth not explained by a line on NDVI. It
+    is computed for each subset of stages, with the other stages ideal, from the same random numbers. The share of a
+    stage is its Shapley value: its contribution averaged over all orders of adding the stages. Shares and curvature sum
+    to the scatter. A share is negative if the stage makes the relation more linear.
+
+    With ``quantity``, the error is the quantity of the leaf area that is retrieved from the image, minus the mean of
+    the quantity over the cells of the pixel. Its bias and variance over the pixels are attributed in the same way to
+    these stages and two more, with Shapley values that sum to the total: "retrieval", with the ideal that the leaf area
+    of the footprint is known; and "scaling", with the ideal that the model at the mean leaf area of the pixel is the
+    truth.
 
     Parameters
     ----------
     scenario : fifesim.scenario.scenario.Scenario, optional
         By default the case of the paper, with pixels at the interval of Table 1.
+    quantity : str or callable, optional
+        "gpp", "evapotranspiration", one of their models such as "photosynthesis" or "pt-jpl", "lai", "fpar", or a
+        function of arrays of LAI, or of LAI and FPAR. FPAR is the light that green leaves absorb.
+    retrieval : "line" or Retrieval, optional
+        The regression line of the true leaf area on NDVI, fitted for each set of stages; or a retrieval from
+        `fifesim.train`, which estimates LAI from reflectance. Stages that it needs cannot be switched off: their shares
+        are NaN, and the coordinate ``reason`` states why.
+    weather : Weather, optional
+        Numbers for the models; by default `fife_weather`, which is assumed.
     realisations : int, optional
         Number of realisations. Each has its own seeds and, if possible, its own window of the grid. For a LAI map, the
         number of windows is the maximum.
@@ -76,11 +107,16 @@ def budget(
         Along stage: ``origin``, where blur, geolocation and noise of the instrument come from. A stage that is unknown
         has the origin "–" and shares of NaN, and the total leaves it out.
 
+        With ``quantity``: over (realisation, stage) ``bias`` and ``variance``, in the unit of the quantity and its
+        square, exactly 0 for a stage that is ideal; over realisation ``total_bias``, ``total_variance``, and mean
+        ``truth`` and ``truth_variance`` of the pixels.
+
     Raises
     ------
     ValueError
-        If a number is out of range, the red or near infrared band is missing, or a window has fewer than 10 pixels
-        along an edge.
+        If a quantity is unknown or a function returns another shape, NaN or negative numbers, if the retrieval does not
+        estimate LAI or is for another instrument, a number is out of range, the red or near infrared band is missing,
+        or a window has fewer than 10 pixels along an edge.
 
     References
     ----------
@@ -97,10 +133,21 @@ def budget(
     >>> shares = fifesim.budget(scenario, realisations=1, cells=90)
     >>> round(float(shares["total"].sel(variable="lai").mean()), 2)
     0.24
+    >>> errors = fifesim.budget(scenario, quantity="gpp", realisations=1, cells=90)
+    >>> bool(errors["bias"].sel(stage="scaling") > 0.9 * errors["total_bias"])
+    True
     """
     scenario = budget_scenario() if scenario is None else scenario
     _check_map(scenario)
+    if quantity is not None:
+        target = target_of(quantity, weather)
+        check_retrieval(retrieval, scenario)
+    elif retrieval != "line" or weather is not None:
+        raise ValueError("retrieval and weather have an effect only with a quantity: give quantity='gpp' too")
     cases = budget_cases(scenario, realisations=realisations, cells=cells, seed=seed)
+    if quantity is not None:
+        shown = steps(cases, "stage by stage") if each is None else each(cases)
+        return _labelled([error_shares(case, target, retrieval) for case in shown], target, retrieval)
     shown = steps(cases, "stage by stage") if each is None else each(cases)
     made = xr.concat([_one(case) for case in shown], "realisation")
     for values in made.data_vars.values():
@@ -110,6 +157,18 @@ def budget(
     # A stage that could not be simulated has an unknown share, not a share of zero.
     by_stage = made[["share", "alone", "first"]]
     return made.assign(by_stage.where((made["origin"] != DASH) | (by_stage != 0).any(["realisation", "variable"])))
+
+
+def _labelled(found, target, retrieval):
+    """Bias and variance of the realisations with their units, and the reason of stages that cannot be switched off."""
+    made = xr.concat(found, "realisation")
+    squared = f"({target.units})2" if target.units else ""
+    for name, values in made.data_vars.items():
+        what = f"{name.replace('_', ' ')} of {target.name}"
+        values.attrs = {"units": squared if "variance" in name else target.units, "long_name": what}
+    reasons = fixed_stages(retrieval)
+    made.attrs["quantity"] = target.name
+    return made.assign_coords(reason=("stage", [reasons.get(stage, "") for stage in made["stage"].values]))
 
 
 def stage_origins(scenario):

@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.analysis import indices
 from fifesim.analysis.index_labels import red_and_nir
 from fifesim.analysis.scaling_labels import aggregate_blocks
 from fifesim.base.footprints import regularize
@@ -22,6 +21,7 @@ from fifesim.grids.reductions import areas
 from fifesim.ground.canopy.properties import DRAWN
 from fifesim.ground.terrain.labels import light_on_slopes
 from fifesim.ground.terrain.source_labels import beside_altitude
+from fifesim.retrieval.description import Retrieval
 from fifesim.scenario.ground import (
     absorbed_light,
     drawn_properties,
@@ -102,32 +102,34 @@ def ground_with(scenario, grid, at_work, dem=None):
     return land.compute()
 
 
-def images_of(scene, cells, switches):
-    """NDVI with the stages of the sensor active or ideal, with one axis for each stage, shape (..., y, x). [1]"""
+def images_of(scene, cells, switches, hazy=True):
+    """NDVI, or leaf area by a retrieval, for active or ideal stages of the sensor, shape (5 axes of stages, y, x)."""
     scaling, spread, registration, quantisation, noise = switches
     found = np.empty((*map(len, switches), *scene.shape))
     for (i, blurred), (j, displaced) in product(enumerate(spread), enumerate(registration)):
-        means = _means(scene, cells, blurred, displaced)
-        red, nir, of_cells = means
-        of_means = indices.normalized_difference(nir, red)
+        means = means_of(scene, cells, blurred, displaced)
         for (k, counts), (m, grains) in product(enumerate(quantisation), enumerate(noise)):
-            recorded = _recorded(scene, means[:2], counts, grains)
+            if scene.retrieval is not None:
+                found[:, i, j, k, m] = _estimated(scene, _recorded(scene, means, counts, grains), hazy)
+                continue
+            *reflectance, of_cells = means
+            recorded = scene.driver.ndvi(_recorded(scene, np.array(reflectance), counts, grains))
             for n, of_reflectance in enumerate(scaling):
                 # Effects of the detector remain.
-                found[n, i, j, k, m] = recorded if of_reflectance else of_cells + (recorded - of_means)
+                found[n, i, j, k, m] = recorded if of_reflectance else of_cells + (recorded - scene.driver.ndvi(means))
     return found
 
 
-def _means(scene, cells, blurred, displaced):
-    """Means over footprints of red, near infrared and NDVI, shape (3, y, x)."""
-    red, nir = scene.driver.bands
+def means_of(scene, cells, blurred, displaced):
+    """Means of layers over footprints, shape (layer, y, x): one layer for each band, and further ones as the first."""
     setup, grid = scene.setup, scene.grid
     box = scene.image if displaced else scene.blocks
     sizes = grids.cell_size(box)
     shifts = [offset * size for offset, size in zip(setup.offset, sizes, strict=True)] if displaced else (0.0, 0.0)
     rows, columns = scene.shape
     means = np.empty((len(cells), rows, columns))
-    for layer, band in enumerate((red, nir, red)):
+    for layer, _ in enumerate(cells):
+        band = scene.driver.bands[layer if layer < len(scene.driver.bands) else 0]
         spreads = setup.instrument.line_spreads(band) if blurred else areas(scene.blocks)
         along = shared_operators(spreads, grid, box[:rows, :columns], tuple(map(float, shifts)))
         means[layer] = regularize(cells[layer], *along, min_valid=setup.min_valid)
@@ -135,12 +137,23 @@ def _means(scene, cells, blurred, displaced):
 
 
 def _recorded(scene, means, counts, grains):
-    """NDVI of the recorded mean reflectances."""
+    """Reflectance of the recorded mean reflectances, shape (band, y, x)."""
     driver = scene.driver
     radiance = driver.radiance(means)
     if grains:
         radiance = driver.with_noise(radiance, scene.image, scene.setup)
-    return driver.ndvi(driver.planetary(driver.recorded(radiance) if counts else radiance))
+    return driver.planetary(driver.recorded(radiance) if counts else radiance)
+
+
+def _estimated(scene, reflectance, hazy):
+    """Leaf area of pixels by a retrieval, shape (y, x). [m2 m-2]"""
+    if hazy and scene.retrieval.level == "surface":
+        reflectance = scene.driver.corrected(reflectance)
+    geometry = scene.setup.geometry
+    pixels = reflectance.reshape(len(reflectance), -1).T
+    angles = np.broadcast_to([geometry.sza, geometry.vza, geometry.raa], (len(pixels), 3))
+    median = scene.retrieval.estimate(pixels, angles).median
+    return median[:, scene.retrieval.quantities.index("lai")].reshape(reflectance.shape[1:])
 
 
 # In this order along the axes of what `pixels` gives.
@@ -211,23 +224,33 @@ def displaced_pixels(scenario, offsets):
     """`pixels` for several registration errors, with the light at the top of the atmosphere computed once."""
     sensors = [scenario.sensor.model_copy(update={"offset": list(offset)}) for offset in offsets]
     stages = [working_stages(scenario.model_copy(update={"sensor": sensor})) for sensor in sensors]
-    scene = _scene(scenario)
+    scene = scene_of(scenario)
     scenes = [replace(scene, setup=replace(scene.setup, offset=tuple(offset))) for offset in offsets]
-    # False is ideal, True is active.
-    switches = [{name: (False, True) if name in each else (False,) for name in STAGES} for each in stages]
-    lit, images = [name for name in STAGES if name not in _SENSED], [[] for _ in scenes]
-    for states in product(*(switches[0][name] for name in lit)):
-        at_work = {name for name, state in zip(lit, states, strict=True) if state}
-        cells = _cells(scene, scene.ground(at_work), at_work)
-        for found, one, each in zip(images, scenes, switches, strict=True):
-            found.append(images_of(one, cells, [each[name] for name in _SENSED]))
+    switches = [switches_of(each) for each in stages]
+    images = images_of_all(scenes, switches)
     truths, even = _truths(scene, switches[0]), _even(scene)
     even_cells, even_truth = _cells(scene, even, set(stages[0])), _truth(scene, even, True)
     found = []
     for k, one in enumerate(scenes):
         of_even = images_of(one, even_cells, [switches[k][name][-1:] for name in _SENSED]).reshape(scene.shape)
-        found.append(_with_data(stages[k], _in_order(images[k], switches[k], lit), truths, of_even, even_truth))
+        found.append(_with_data(stages[k], images[k], truths, of_even, even_truth))
     return found
+
+
+def switches_of(stages):
+    """States of all stages by name: False is ideal, True is active."""
+    return {name: (False, True) if name in stages else (False,) for name in STAGES}
+
+
+def images_of_all(scenes, switches):
+    """Images of scenes that differ in the offset for all states of their stages, each (13 axes of stages, y, x)."""
+    lit, images = [name for name in STAGES if name not in _SENSED], [[] for _ in scenes]
+    for states in product(*(switches[0][name] for name in lit)):
+        at_work = {name for name, state in zip(lit, states, strict=True) if state}
+        cells = _cells(scenes[0], scenes[0].ground(at_work), at_work)
+        for found, one, each in zip(images, scenes, switches, strict=True):
+            found.append(images_of(one, cells, [each[name] for name in _SENSED], "atmosphere" in at_work))
+    return [_in_order(found, each, lit) for found, each in zip(images, switches, strict=True)]
 
 
 def _in_order(images, switches, lit):
@@ -254,10 +277,11 @@ class _Scene:
     scenario: Scenario
     setup: Setup
     driver: Driver
-    """Driver of the red and the near infrared band, on level ground."""
+    """Driver of the red and the near infrared band, or of the bands of the retrieval, on level ground."""
     grid: GeoBox
     blocks: GeoBox
     image: GeoBox
+    retrieval: Retrieval | None = None
     grounds: dict = field(default_factory=dict)
 
     @property
@@ -290,15 +314,17 @@ class _Scene:
         return spread_out(cells, self.blocks, self.setup.min_valid)
 
 
-def _scene(scenario):
+def scene_of(scenario, retrieval=None):
+    """Scene of a scenario with the bands of NDVI, or of a retrieval."""
     setup, grid = setup_of(scenario), scenario.geobox()
-    bands = _red_and_nir(setup.instrument.select(setup.bands))
+    chosen = setup.instrument.select(setup.bands if retrieval is None else retrieval.bands)
+    bands = _red_and_nir(chosen) if retrieval is None else chosen
     blocks = grids.aligned_grid(grid, scenario.sensor.size)
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
     # In memory, because every set of stages with topography needs them.
     dem, horizon = in_memory(*elevation(scenario, grid)[:2])
     driver = Driver(replace(setup, bands=tuple(band.name for band in bands)))
-    return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), driver, grid, blocks, image)
+    return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), driver, grid, blocks, image, retrieval)
 
 
 def _even(scene):
@@ -333,7 +359,7 @@ def _truth(scene, ground, curve):
     def fpar(area):
         if scene.is_stand(ground):
             return scene.driver.fpar(area, own.ground.fpar_inf)
-        return absorbed_light(own, _setup_over(scene, ground), _with_lai(ground, area)).values
+        return absorbed_light(own, setup_over(scene, ground), _with_lai(ground, area)).values
 
     absorbed = fpar(lai) if curve else along_tangent(fpar, lai, ground.middle)
     size, (rows, columns) = grids.cell_size(scene.blocks)[0], scene.shape
@@ -341,7 +367,7 @@ def _truth(scene, ground, curve):
     return [each[:rows, :columns] for each in means]
 
 
-def _setup_over(scene, ground):
+def setup_over(scene, ground):
     """Setup without the canopy properties that vary by cell."""
     given = scene.setup.canopy.given & set(ground.land.data_vars)
     return replace(scene.setup, canopy=scene.setup.canopy.replace(**dict.fromkeys(given)))
@@ -353,9 +379,9 @@ def _with_lai(ground, area):
 
 
 def _cells(scene, ground, at_work):
-    """Red, near infrared and NDVI of the cells, at the ground or at the top of the atmosphere, shape (3, y, x)."""
+    """Bands of the cells at the ground or at the top of the atmosphere, and NDVI without a retrieval, (layer, y, x)."""
     driver, bands = scene.driver, list(scene.driver.setup.bands)
-    setup = _setup_over(scene, ground)
+    setup = setup_over(scene, ground)
     setup = setup if "topography" in at_work else replace(setup, dem=None, horizon=None)
 
     def reflectance(area):
@@ -371,8 +397,7 @@ def _cells(scene, ground, at_work):
     seen = ground.known[key]
     if "atmosphere" in at_work:
         seen = _with_adjacency(scene, seen) if setup.adjacency else driver.toa(seen)
-    red, nir = seen
-    return np.stack([red, nir, driver.ndvi(seen)])
+    return seen if scene.retrieval is not None else np.concatenate([seen, driver.ndvi(seen)[None]])
 
 
 def _with_adjacency(scene, reflectance):

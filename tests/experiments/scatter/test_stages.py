@@ -14,12 +14,12 @@ from fifesim.experiments.scatter.stages import (
     STAGES,
     STEP,
     _Scene,
-    _scene,
     along_tangent,
     displaced_pixels,
     images_of,
     middle_cells,
     pixels,
+    scene_of,
     spread_out,
 )
 from fifesim.grids import grid as grids
@@ -140,7 +140,9 @@ IDEAL = ((False,), (False,), (False,), (False,), (False,))
 
 @pytest.fixture(scope="module")
 def scene():
-    return _scene(Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"}, sensor={"offset": [0.0, 1.0]}))
+    return scene_of(
+        Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"}, sensor={"offset": [0.0, 1.0]})
+    )
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,143 @@
+"""Bias and variance of the error of a quantity by stage."""
+
+import numpy as np
+import pytest
+
+import fifesim
+from fifesim.analysis.scaling import shapley
+from fifesim.experiments.scatter.errors import ERROR_STAGES
+from fifesim.experiments.scatter.shares import budget_cases
+
+SQUARE = {"west": 707970.0, "north": 4331220.0, "width": 600.0, "height": 600.0}
+BURNED = {"grid": SQUARE, "terrain": {"dem": "flat"}, "sensor": {"offset": [0.3, 0.0]}}
+TREATMENTS = ("burned-grazed", "burned-ungrazed", "unburned-ungrazed")
+PASTURES = BURNED | {
+    "landscape": {"cover": "voronoi", "size": 150.0, "deviations": {"soil": 0.03}},
+    "classes": {name: {"distribution": name} for name in TREATMENTS},
+}
+
+
+def shares_of(sections, quantity="gpp", realisations=3, **options):
+    scenario = fifesim.Scenario(**sections)
+    return fifesim.budget(scenario, quantity=quantity, realisations=realisations, each=iter, **options)
+
+
+@pytest.mark.parametrize("quantity", ["gpp", "photosynthesis", "penman-monteith"])
+def test_shares_add_up_and_ideal_stages_have_none(quantity):
+    found = shares_of(BURNED, quantity)
+    for kind in ("bias", "variance"):
+        np.testing.assert_allclose(found[kind].sum("stage"), found[f"total_{kind}"], rtol=0, atol=1e-9)
+        ideal = ["noise", "topography", "soil", "dead leaves", "cover", "clumping", "covariance"]
+        assert (found[kind].sel(stage=ideal) == 0).all()
+    assert list(found.stage.values) == list(ERROR_STAGES)
+    assert found.bias.attrs["units"] in ("g m-2 d-1", "kg m-2 d-1")
+
+
+@pytest.mark.parametrize("sections", [BURNED, PASTURES], ids=["burned-grazed", "pastures"])
+def test_bias_comes_from_scaling_and_scatter_from_registration(sections):
+    found = shares_of(sections, "photosynthesis").mean("realisation")
+    assert found.bias.sel(stage="scaling") > 0.9 * found.total_bias > 0
+    if sections is BURNED:
+        assert found.variance.sel(stage="registration") > 0.5 * found.total_variance
+    else:
+        assert found.variance.sel(stage="soil") > 0
+
+
+def test_concave_models_are_biased_by_the_curvature_of_the_truth():
+    """With the true mean LAI, the bias is the mean of the model at the pixel means minus its mean at the cells."""
+    scenario = fifesim.Scenario(**BURNED)
+    (case,) = budget_cases(scenario, realisations=1, cells=333)
+    lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
+
+    def saturating(area):
+        return 1 - np.exp(-0.6 * area)
+
+    means, truth = lai.fifesim.aggregate(30), saturating(lai).fifesim.aggregate(30)
+    expected = (saturating(means) - truth).isel(y=slice(1, -1), x=slice(1, -1)).mean()
+    found = shares_of(BURNED, saturating, realisations=1)
+    # Pixels at the edge have no data; the others differ little in the mean.
+    np.testing.assert_allclose(found.bias.sel(stage="scaling").item(), expected.item(), rtol=0.05)
+
+
+def test_linear_quantity_with_a_line_has_the_shares_of_the_closed_form(tmp_path):
+    """
+    Independent cells of nearly the same leaf area, displaced by a third of a pixel.
+
+    Footprint and block have the correlation r = 2 / 3. The error has the variance 2 (1 - r) of the block means if LAI
+    of the footprint is known, and 1 - r^2 / (1 + q) on a line, with the share q of digital numbers in the variance of
+    NDVI. The total of the budget gives q, and q the three shares.
+    """
+    path = tmp_path / "narrow.csv"
+    np.savetxt(path, np.random.default_rng(1).normal(2.0, 0.1, 2000), header="lai", comments="")
+    sensor = {"instrument": "OLI2", "response": "detector", "offset": [1 / 3, 0.0]}
+    sections = BURNED | {"sensor": sensor, "ground": {"distribution": str(path), "arp": 0.0}}
+    found = shares_of(sections, lambda area: 3.0 * area, realisations=8)
+    shares, total = found.variance / found.truth_variance, found.total_variance / found.truth_variance
+    q = (4 / 9) / (1 - float(total.mean())) - 1
+    values = np.zeros((2, 2, 2))  # retrieval, registration, quantisation
+    values[0, 1] = 2 * (1 - 2 / 3)
+    for displaced, r in enumerate((1, 2 / 3)):
+        values[1, displaced] = 1 - r**2, 1 - r**2 / (1 + q)
+    for stage, expected in zip(("retrieval", "registration", "quantisation"), shapley(values, 3), strict=True):
+        each = shares.sel(stage=stage)
+        error = float(each.std("realisation", ddof=1)) / np.sqrt(each.size)
+        assert abs(float(each.mean()) - expected) < 3 * error, stage
+        assert error < 0.015
+    np.testing.assert_allclose(found.variance.sel(stage="scaling"), 0, atol=1e-12)
+    np.testing.assert_allclose(found.bias.sel(stage="scaling"), 0, atol=1e-12)
+
+
+def test_retrieval_of_reflectance_states_what_cannot_be_switched_off():
+    chip = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
+    study = fifesim.Study(chip, {"visibility": {"uniform": [20, 60]}}, landscapes=10)
+    retrieval = fifesim.train(study, "line", chips=10)
+    found = shares_of(BURNED, "photosynthesis", realisations=1, retrieval=retrieval)
+    assert "top of the atmosphere" in str(found.reason.sel(stage="atmosphere").item())
+    assert "not NDVI" in str(found.reason.sel(stage="NDVI scaling").item())
+    assert found.variance.sel(stage="atmosphere").isnull().all()
+    np.testing.assert_allclose(found.variance.sum("stage"), found.total_variance, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.bias.sum("stage"), found.total_bias, rtol=0, atol=1e-9)
+    # The estimates are those of the image of the whole chain.
+    (case,) = budget_cases(fifesim.Scenario(**BURNED), realisations=1, cells=333)
+    run = fifesim.simulate(case)
+    image = run["image"]["dn"].fifesim.to_reflectance().fifesim.retrieve(retrieval).lai
+    truth = run["truth"].to_dataset().lai.values
+    both = np.isfinite(image.values) & np.isfinite(truth)
+    area = fifesim.budget(fifesim.Scenario(**BURNED), quantity="lai", retrieval=retrieval, realisations=1, each=iter)
+    np.testing.assert_allclose(area.total_bias, (image.values - truth)[both].mean(), atol=2e-3)
+
+
+def negative(area):
+    return area - 100
+
+
+def short(area):
+    return area[..., :1]
+
+
+def missing(area):
+    return np.full(area.shape, np.nan)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"quantity": negative}, "negative returns -.*must not be negative"),
+        ({"quantity": short}, "short returns shape"),
+        ({"quantity": missing}, "missing returns nan"),
+        ({"quantity": lambda a, b, c: a}, "must take LAI, or LAI and FPAR, it needs 3 arguments"),
+        ({"quantity": "yield"}, "quantity must be a function of LAI, or one of lai, fpar, gpp"),
+        ({"quantity": "gpp", "retrieval": "net"}, "retrieval must be 'line' or a fifesim.Retrieval"),
+        ({"retrieval": "net"}, "only with a quantity"),
+    ],
+    ids=str,
+)
+def test_invalid_quantities_are_refused_by_name(options, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.budget(fifesim.Scenario(**BURNED), realisations=1, each=iter, **options)
+
+
+def test_weather_by_cell_is_refused(lai):
+    weather = fifesim.fife_weather().replace(shortwave=(500 + lai).drop_attrs())
+    with pytest.raises(ValueError, match="weather of numbers, got a raster of shortwave"):
+        fifesim.budget(fifesim.Scenario(**BURNED), quantity="gpp", weather=weather, realisations=1)
