@@ -146,6 +146,7 @@ from .scenario.simulation import simulate as simulate
 from .scenario.sweeps import sweep as sweep
 from .output.chips.folder import dataset as dataset
 from .experiments.scatter.shares import budget as budget
+from .experiments.scatter.study_indices import sensitivity as sensitivity
 from .experiments.explorer.page import explore as explore
 from .scenario.scenario import Scenario as Scenario
 from .scenario.scenario import default_scenario as default_scenario

@@ -1,13 +1,15 @@
 """Bias and variance of the error of a quantity that is computed from retrieved leaf area, by stage."""
 
+from collections.abc import Callable
 from inspect import Parameter, signature
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 import xarray as xr
 
 from fifesim.analysis.scaling import shapley
+from fifesim.base.arguments import Kind
 from fifesim.chain.absorbed_light import fpar as absorbed_fraction
 from fifesim.chain.driver import cell_block_means
 from fifesim.experiments.scatter.stages import (
@@ -28,6 +30,11 @@ from fifesim.models.weather import fife_weather
 from fifesim.retrieval.description import Retrieval
 from fifesim.scenario.ground import drawn_properties, spectral_canopy
 
+QuantityOrFunction: TypeAlias = Annotated[
+    str | Callable[..., Any],
+    Kind("a name such as 'gpp', or a function of LAI", lambda value: isinstance(value, str) or callable(value)),
+]
+
 ERROR_STAGES = STAGES | {
     "retrieval": "leaf area of the pixel's footprint is known",
     "scaling": "the model at the mean leaf area of the pixel is the truth, instead of its mean over the cells",
@@ -36,7 +43,7 @@ ERROR_STAGES = STAGES | {
 
 
 class Target(NamedTuple):
-    """Quantity whose error is attributed: a model of `models.labels`, a function, or LAI or FPAR itself."""
+    """QuantityOrFunction whose error is attributed: a model of `models.labels`, a function, or LAI or FPAR itself."""
 
     name: str
     quantity: str
@@ -200,7 +207,7 @@ def _truths(scene, target, switches):
 
 
 def of_cells(scene, target, ground):
-    """Quantity of the cells of a ground, shape (y, x)."""
+    """QuantityOrFunction of the cells of a ground, shape (y, x)."""
     setup = setup_over(scene, ground)
     canopy = spectral_canopy(scene.scenario, setup.canopy)
     light = {"canopy": canopy, "atmosphere": scene.driver.air, "geometry": setup.geometry}
@@ -215,7 +222,7 @@ def of_cells(scene, target, ground):
 
 
 def of_pixels(scene, target, canopy, lai):
-    """Quantity of pixels with the mean canopy of the scene, shape of the leaf area."""
+    """QuantityOrFunction of pixels with the mean canopy of the scene, shape of the leaf area."""
     fpar, flat = None, np.ascontiguousarray(lai).reshape(-1)
     if target.takes_fpar:
         fpar = scene.driver.absorbed(flat, canopy)

@@ -17,7 +17,13 @@ from fifesim.base.annotations import WholeNumber
 from fifesim.base.arguments import Kind
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import warn
-from fifesim.experiments.scatter.errors import check_retrieval, error_shares, fixed_stages, target_of
+from fifesim.experiments.scatter.errors import (
+    QuantityOrFunction,
+    check_retrieval,
+    error_shares,
+    fixed_stages,
+    target_of,
+)
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
 from fifesim.grids import grid as grids
 from fifesim.grids.opening import raster_file
@@ -29,10 +35,6 @@ from fifesim.scenario.scenario import Scenario, grid_keys
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.provenance import DASH, origin_text
 
-Quantity: TypeAlias = Annotated[
-    str | Callable[..., Any],
-    Kind("a name such as 'gpp', or a function of LAI", lambda value: isinstance(value, str) or callable(value)),
-]
 LineOrRetrieval: TypeAlias = Annotated[
     str | Retrieval,
     Kind("'line', or a fifesim.Retrieval", lambda value: isinstance(value, str | Retrieval)),
@@ -52,7 +54,7 @@ _FILLED = 0.5
 def budget(
     scenario: Scenario | None = None,
     *,
-    quantity: Quantity | None = None,
+    quantity: QuantityOrFunction | None = None,
     retrieval: LineOrRetrieval = "line",
     weather: Weather | None = None,
     realisations: int = 20,
