@@ -268,6 +268,41 @@ def budget_command(
     report(files, time.monotonic() - start, f"{output / 'report.html'} in a browser")
 
 
+@app.command("endtoend")
+def endtoend_command(
+    scenario: Annotated[Path | None, typer.Argument(help="Scenario file (TOML); by default the default one.")] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("endtoend"),
+    quantity: Annotated[
+        str, typer.Option(help="gpp, evapotranspiration, or one of their models such as photosynthesis or pt-jpl.")
+    ] = "gpp",
+    retrieval: Annotated[
+        Path | None, typer.Option(help="Trained retrieval (NetCDF); by default a line on NDVI.")
+    ] = None,
+    realisations: Annotated[int, typer.Option(help="Number of scenes.")] = 20,
+    cells: Annotated[int, typer.Option(help="Cells along the edge of a scene.")] = 333,
+    seed: Annotated[int | None, typer.Option(help="Seed of the first scene; by default from the scenario.")] = None,
+    overwrite: _Overwrite = False,
+    allow_remote: _AllowRemote = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+):
+    """Attribute bias and variance of GPP or evapotranspiration from retrieved LAI. Writes a report with maps."""
+    start = time.monotonic()
+    _check_spelling(scenario)
+
+    with importing():
+        from fifesim.experiments.scatter.endtoend import endtoend_to_folder
+        from fifesim.retrieval.description import read_retrieval
+        from fifesim.scenario.scenario import read_scenario
+
+    files = endtoend_to_folder(
+        None if scenario is None else read_scenario(scenario), output, quantity=quantity,
+        retrieval="line" if retrieval is None else read_retrieval(retrieval), realisations=realisations, cells=cells,
+        seed=seed, overwrite=overwrite,
+    )  # fmt: skip
+    report(files, time.monotonic() - start, f"{output / 'report.html'} in a browser")
+
+
 @app.command("explore")
 def explore_command(
     scenario: Annotated[

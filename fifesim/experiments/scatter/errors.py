@@ -36,6 +36,7 @@ QuantityOrFunction: TypeAlias = Annotated[
 ]
 
 ERROR_STAGES = STAGES | {
+    "non-linearity": "reflectance is linear in LAI, along the tangent at the mean LAI of the pixel",
     "retrieval": "leaf area of the pixel's footprint is known",
     "scaling": "the model at the mean leaf area of the pixel is the truth, instead of its mean over the cells",
 }
