@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = "fifesim"
 
 # The author's own file, which the recipe of a public function cannot name.
-OWN_FILE = "fifesim/analysis/gpp.py"
+OWN_FILE = "fifesim/analysis/npp.py"
 
 RECIPES = tomllib.loads((ROOT / "tests" / "data" / "recipes.toml").read_text(encoding="utf-8"))
 
