@@ -26,6 +26,7 @@ from .ground.landscape.distribution import treatments as treatments
 from .ground.landscape.autoregression import correlation_length as correlation_length
 from .ground.landscape.autoregression import arp_for_length as arp_for_length
 from .ground.landscape.labels import landscape as landscape
+from .ground.landscape.season_labels import phenology as phenology
 from .ground.landscape.cover import Patches as Patches
 from .ground.landscape.classes import CoverClass as CoverClass
 from .ground.landscape.classes import fife_classes as fife_classes
@@ -69,6 +70,8 @@ from .sensor.labels import sense as sense  # method, of a Dataset too
 from .sensor.band_labels import to_bands as to_bands  # method
 from .sensor.scan_labels import scan_geometry as scan_geometry
 from .sensor.response.scan import Track as Track
+from .sensor.overpass_labels import overpasses as overpasses
+from .sensor.overpass_labels import to_gac as to_gac  # method
 from .sensor.scan_labels import sense_swath as sense_swath  # method
 from .grids.swaths import grid_swath as grid_swath  # method
 from .chain.comparison import compare as compare  # method, of a Dataset too
