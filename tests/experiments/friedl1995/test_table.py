@@ -51,6 +51,8 @@ def test_rows_of_the_table_are_those_of_the_paper(found, tables):
             place = {"distribution": row["distribution"], "arp": row["arp"], "variable": row["variable"]}
             assert row["slope"] == pytest.approx(float(fit.sel(place)), rel=1e-12)
             assert row["paper_slope"] == float(found["paper_slope"].sel(place))
+            three = found["slope"].sel(reading=name).sel(place).values
+            assert row["slope_deviation"] == pytest.approx(np.sqrt(np.sum((three - three.mean()) ** 2) / 2), rel=1e-9)
 
 
 def test_sample_of_200_scatters_as_theory_says(tables):
