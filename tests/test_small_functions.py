@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from fifesim.analysis.regression import totals
 from fifesim.atmosphere.aerosols import covers
@@ -10,26 +9,16 @@ from fifesim.atmosphere.coupling import nodes_of
 from fifesim.atmosphere.gases import absorber_layers, profile_above
 from fifesim.atmosphere.mixtures import sphere
 from fifesim.atmosphere.models import ozone_column, water_vapour_column
-from fifesim.base.arguments import is_a
 from fifesim.base.bands import Band
-from fifesim.base.lattice import centres, check_seed, whole_cells
-from fifesim.base.messages import closest
+from fifesim.base.lattice import centres, whole_cells
 from fifesim.experiments.verification.deviations import integral
-from fifesim.grids.cf import check_words
-from fifesim.grids.inputs import check_scale, no_data_of
-from fifesim.grids.projection import place_in_words
-from fifesim.ground.canopy.leaf_area import outside
-from fifesim.ground.canopy.soil import check_brightness, check_moisture
 from fifesim.ground.canopy.spectra import (
     Background,
     background_means,
-    check_shares,
     did_you_mean,
     is_mixture,
     spectrum_names,
 )
-from fifesim.ground.landscape.coarse_lattice import check_coarser
-from fifesim.ground.landscape.covariance import flat
 from fifesim.ground.terrain.slope import rise
 from fifesim.output.report import plus_minus
 from fifesim.scenario.toml import full_path
@@ -64,35 +53,13 @@ def test_nodes_reach_beyond_a_band():
     assert nodes_of([Band("red", (0.6, 0.65), (1, 1))]).tolist() == [0.55, 0.59, 0.633, 0.67, 0.694]
 
 
-def test_class_is_known_by_name():
-    assert is_a(1.5, "float", "int") and not is_a("1.5", "float")
-
-
 def test_lattice_counts_from_the_origin():
     assert whole_cells(100.5, 10.0) == (10, 0.5) and whole_cells(100.5, -10.0) == (-11, -9.5)
     assert centres(100.5, 10.0, np.array([0, 3])).tolist() == [105.5, 135.5]
 
 
-def test_seed_of_numpy_is_a_seed():
-    assert check_seed(np.uint8(7)) == 7
-
-
-def test_closest_name():
-    names = ["continental", "maritime"]
-    assert closest("maritme", names) == "maritime" and closest("desert", names) == ""
-
-
 def test_integral_with_a_kink():
     assert integral(abs, (-1.0, 0.0, 2.0)) == pytest.approx(2.5, abs=1e-12)
-
-
-def test_values_outside_a_range_are_counted_without_nan():
-    assert outside(np.array([0.2, np.nan, 1.5]), 0.0, 1.0) == 1
-
-
-def test_soil_values_in_range_pass():
-    assert check_brightness(-0.04) == -0.04 and check_moisture(0.3) is None
-    assert check_shares(["soil_dry", "shade"], [0.25, 0.75]) is None
 
 
 def test_background_is_a_linear_mixture():
@@ -105,34 +72,12 @@ def test_background_is_a_linear_mixture():
     assert did_you_mean("TM33", ["TM3", "TM4"]) == ", did you mean 'TM3'?"
 
 
-def test_coarsening_factor_in_range_passes():
-    assert check_coarser(4) == 4
-
-
-def test_nested_correlations_are_flattened():
-    assert list(flat({"lai": {"soil": -0.4}})) == [("lai", "soil", -0.4)]
-
-
 def test_rise_continues_past_a_missing_end():
     assert (rise(0.0, 1.0, 5.0), rise(np.nan, 1.0, 5.0), rise(np.nan, 1.0, np.nan)) == (5.0, 8.0, 0.0)
 
 
 def test_standard_error_follows_its_number():
     assert plus_minus(0.25, 2) == " ± 0.25" and plus_minus(float("nan")) == ""
-
-
-def test_names_of_the_quantity_pass():
-    assert check_words("map.tif", ["LAI_500m"], "lai") is None
-    assert check_scale(np.array([[0.2, 0.3]])).shape == (1, 2)
-
-
-def test_value_for_no_data():
-    assert no_data_of(xr.DataArray([35, 255], attrs={"_FillValue": 255})) == 255
-    assert no_data_of(xr.DataArray([0, 1])) is None
-
-
-def test_place_as_text():
-    assert place_in_words(28.2, -25.125) == "latitude -25.12, longitude 28.20"
 
 
 def test_paths_of_a_scenario():
