@@ -8,13 +8,12 @@ import dask.array as da
 import numpy as np
 import xarray as xr
 from dask.graph_manipulation import bind
-from dask.highlevelgraph import HighLevelGraph
 from numba import vectorize
 from scipy.sparse.csgraph import connected_components
 
 from fifesim.base.footprints import AxisOperator, axis_operator, regularize
 from fifesim.base.line_spread import Boxcar
-from fifesim.grids import chunks
+from fifesim.grids import chunks, windows
 from fifesim.grids import grid as grids
 from fifesim.grids.chunks import Reads, in_blocks
 
@@ -121,12 +120,6 @@ def _chain(data, weights, edges, numbers):
     return da.block(parts[None].tolist())
 
 
-def _alone(chunk):
-    """Array with a graph reduced to its dependencies."""
-    graph = {chunk.name: chunk.dask.cull(chunk.__dask_keys__()).to_dict()}
-    return da.Array(HighLevelGraph(graph, {chunk.name: set()}), chunk.name, chunk.chunks, meta=chunk._meta)
-
-
 def _links(data, weights, edges, numbers, in_turn=False):
     """One chain of sums, with each chunk read after the previous sum, or at any time."""
     rest = tuple(range(1, data.ndim))
@@ -135,7 +128,7 @@ def _links(data, weights, edges, numbers, in_turn=False):
     for number in numbers if len(numbers) else [0]:
         part, chunk = weights[:, edges[number] : edges[number + 1]], data.blocks[number]
         if in_turn and total:
-            chunk = bind(_alone(chunk), total[0])
+            chunk = bind(windows.alone(chunk), total[0])
         arguments = (part, None, chunk, (0, *rest), *total)
         meta = np.empty((0,) * data.ndim)
         made = da.blockwise(_add, sums, *arguments, concatenate=True, new_axes=rows, dtype=float, meta=meta)

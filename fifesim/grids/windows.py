@@ -78,6 +78,12 @@ def held(array):
     return da.Array(layers, name, array.chunks, dtype=array.dtype, meta=array._meta)
 
 
+def alone(array):
+    """Lazy array with a graph reduced to its own tasks and what they need."""
+    graph = {array.name: array.dask.cull(array.__dask_keys__()).to_dict()}
+    return da.Array(HighLevelGraph(graph, {array.name: set()}), array.name, array.chunks, meta=array._meta)
+
+
 def slices(sizes):
     """Slices of chunks of some sizes."""
     edges = _starts(sizes).tolist()

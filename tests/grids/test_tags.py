@@ -61,6 +61,14 @@ def test_selected_variables_keep_their_names(truth, tmp_path, opened):
         found, names = opened(copy), [list(truth)[band] for band in bands]
         assert found["band"].values.tolist() == names
         np.testing.assert_array_equal(found, [truth[name] for name in names])
+    copy = Copy(path)
+    copy.descriptions = ["lai", "mine"]
+    with pytest.raises(ValueError, match="are lai, mine, and its tag FIFESIM has lai, fpar"):
+        opened(copy)
+    # One band can be no other.
+    copy = Copy(truth["lai"].fifesim.to_geotiff(tmp_path / "lai.tif"))
+    copy.descriptions = ["mine"]
+    np.testing.assert_array_equal(opened(copy), truth["lai"])
 
 
 def test_bands_without_names_are_counted_by_their_wavelengths(image, tmp_path):
