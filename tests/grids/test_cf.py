@@ -15,6 +15,7 @@ def raster(**attrs):
 # Names of version 85 of the CF standard name table, with its canonical units as they are written here.
 STANDARD_NAMES = {
     "area_fraction": "1",
+    "atmosphere_optical_thickness_due_to_cloud": "1",
     "fraction_of_surface_downwelling_photosynthetic_radiative_flux_absorbed_by_vegetation": "1",
     # Convertible to the canonical kg m-2 s-1.
     "gross_primary_productivity_of_biomass_expressed_as_carbon": "g m-2 d-1",
