@@ -77,7 +77,7 @@ def sobol_indices(values):
 
     Examples
     --------
-    Of the sum of an input and twice another, the second has four times the variance:
+    In the sum of an input and twice another, the second has four times the variance:
 
     >>> from scipy.stats import qmc
     >>> sets = sobol_points(qmc.Sobol(4, seed=0).random(1024))

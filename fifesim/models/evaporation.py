@@ -286,7 +286,7 @@ def reference_evapotranspiration(tmin, tmax, ea_kpa, rs_mj, u2, elevation, latit
 
     Notes
     -----
-    Constants are those of ASCE, which differ from FAO-56 in the last printed digit. The logarithmic profile, Eq. 47 of
+    The constants are from ASCE and differ from FAO-56 in the last printed digit. The logarithmic profile, Eq. 47 of
     FAO-56, is applied at any height; at 2 m its rounded constants give a factor of 1.0004.
 
     References

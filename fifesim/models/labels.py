@@ -47,7 +47,7 @@ PHOTONS = 4.57
 
 
 class LandModel(NamedTuple):
-    """Function ``f(lai, fpar, weather, sza)`` of arrays, the weather that it needs, and what its result is."""
+    """Function ``f(lai, fpar, weather, sza)`` of arrays, the weather it needs, and its name in the history."""
 
     function: Callable
     weather: tuple[str, ...]
@@ -95,7 +95,7 @@ def _penman_monteith(lai, fpar, weather, sza):
 
 
 def _pt_jpl(lai, fpar, weather, sza):
-    # PT-JPL takes FPAR from NDVI, by its own line.
+    # PT-JPL computes FPAR from NDVI by a line, which is inverted here.
     found = evaporation.pt_jpl(
         weather.temperature, 100 * weather.humidity, weather.pressure, 0.8 * fpar + 0.17, LARGEST_FPAR, lai,
         weather.net_radiation, weather.ground_heat,
@@ -276,7 +276,7 @@ def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time)
     weather = fife_weather() if weather is None else weather
     geometry = directions.uniform_geometry(directions.given_geometry(geometry, area, time), quantity)
     if model.of_green_leaves:
-        # Photosynthesis is of green leaves; their shade is that of the whole canopy only if all are alike.
+        # Dead leaves do not take part; their shade is neglected.
         area, share = _green(area, land, canopy or TALLGRASS), None
     elif fpar is None:
         share = absorbed_fraction(

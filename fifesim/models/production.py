@@ -101,7 +101,7 @@ def maintenance_respiration(lai, tmean_c, sla=38.0, root_per_leaf=2.6, leaf_rate
     sla : float, optional
         Leaf area per carbon, by default of grassland, as the others. [m2 kg-1]
     root_per_leaf : float, optional
-        Carbon of fine roots over that of leaves. [1]
+        Carbon of fine roots divided by carbon of leaves. [1]
     leaf_rate, root_rate : float, optional
         Respired share of the carbon at 20 degC. [d-1]
 
@@ -202,7 +202,7 @@ def two_leaves(lai, par, diffuse_fraction, sza, vcmax25):
     par : array
         Photon flux above the canopy. [umol m-2 s-1]
     diffuse_fraction : array
-        Of the photon flux. [1]
+        Diffuse fraction of the photon flux. [1]
     sza : array
         Below 90. [degree]
     vcmax25 : array
@@ -251,11 +251,11 @@ def farquhar_canopy(lai, par, diffuse_fraction, sza, ta_k, vcmax25=60.0, ci_pa=2
     par : array
         Photon flux above the canopy. [umol m-2 s-1]
     diffuse_fraction : array
-        Of the photon flux. [1]
+        Diffuse fraction of the photon flux. [1]
     sza : array
         Below 90. [degree]
     ta_k : array
-        Temperature of the leaves, taken as that of the air. [K]
+        Temperature of the leaves, assumed equal to the air temperature. [K]
     vcmax25 : array, optional
         Capacity of carboxylation of the uppermost leaves at 25 degC; the default is a typical C3 grass (assumed).
         [umol m-2 s-1]

@@ -68,7 +68,7 @@ class Weather:
     day_length : float or xarray.DataArray, dims (y, x), optional
         Time between sunrise and sunset. [h]
     diffuse_fraction : float or xarray.DataArray, dims (y, x), optional
-        Of the photosynthetically active radiation. [1]
+        Diffuse fraction of the photosynthetically active radiation. [1]
 
     Raises
     ------
