@@ -63,7 +63,7 @@ def two_stream(leaf_reflectance, leaf_transmittance, chi, sza, lai, ground):
 
     Notes
     -----
-    The equations equal SAIL's equations of fluxes with other coefficients, so that SAIL's solution is used. It holds for
+    These are SAIL's equations of fluxes with other coefficients, so that SAIL's solution is used. It holds for
     conservative leaves and where :math:`K \bar\mu` equals the eigenvalue, where printed solutions divide by 0.
 
     References
