@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numba
 import numpy as np
 from scipy import stats
 
 from fifesim.base.annotations import Numbers
 from fifesim.base.arguments import Method
+from fifesim.base.arrays import compiled
 
 
 @dataclass(frozen=True)
@@ -178,10 +178,15 @@ class Regression:
         return self.predict(x) - half, self.predict(x) + half
 
 
-@numba.njit(nogil=True, cache=True)
 def row_sums(y, x, y_origin, x_origin):
     """Sums of 1, x, y, xx, xy and yy over the valid pairs of each row, shape (rows, 6)."""
     sums = np.zeros((y.shape[0], 6))
+    _add_pairs(y, x, y_origin, x_origin, sums)
+    return sums
+
+
+@compiled
+def _add_pairs(y, x, y_origin, x_origin, sums):
     for i in range(y.shape[0]):
         for j in range(y.shape[1]):
             a, b = x[i, j] - x_origin, y[i, j] - y_origin
@@ -192,7 +197,6 @@ def row_sums(y, x, y_origin, x_origin):
                 sums[i, 3] += a * a
                 sums[i, 4] += a * b
                 sums[i, 5] += b * b
-    return sums
 
 
 def totals(sums):
@@ -255,7 +259,7 @@ def equivalent_noise(deviation, slope, value):
     return deviation / (slope * value)
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def increment_sums(variable, ndvi, first, width, increments, ndvi_origin):
     """Sums of 1, variable, NDVI and squared NDVI of each row by increment, shape (rows, 4 increments)."""
     sums = np.zeros((variable.shape[0], 4 * increments))

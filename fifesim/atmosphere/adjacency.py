@@ -10,9 +10,9 @@ Blocks are counted from the origin of the CRS, as cells are.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy import fft
 
+from fifesim.base.arrays import compiled
 from fifesim.base.footprints import axis_operator, regularize
 from fifesim.base.line_spread import Boxcar
 
@@ -468,7 +468,7 @@ def _cells_of(along, pieces, linear):
     return _Cells(piece, (cells + along.blocks.offset) % size, weights)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _add_moments(values, down, across, sums):
     """Add sums and counts of each piece in integers, whose sum does not depend on the order."""
     for i in range(values.shape[0]):

@@ -4,11 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.special import exprel
 
 from fifesim.atmosphere.aerosols import SCALE_HEIGHT
 from fifesim.atmosphere.gases import DEPOLARIZATION, rayleigh_anisotropy
+from fifesim.base.arrays import compiled
 
 # Columns of an expansion: of F11 (the phase function), of F22 and F33 together, and of F12.
 INTENSITY, LINEAR, DIAGONAL, POLARIZING = range(4)
@@ -157,7 +157,6 @@ def truncated_expansion(moments, count):
     return kept * (2 * np.arange(count)[:, None] + 1) / (1 - peak), float(peak)
 
 
-@njit(nogil=True, cache=True)
 def wigner(order, spin, cosine, count):
     r"""
     Wigner functions of all degrees, by recurrence.
@@ -186,9 +185,15 @@ def wigner(order, spin, cosine, count):
     [1.0, 0.5, -0.125]
     """
     functions = np.zeros((count, cosine.size))
-    lowest = max(order, abs(spin))
-    if lowest >= count:
-        return functions
+    if max(order, abs(spin)) < count:
+        _recur(order, spin, cosine, functions)
+    return functions
+
+
+@compiled
+def _recur(order, spin, cosine, functions):
+    """Fill in Wigner functions, 0 where the degree is below order or spin."""
+    count, lowest = functions.shape[0], max(order, abs(spin))
     apart, together = abs(order - spin), abs(order + spin)
     start = math.exp(0.5 * (math.lgamma(2 * lowest + 1) - math.lgamma(apart + 1) - math.lgamma(together + 1)))
     if spin < order and (order - spin) % 2 == 1:
@@ -200,11 +205,12 @@ def wigner(order, spin, cosine, count):
             if s == 0:
                 functions[1, j] = x
                 continue
-            before = functions[s - 1, j] * (s + 1) * math.sqrt((s**2 - order**2) * (s**2 - spin**2))
+            # Products: numba compiles whole powers of whole numbers as loops.
+            squared, squared_next = s * s, (s + 1) * (s + 1)
+            before = functions[s - 1, j] * (s + 1) * math.sqrt((squared - order * order) * (squared - spin * spin))
             here = functions[s, j] * (2 * s + 1) * (s * (s + 1) * x - order * spin)
-            scale = s * math.sqrt(((s + 1) ** 2 - order**2) * ((s + 1) ** 2 - spin**2))
+            scale = s * math.sqrt((squared_next - order * order) * (squared_next - spin * spin))
             functions[s + 1, j] = (here - before) / scale
-    return functions
 
 
 def stokes_basis(order, cosine, count, components):

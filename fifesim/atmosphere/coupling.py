@@ -4,11 +4,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numba.extending import register_jitable
 from scipy.interpolate import PchipInterpolator
 
 from fifesim.atmosphere import gases
+from fifesim.base.arrays import compiled, jitable
 from fifesim.base.bands import solar_irradiance_steps
 from fifesim.base.caches import cached
 
@@ -207,7 +206,7 @@ def target_reflectance(toa_reflectance, environment, terms):
     return (upward - environment * diffuse) / direct
 
 
-@register_jitable
+@jitable
 def apparent_reflectance_of_cell(leaving, around, path, down, up, albedo, gas):
     r"""
     Apparent reflectance at the top of the atmosphere of one cell.
@@ -245,7 +244,7 @@ def apparent_reflectance_of_cell(leaving, around, path, down, up, albedo, gas):
     return gas * (path + down * leaving / (1 - trapped) * up)
 
 
-@register_jitable
+@jitable
 def corrected_reflectance_of_cell(toa, path, down, up, albedo, gas):
     """
     Reflectance of one cell of a uniform surface from apparent reflectance, as in `corrected_reflectance` [Tanre1990]_.
@@ -283,7 +282,7 @@ def _by_cell(kernel, cells, terms):
 
 
 # Without transmitted light, division by zero gives infinity as in numpy.
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _apparent(leaving, around, terms, out):
     """Fill in the apparent reflectances, and count those to be refused."""
     refused = 0
@@ -295,7 +294,7 @@ def _apparent(leaving, around, terms, out):
     return refused
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _corrected(toa, terms, out):
     for i in range(out.shape[0]):
         path, down, up, albedo, gas = terms[:, i]

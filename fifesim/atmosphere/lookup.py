@@ -5,12 +5,12 @@ import threading
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.interpolate import CubicSpline
 
 from fifesim.atmosphere import aerosols
 from fifesim.atmosphere.coupling import apparent_reflectance_of_cell, corrected_reflectance_of_cell
 from fifesim.atmosphere.engines import LARGEST_ZENITH, terms_at
+from fifesim.base.arrays import compiled, jitable
 from fifesim.base.caches import cached
 from fifesim.base.geometry import relative_azimuth
 
@@ -43,7 +43,7 @@ def scattered_once(atmosphere, bands):
     return Once(albedo, atmosphere.aerosol_optical_depth(wavelength), overlying, phase)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def once_reflectance(sza, vza, raa, once, band):
     r"""
     Reflectance by single scattering in one band.
@@ -87,7 +87,7 @@ def once_reflectance(sza, vza, raa, once, band):
     return turned * -np.expm1(-air_mass * once.depth[band]) * np.exp(-air_mass * once.overlying[band])
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def once_on_nodes(sza, vza, raa, once):
     """Reflectance by single scattering [Tanre1990]_ on nodes, shape (S, V, R, band). [1]"""
     out = np.empty((sza.size, vza.size, raa.size, once.albedo.size))
@@ -289,7 +289,7 @@ def _node_terms(atmosphere, bands, sza, vza, raa):
     return terms_at(atmosphere, bands, sza, np.array(vza), np.array(raa))
 
 
-@njit(nogil=True, cache=True)
+@jitable
 def _stencil(value, lattice, order, weights):
     """Fill in the Lagrange weights of a value; return the index of the first node and their number."""
     if lattice.size == 1:
@@ -305,7 +305,7 @@ def _stencil(value, lattice, order, weights):
     return start - lattice.first, order
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _interpolate(place, lattices, tables, weights, terms):
     """Terms of all bands at one place, interpolated in the tables."""
     a, n_altitudes = _stencil(place.altitude, lattices.altitude, LINEAR, weights.altitude)
@@ -337,7 +337,7 @@ def _interpolate(place, lattices, tables, weights, terms):
                         terms.path_reflectance[b] += weight * weights.raa[m] * path
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _through(reflectance, places, lattices, tables, once, to_surface, out):
     n_bands = out.shape[0]
     terms = Tables(np.empty(n_bands), np.empty(n_bands), np.empty(n_bands), np.empty(n_bands), np.empty(n_bands))

@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from fifesim.atmosphere.aerosols import SCALE_HEIGHT
 from fifesim.atmosphere.column import mixed_column, stokes_basis, wigner
 from fifesim.atmosphere.gases import DEPOLARIZATION, rayleigh_anisotropy, rayleigh_phase
+from fifesim.base.arrays import compiled, jitable
 from fifesim.base.caches import cached
 from fifesim.base.geometry import scattering_angle_cosine
 
@@ -191,13 +191,15 @@ def _by_layers(light, matrix):
     return np.concatenate([light[first : first + step] @ matrix for first in range(0, len(light), step)])
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _scattered(weighted, basis, mixing):
     """Coefficients of the source that a weighted field generates by scattering, shape (layers, basis)."""
     incident = np.dot(weighted, basis)
-    source = np.zeros_like(incident)
+    source = np.empty(incident.shape)
     layers, degrees, components, _ = mixing.shape
     for k in range(layers):
+        for i in range(source.shape[1]):
+            source[k, i] = 0.0
         for to in range(components):
             for of in range(components):
                 for degree in range(degrees):
@@ -205,12 +207,11 @@ def _scattered(weighted, basis, mixing):
     return source
 
 
-@njit(nogil=True, cache=True)
-def _travel(source, through, averaged):
-    """Mean over each layer of the light from homogeneous sources in all layers, without incident light."""
+@jitable
+def _travel(source, through, averaged, field):
+    """Fill in the mean over each layer of the light from homogeneous sources in all layers, without incident light."""
     layers, size = source.shape
     streams = through.size
-    field = np.empty_like(source)
     for first in range(0, size, 2 * streams):
         for j in range(streams):
             up, down = first + j, first + streams + j
@@ -221,32 +222,55 @@ def _travel(source, through, averaged):
                 falling = source[k, down] + (falling - source[k, down]) * through[j]
                 field[under, up] = source[under, up] + (rising - source[under, up]) * averaged[j]
                 rising = source[under, up] + (rising - source[under, up]) * through[j]
-    return field
 
 
-@njit(nogil=True, cache=True)
+@jitable
+def _add(field, share, total):
+    """Add a share of a field to a total."""
+    for k in range(field.shape[0]):
+        for i in range(field.shape[1]):
+            total[k, i] += field[k, i] * share
+
+
+@jitable
+def _weighted(field, weights, out):
+    """Fill in a weighted field; return the sum of its magnitude."""
+    strength = 0.0
+    for k in range(field.shape[0]):
+        for i in range(field.shape[1]):
+            out[k, i] = field[k, i] * weights[i]
+            strength += abs(field[k, i]) * weights[i]
+    return strength
+
+
 def _sum_orders(source, mode, least, tolerance):
     """Light of all orders of scattering from the source of the first, with the tail closed as a geometric series."""
     # Returns the mean of each layer, shape (layers, components * directions), and its weighted sum. The error of the
     # tail is held below the tolerance times this sum, or times `least` where that is larger.
-    backward = np.ascontiguousarray(mode.basis.T)
     total = np.zeros_like(source)
+    return total, _add_orders(source, mode, np.ascontiguousarray(mode.basis.T), least, tolerance, total)
+
+
+@compiled
+def _add_orders(source, mode, backward, least, tolerance, total):
+    field, weighted = np.empty(source.shape), np.empty(source.shape)
     size, last, last_ratio = 0.0, 0.0, 2.0
     for _ in range(MOST_ORDERS):
-        field = _travel(source, mode.through, mode.averaged)
-        total += field
-        strength = (np.abs(field) * mode.weights).sum()
+        _travel(source, mode.through, mode.averaged, field)
+        _add(field, 1.0, total)
+        strength = _weighted(field, mode.weights, weighted)
         size += strength
         ratio = strength / last if last > 0 else 0.0
         if last > 0 and ratio < 1:
-            left = strength * abs(ratio - last_ratio) / (1 - ratio) ** 2
-            if left <= tolerance * max(size, least):
-                return total + field * (ratio / (1 - ratio)), size
+            left = strength * abs(ratio - last_ratio) / ((1 - ratio) * (1 - ratio))
+            if left <= tolerance * (size if size > least else least):
+                _add(field, ratio / (1 - ratio), total)
+                return size
         if not strength > 0:
             break
         last, last_ratio = strength, ratio
-        source = np.dot(_scattered(field * mode.weights, mode.basis, mode.mixing), backward)
-    return total, size
+        source = np.dot(_scattered(weighted, mode.basis, mode.mixing), backward)
+    return size
 
 
 STREAMS = 16  # directions per hemisphere

@@ -1,7 +1,27 @@
-"""Arguments of compiled kernels as arrays."""
+"""Compilation of kernels, and their arguments as arrays."""
 
+from functools import partial
+from typing import Any
+
+import numba
 import numpy as np
 import pandas as pd
+from numba.extending import register_jitable
+
+# Divided as numpy does: a check of each divisor for 0 would keep a loop from taking several cells at once. Allocate
+# arrays, reshape and sort outside of kernels: numba compiles these operations anew for each kernel.
+compiled: Any = partial(numba.njit, nogil=True, cache=True, error_model="numpy", no_cfunc_wrapper=True)
+"""Decorator of a kernel, which is compiled for each type of its arguments when it is first called."""
+
+jitable: Any = register_jitable(no_cfunc_wrapper=True)
+"""Decorator of a function that kernels call too, compiled as a part of them."""
+
+
+def read_only(values):
+    """Contiguous, read-only view of an array, so that a kernel is compiled once for arrays of either kind."""
+    view = np.ascontiguousarray(values).view()
+    view.flags.writeable = False
+    return view
 
 
 def numbers(values):

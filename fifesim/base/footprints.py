@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from fifesim.base.arrays import compiled, jitable
 
 # Rounding of positions leaves weights of about 1e-16 in cells that only touch the footprint: dropped, because
 # they would pass on NaN and widen the window.
@@ -220,7 +221,7 @@ def _rows_of(cells, dtype):
     return np.lib.stride_tricks.as_strided(cells, (size,), cells.strides[1:]), apart, cells.shape[1]
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _regularize(values, apart, length, rows, columns, min_valid, out):
     line = np.empty(length)
     for i in range(out.shape[0]):
@@ -245,7 +246,7 @@ def _regularize(values, apart, length, rows, columns, min_valid, out):
             out[i, j] = total / share if share > 0 and share >= min_valid - 1e-9 else np.nan
 
 
-@njit(nogil=True, cache=True)
+@jitable
 def _sum_valid(values, apart, y_weights, x_weights):
     total, share = 0.0, 0.0
     for y in range(y_weights.size):

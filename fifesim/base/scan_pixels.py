@@ -3,7 +3,8 @@
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
+
+from fifesim.base.arrays import compiled, jitable
 
 # Corners that a quadrilateral may have once it is cut along four lines: each cut doubles them at most.
 _MOST = 64
@@ -50,7 +51,7 @@ def reach(row, column, edges, cell):
     return farthest
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def nearest_pixels(row, column, reach, cell, rows, columns):
     """Number of the pixel nearest to each cell among the pixels that reach it, -1 if none does."""
     number = np.full((rows[1] - rows[0], columns[1] - columns[0]), -1)
@@ -71,7 +72,7 @@ def nearest_pixels(row, column, reach, cell, rows, columns):
     return number
 
 
-@njit(nogil=True, cache=True)
+@jitable
 def _between_cells(center, half, limits):
     """Range of cells within a half width of a place and inside a window; empty if the place is not finite."""
     if not np.isfinite(center + half):
@@ -81,7 +82,7 @@ def _between_cells(center, half, limits):
     return int(min(first, limits[1])), int(max(last, limits[0]))
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def covered_means(values, row, column, rows, columns):
     """Area-weighted means of the valid pixels over cells, and the covered share, shape (band, rows, columns)."""
     shape = values.shape[0], rows[1] - rows[0], columns[1] - columns[0]
@@ -105,14 +106,14 @@ def covered_means(values, row, column, rows, columns):
     return np.where(covered > 0, total / np.where(covered > 0, covered, 1.0), np.nan), covered
 
 
-@njit(nogil=True, cache=True)
+@jitable
 def _touched(places, limits):
     """Range of cells along an axis that a polygon touches inside a window."""
     low, high = places.min(), places.max()
     return _between_cells((low + high) / 2, (high - low) / 2, limits)
 
 
-@njit(nogil=True, cache=True)
+@jitable
 def _area_in_cell(pixel, i, j, cut, other):
     """Area of a pixel inside the cell of row i and column j: clipped to its four sides, then the shoelace formula."""
     count = _cut(pixel, 4, cut, 0, i, 1.0)
@@ -127,7 +128,7 @@ def _area_in_cell(pixel, i, j, cut, other):
     return abs(area) / 2
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _cut(polygon, corners, kept, axis, limit, side):
     """Clip a polygon to one side of a line along an axis; return the number of corners that are written."""
     count, before = 0, corners - 1

@@ -10,11 +10,11 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numba import njit
 
 from fifesim.analysis import scaling_labels
 from fifesim.atmosphere.coupling import apparent_reflectance, apparent_reflectance_of_cell
 from fifesim.base.annotations import Metres
+from fifesim.base.arrays import compiled
 from fifesim.base.line_spread import Spread
 from fifesim.base.messages import warn
 from fifesim.chain import coupled_ground
@@ -102,7 +102,7 @@ def seen_reflectance(lai, *, background, scene, terms):
 
 
 # Without transmitted light, division by zero gives infinity as in numpy.
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _seen(lai, table, terms, out):
     """Fill in the apparent reflectance; return whether any leaf area or reflectance is invalid."""
     interval, share, ground = np.empty(RUN, np.int64), np.empty(RUN), np.empty(RUN)

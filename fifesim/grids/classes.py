@@ -4,8 +4,8 @@ import math
 from functools import partial
 
 import numpy as np
-from numba import njit
 
+from fifesim.base.arrays import compiled, read_only
 from fifesim.base.caches import cached
 from fifesim.base.geometry import ANGLES
 from fifesim.grids import chunks as chunking
@@ -39,7 +39,9 @@ def _listed(table):
 
 def cells_by_class(codes, table):
     """Ascending indices of the cells of each class."""
-    order, ends = _sorted(np.asarray(codes, np.int16), _numbers(tuple(table)), len(table))
+    order, ends = np.empty(codes.size, np.int64), np.zeros(len(table) + 2, np.int64)
+    _sort(np.asarray(codes, np.int16), _numbers(tuple(table)), order, ends)
+    ends = ends[: len(table)]
     return np.split(order[: ends[-1]], ends[:-1]) if len(table) else []
 
 
@@ -47,7 +49,7 @@ def numbers_of(codes, table):
     """Positions of the codes of cells in a table, its length for unknown codes, and which of them occur."""
     codes, present = np.ascontiguousarray(codes, np.int16), np.zeros(len(table) + 1, bool)
     numbers = np.empty(codes.shape, np.int16)
-    _look_up(codes.reshape(-1), _numbers(tuple(table)), numbers.reshape(-1), present)
+    _look_up(read_only(codes.reshape(-1)), _numbers(tuple(table)), numbers.reshape(-1), present)
     return numbers, present
 
 
@@ -59,7 +61,7 @@ def _numbers(table):
     return numbers
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _others(codes, numbers):
     """Number of codes outside of a table, apart from -1."""
     count, none = 0, numbers[-1]
@@ -68,27 +70,25 @@ def _others(codes, numbers):
     return count
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _look_up(codes, numbers, out, present):
     for i in range(codes.size):
         out[i] = numbers[codes[i]]
         present[out[i]] = True
 
 
-@njit(nogil=True, cache=True)
-def _sorted(codes, numbers, classes):
-    """Cells sorted by class, and the end of each class; cells without a class come last."""
-    counts = np.zeros(classes + 1, np.int64)
+@compiled
+def _sort(codes, numbers, order, ends):
+    """Fill in cells sorted by class, and add the end of each class to zeros; cells without a class come last."""
     for i in range(codes.size):
-        counts[numbers[codes[i]]] += 1
-    ends = np.cumsum(counts)
-    place = ends - counts
-    order = np.empty(codes.size, np.int64)
+        ends[numbers[codes[i]] + 1] += 1
+    for number in range(1, ends.size):
+        ends[number] += ends[number - 1]
+    # Each entry is the start of its class, and counts up to its end.
     for i in range(codes.size):
         number = numbers[codes[i]]
-        order[place[number]] = i
-        place[number] += 1
-    return order, ends[:-1].copy()
+        order[ends[number]] = i
+        ends[number] += 1
 
 
 # Cells per batch, 2 MB of each raster, so that intermediate results stay in the processor cache.

@@ -13,11 +13,11 @@ import rasterio
 import rasterio.windows
 import xarray as xr
 from affine import Affine
-from numba import njit
 from odc.geo.geobox import GeoBox
 from rasterio.enums import Resampling
 from rasterio.warp import reproject
 
+from fifesim.base.arrays import compiled
 from fifesim.base.caches import cached
 from fifesim.base.lattice import assemble
 from fifesim.grids import chunks as chunking
@@ -257,7 +257,7 @@ def _samples(cells):
     return min(along * (5 if along == 1 else 3 if along < 8 else 1), _MOST_SAMPLES)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _most_frequent(values, samples):
     """Most frequent value among samples x samples neighbours, the smallest if tied; NaN is skipped."""
     out = np.full((values.shape[0] // samples, values.shape[1] // samples), np.nan)

@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numba
 import numpy as np
+
+from fifesim.base.arrays import compiled
 
 # Members whose log-likelihood is lower than the best one by more than this have no effect on a quantile.
 _NEGLIGIBLE = 20.0
@@ -52,7 +53,7 @@ def table_posterior(measured, members, states, probabilities):
     return _table_posterior(*arrays, orders, np.asarray(probabilities, float))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _table_posterior(measured, members, states, orders, probabilities):
     """Body of `table_posterior`, with members of shape (m, k) and their order along each quantity."""
     count, width = measured.shape

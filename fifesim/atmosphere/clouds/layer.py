@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numba.extending import register_jitable
 from scipy.interpolate import CubicSpline
 
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
 from fifesim.base import files
+from fifesim.base.arrays import jitable
 from fifesim.base.bands import solar_irradiance_steps
 from fifesim.base.caches import cached
 from fifesim.base.geometry import scattering_angle_cosine
@@ -266,7 +266,7 @@ def sky_tables(co_albedos, path, diffuse_fraction, ozone, sza, vza, raa):
     return CloudTables(seen, down, diffuse, np.asarray(path, float), np.asarray(diffuse_fraction, float))
 
 
-@register_jitable
+@jitable
 def clouded_reflectance(clear, path, diffuse, reflected, down, lit, sky, up, albedo):
     r"""
     Apparent reflectance of one cell below and between clouds.
@@ -396,7 +396,7 @@ def _cloud_scene(clear, seen, sunlit, overhead, sky, out):
                 )
 
 
-@register_jitable
+@jitable
 def _find(thickness, which, number, place, share):
     """Fill in the step of a thickness in the tables, and the share of the way to the next; NaN stays NaN."""
     if np.isnan(thickness):

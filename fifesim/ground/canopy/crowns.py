@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 
-from fifesim.base.arrays import numbers
+from fifesim.base.arrays import jitable, numbers
 from fifesim.ground.canopy.leaf_angles import RADIANS_PER_DEGREE
 from fifesim.ground.canopy.leaf_area import LARGEST_LAI, check_share
 from fifesim.ground.canopy.sail_model import direction_distance, over_background
@@ -165,7 +164,7 @@ def crown_terms(canopy, sky):
     )
 
 
-@register_jitable
+@jitable
 def crowns_over_background(terms, shares, background):
     r"""
     Reflectance factor of crowns and gaps over a background, from terms of the crowns.

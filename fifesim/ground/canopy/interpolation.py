@@ -3,12 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numba.extending import register_jitable
 from scipy.interpolate import CubicSpline
 
+from fifesim.base.arrays import compiled, jitable, read_only
 from fifesim.ground.canopy.crowns import crown_shares, crowns_over_background
-from fifesim.ground.canopy.leaf_area import LARGEST_LAI, read_only
+from fifesim.ground.canopy.leaf_area import LARGEST_LAI
 from fifesim.ground.canopy.sail_model import over_background
 
 LARGEST_TABLE_LAI = LARGEST_LAI
@@ -81,7 +80,7 @@ def interpolate_over(table, lai, background):
     return values.reshape(-1, *lai.shape)
 
 
-@register_jitable
+@jitable
 def table_places(lai, table, interval, share):
     """Fill in the intervals of leaf area indices in a table and the places in these, NaN outside of the table."""
     last = table.coefficients.shape[0] - 1
@@ -95,7 +94,7 @@ def table_places(lai, table, interval, share):
         share[k] = position - at if inside else np.nan
 
 
-@register_jitable
+@jitable
 def value_at(table, interval, column, share):
     """Value of a table at a place in an interval."""
     c = table.coefficients[interval, column]
@@ -103,7 +102,7 @@ def value_at(table, interval, column, share):
 
 
 # No divisor is 0; without this check the loop is vectorized.
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _interpolate(lai, table, values):
     interval, share = np.empty(RUN, np.int64), np.empty(RUN)
     for first in range(0, lai.size, RUN):
@@ -115,7 +114,7 @@ def _interpolate(lai, table, values):
                 out[k] = value_at(table, interval[k], column, share[k])
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _interpolate_over(lai, background, table, values):
     interval, share = np.empty(RUN, np.int64), np.empty(RUN)
     for first in range(0, lai.size, RUN):
@@ -257,7 +256,8 @@ def interpolate_foliage(table, lai, brown, background):
     """Reflectance of green and dead leaves over backgrounds, shape (band, n) [1], and number of invalid cells."""
     # Infinite where the leaf area within crowns is above LIMIT.
     values = np.empty((table.coefficients.shape[-1] // 4, lai.size))
-    wrong = _foliage(*map(read_only, (lai, brown, background)), table, values)
+    given = read_only(lai), _for_runs(brown), read_only(background)
+    wrong = _foliage(*given, table, table.coefficients.reshape(-1), _memory(table), values)
     return values, wrong
 
 
@@ -265,11 +265,33 @@ def interpolate_crowned(table, crowns, lai, brown, cover, background):
     """Reflectance of crowns of green and dead leaves and gaps, shape (band, n) [1], and number of invalid cells."""
     # Infinite where the leaf area within crowns is above LIMIT.
     values = np.empty((table.coefficients.shape[-1] // TERMS, lai.size))
-    wrong = _crowned(*map(read_only, (lai, brown, cover, background)), table, crowns, values)
+    given = read_only(lai), _for_runs(brown), read_only(cover), read_only(background)
+    wrong = _crowned(*given, table, table.coefficients.reshape(-1), crowns, _memory(table), values)
     return values, wrong
 
 
-@register_jitable
+class _Memory(NamedTuple):
+    """Memory for a run of cells."""
+
+    wide: np.ndarray  # all columns of a table at four dead shares
+    terms: np.ndarray  # and at the place of each cell
+    starts: np.ndarray
+    leaves: np.ndarray
+    dead: np.ndarray
+
+
+def _memory(table):
+    columns, places = table.coefficients.shape[2], np.zeros((2, _RUN))
+    wide, terms = np.empty(4 * columns, np.float32), np.zeros(_RUN * columns, np.float32)
+    return _Memory(wide, terms, np.empty(_RUN, np.int64), *places)
+
+
+def _for_runs(brown):
+    """Dead share of each cell, or the same for all cells of a run."""
+    return read_only(brown if brown.size > 1 else np.full(_RUN, brown[0]))
+
+
+@jitable
 def _weights(share):
     """Weights of four neighbouring cubic B-splines, times 6."""
     rest = 1 - share
@@ -277,7 +299,7 @@ def _weights(share):
     return rest * other, 4 + square * (3 * share - 6), 4 + other * (3 * rest - 6), share * square
 
 
-@register_jitable
+@jitable
 def _place(position, nodes):
     """Interval of a position and the place in it; ``nodes`` counts coefficients, two more than nodes."""
     interval = min(int(position), nodes - 4)
@@ -286,7 +308,7 @@ def _place(position, nodes):
 
 # The next three are loops without branches, which are vectorized. Invalid values are counted separately, divisions,
 # which take as long without.
-@register_jitable
+@jitable
 def _places(table, lai, brown, starts, leaves, dead):
     """Fill in first coefficients of cells, -1 outside of the table, and places; count the invalid cells."""
     browns, wrong = table.coefficients.shape[1], 0
@@ -302,7 +324,7 @@ def _places(table, lai, brown, starts, leaves, dead):
     return wrong
 
 
-@register_jitable
+@jitable
 def _within(lai, cover, inside):
     """Fill in leaf area within crowns, NaN where the cover is invalid; return the number of invalid cells."""
     wrong = 0
@@ -313,7 +335,7 @@ def _within(lai, cover, inside):
     return wrong
 
 
-@register_jitable
+@jitable
 def _rooms(crowns, cover, at, share):
     """Fill in the intervals of crown covers in a table of crowns, and the places in these."""
     for i in range(cover.size):
@@ -323,10 +345,10 @@ def _rooms(crowns, cover, at, share):
 
 # Columns are found by places that have no sign, here in flat arrays and below: views of rows, and places that may count
 # from the end, take longer than the work.
-@register_jitable
-def _along(table, rows, shares, out):
-    """Fill in the values of all columns of a table, shape (n, column), from splines of one variable."""
-    flat, values, columns = table.reshape(-1), out.reshape(-1), np.uint64(out.shape[1])
+@jitable
+def _along(flat, columns, rows, shares, values):
+    """Fill in the values of all columns of a table, one cell after the other, from splines of one variable."""
+    columns = np.uint64(columns)
     for i in range(rows.size):
         if rows[i] >= 0:
             w0, w1, w2, w3 = _weights(shares[i])
@@ -336,11 +358,11 @@ def _along(table, rows, shares, out):
                 values[to + c] = w0 * flat[k0 + c] + w1 * flat[k1 + c] + w2 * flat[k2 + c] + w3 * flat[k3 + c]
 
 
-@register_jitable
-def _across(table, starts, leaves, dead, wide, out):
+@jitable
+def _across(table, flat, starts, leaves, dead, wide, values):
     """Fill in the values of all columns of a table from splines of two variables; ``wide`` holds four dead shares."""
     # These are contiguous, so that most of the work is one long loop.
-    flat, values, columns = table.reshape(-1), out.reshape(-1), np.uint64(table.shape[2])
+    columns = np.uint64(table.shape[2])
     length, n2 = np.uint64(table.shape[1]) * columns, columns + columns
     n3, width = n2 + columns, n2 + n2
     for i in range(starts.size):
@@ -355,64 +377,63 @@ def _across(table, starts, leaves, dead, wide, out):
                 values[to + c] = b0 * wide[c] + b1 * wide[columns + c] + b2 * wide[n2 + c] + b3 * wide[n3 + c]
 
 
-@register_jitable
+@jitable
 def _single(weights):
     w0, w1, w2, w3 = weights
     return np.float32(w0), np.float32(w1), np.float32(w2), np.float32(w3)
 
 
 # No divisor is 0; without this check the loop is vectorized.
-@njit(nogil=True, cache=True, error_model="numpy")
-def _foliage(lai, brown, background, table, values):
-    columns = table.coefficients.shape[2]
-    wide, terms = np.zeros(4 * columns, np.float32), np.zeros((_RUN, columns), np.float32)
-    starts, leaves, dead = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros(_RUN)
-    of_ground, of_brown, alike = background.shape[1] > 1, brown.size > 1, np.full(_RUN, brown[0])
+@compiled
+def _foliage(lai, brown, background, table, flat, memory, values):
+    terms, starts, leaves, dead = memory.terms, memory.starts, memory.leaves, memory.dead
+    columns, of_ground, of_brown = np.uint64(table.coefficients.shape[2]), background.shape[1] > 1, brown.size > _RUN
     wrong, step = 0, int(of_ground)
     for first in range(0, lai.size, _RUN):
-        cells, shares = lai[first : first + _RUN], brown[first : first + _RUN] if of_brown else alike
+        cells, shares = lai[first : first + _RUN], brown[first : first + _RUN] if of_brown else brown
         wrong += _places(table, cells, shares, starts, leaves, dead)
-        _across(table.coefficients, starts[: cells.size], leaves, dead, wide, terms)
+        _across(table.coefficients, flat, starts[: cells.size], leaves, dead, memory.wide, terms)
         for band in range(values.shape[0]):
             out = values[band, first : first + _RUN]
             below = background[band, first : first + _RUN] if of_ground else background[band]
             k = np.uint64(4 * band)
             for i in range(cells.size):
-                t, ground = terms[i], below[step * i]
+                t, ground = np.uint64(i) * columns + k, below[step * i]
                 wrong += (ground < 0) | (ground > 1)
-                seen = over_background(t[k], t[k + 1], t[k + 2], t[k + 3], ground)
+                seen = over_background(terms[t], terms[t + 1], terms[t + 2], terms[t + 3], ground)
                 out[i] = seen if starts[i] >= 0 else np.inf if cells[i] > LARGEST_FOLIAGE_LAI else np.nan
     return wrong
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def _crowned(lai, brown, cover, background, table, crowns, values):
-    columns = table.coefficients.shape[2]
-    wide, terms = np.zeros(4 * columns, np.float32), np.zeros((_RUN, columns), np.float32)
-    starts, leaves, dead, inside = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros(_RUN), np.zeros(_RUN)
-    places, shares, parts = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros((_RUN, 4))
-    of_ground, of_brown, alike = background.shape[1] > 1, brown.size > 1, np.full(_RUN, brown[0])
+@compiled
+def _crowned(lai, brown, cover, background, table, flat, crowns, memory, values):
+    terms, starts, leaves, dead = memory.terms, memory.starts, memory.leaves, memory.dead
+    inside, places, shares, parts = np.empty(_RUN), np.empty(_RUN, np.int64), np.empty(_RUN), np.empty(4 * _RUN)
+    columns, of_ground, of_brown = np.uint64(table.coefficients.shape[2]), background.shape[1] > 1, brown.size > _RUN
     wrong, step = 0, int(of_ground)
     for first in range(0, lai.size, _RUN):
         cells, crowned = lai[first : first + _RUN], cover[first : first + _RUN]
-        browns = brown[first : first + _RUN] if of_brown else alike
+        browns = brown[first : first + _RUN] if of_brown else brown
         wrong += _within(cells, crowned, inside)
         of_cells = inside[: cells.size]
         wrong += _places(table, of_cells, browns, starts, leaves, dead)
         if table.coefficients.shape[1] > 1:
-            _across(table.coefficients, starts[: cells.size], leaves, dead, wide, terms)
+            _across(table.coefficients, flat, starts[: cells.size], leaves, dead, memory.wide, terms)
         else:
-            _along(table.coefficients, starts[: cells.size], leaves, terms)
+            _along(flat, columns, starts[: cells.size], leaves, terms)
         _rooms(crowns, crowned, places, shares)
-        _along(crowns, places[: cells.size], shares, parts)
+        _along(crowns.reshape(-1), 4, places[: cells.size], shares, parts)
         for band in range(values.shape[0]):
             out = values[band, first : first + _RUN]
             below = background[band, first : first + _RUN] if of_ground else background[band]
             k = np.uint64(TERMS * band)
             for i in range(cells.size):
-                t, p, ground = terms[i], parts[i], below[step * i]
+                t, p, ground = np.uint64(i) * columns + k, parts[4 * i : 4 * i + 4], below[step * i]
                 wrong += (ground < 0) | (ground > 1)
-                of_band = t[k], t[k + 1], t[k + 2], t[k + 3], t[k + 4], t[k + 5], t[k + 6], t[k + 7]
+                of_band = (
+                    terms[t], terms[t + 1], terms[t + 2], terms[t + 3],
+                    terms[t + 4], terms[t + 5], terms[t + 6], terms[t + 7],
+                )  # fmt: skip
                 seen = crowns_over_background(of_band, (crowned[i], p[0], p[1], p[2], p[3]), ground)
                 out[i] = seen if starts[i] >= 0 else np.inf if of_cells[i] > LARGEST_FOLIAGE_LAI else np.nan
     return wrong

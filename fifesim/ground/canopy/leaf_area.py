@@ -1,8 +1,8 @@
 """Checks of leaf area index and of the fractions of a canopy."""
 
 import numpy as np
-from numba import njit
 
+from fifesim.base.arrays import jitable
 from fifesim.base.messages import warn
 
 
@@ -13,7 +13,7 @@ def within(values, lowest, highest):
     return bool(low >= lowest and high <= highest)
 
 
-@njit(nogil=True, cache=True)
+@jitable
 def outside(values, lowest, highest):
     """Number of values outside a range; NaN is ignored."""
     # A sum without branches is vectorized.
@@ -21,13 +21,6 @@ def outside(values, lowest, highest):
     for i in range(values.size):
         count += (values[i] < lowest) | (values[i] > highest)
     return count
-
-
-def read_only(values):
-    """Contiguous, read-only view of an array, so that a kernel is compiled once for arrays of either kind."""
-    view = np.ascontiguousarray(values).view()
-    view.flags.writeable = False
-    return view
 
 
 def check_fraction(name, values):

@@ -8,11 +8,11 @@ from scipy.interpolate import CubicSpline
 
 from fifesim.base import files
 from fifesim.base.arguments import is_path
-from fifesim.base.arrays import distinct_columns
+from fifesim.base.arrays import distinct_columns, read_only
 from fifesim.base.bands import Band
 from fifesim.base.caches import cached
 from fifesim.ground.canopy.interpolation import refined
-from fifesim.ground.canopy.leaf_area import check_fraction, check_share, read_only
+from fifesim.ground.canopy.leaf_area import check_fraction, check_share
 from fifesim.ground.canopy.prospect import CONTENTS, LARGEST_STRUCTURE, Leaf, leaf_band_means, leaf_spectrum
 from fifesim.ground.canopy.spectra import (
     Background,

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
-from numba.extending import register_jitable
 
 from fifesim.base import files
 from fifesim.base.annotations import Array, NumberOrArray
 from fifesim.base.arguments import described
-from fifesim.base.arrays import as_rows, numbers
+from fifesim.base.arrays import as_rows, compiled, jitable, numbers
 from fifesim.base.caches import cached
 
 CONTENTS = {
@@ -186,7 +184,7 @@ def _constants():
     return np.ascontiguousarray([*(table[name] for name in CONTENTS), *entering, entering[1] / n**2])
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _spectra(contents, constants, spectra):
     """Reflectance and transmittance of each leaf at each wavelength."""
     for leaf in range(contents.shape[1]):
@@ -194,7 +192,7 @@ def _spectra(contents, constants, spectra):
             spectra[0, leaf, node], spectra[1, leaf, node] = _leaf(contents[:, leaf], constants[:, node])
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _means(contents, constants, weights, means):
     """Sums of reflectance and transmittance of each leaf over wavelengths, by weights of each band."""
     for leaf in range(contents.shape[1]):
@@ -205,7 +203,7 @@ def _means(contents, constants, weights, means):
                 means[1, band, leaf] += weights[node, band] * transmittance
 
 
-@register_jitable
+@jitable
 def _leaf(contents, constants):
     """Reflectance and transmittance of a leaf at one wavelength."""
     absorption, structure = 0 * contents[0], contents[0]
@@ -261,7 +259,7 @@ def layer_transmissivity(absorption):
     return tau.reshape(shape)[()]
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _transmissivities(absorption, tau):
     """Transmittance of each of some layers."""
     for layer in range(absorption.size):
@@ -272,7 +270,7 @@ def _transmissivities(absorption, tau):
 _SERIES = np.array([-np.euler_gamma, *(-((-1) ** n) / (n * math.factorial(n)) for n in range(1, 41))])
 
 
-@register_jitable
+@jitable
 def _transmissivity(k):
     """Transmittance of a layer, 2 E3(k): by the series of E1, or a continued fraction [DLMF 8.9.2] of E3."""
     if k.real <= 0:
@@ -362,7 +360,7 @@ def plate(refractive_index, tau, angle):
     return _plate(interface_transmissivity(n, angle), interface_transmissivity(n, 90.0) / n**2, tau)
 
 
-@register_jitable
+@jitable
 def _plate(entering, leaving, tau):
     """Reflectance and transmittance of a layer from the transmissivities of its surfaces and its inside."""
     inside = (1 - leaving) * tau
@@ -405,14 +403,14 @@ def pile(reflectance, transmittance, layers):
     return r[()], t[()]
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _piles(reflectance, transmittance, layers, found):
     """Reflectance and transmittance of each of some piles."""
     for i in range(layers.size):
         found[0, i], found[1, i] = _pile(reflectance[i], transmittance[i], layers[i])
 
 
-@register_jitable
+@jitable
 def _pile(r, t, layers):
     """Reflectance and transmittance of a pile of layers with reflectance r and transmittance t."""
     square = (1 + r + t) * (1 + r - t) * (1 - r + t) * (1 - r - t)

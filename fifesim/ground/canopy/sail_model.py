@@ -3,11 +3,9 @@
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
-from numba.extending import register_jitable
 
-from fifesim.base.arrays import as_rows, distinct_columns, numbers
+from fifesim.base.arrays import as_rows, compiled, distinct_columns, jitable, numbers
 from fifesim.base.geometry import relative_azimuth
 from fifesim.ground.canopy.leaf_angles import RADIANS_PER_DEGREE, azimuth_limit, leaf_angle_classes, leaf_projection
 
@@ -66,7 +64,7 @@ def with_background(canopy, background):
     )
 
 
-@register_jitable
+@jitable
 def over_background(alone, hot, through, rdd, background):
     r"""
     Reflectance factor of a canopy over a background, from terms of its layer.
@@ -212,7 +210,7 @@ def bidirectional_gap(lai, ks, ko, alpha):
     return tsstoo[()], seen[()]
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _gaps(lai, ks, ko, alpha, gaps):
     """Gap fraction of both beams, and its integral, for each cell."""
     for cell in range(lai.size):
@@ -286,7 +284,7 @@ def exponential_chain(lai, *rates):
     return chains.reshape(shape)[()]
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _chains(lai, rates, chains):
     """Divided differences of the exponential over all exponents of each cell, times a power of the depth."""
     count = rates.shape[0]
@@ -303,7 +301,7 @@ def _chains(lai, rates, chains):
         chains[cell] = lai[cell] ** (count - 1) * difference[0]
 
 
-@numba.njit(nogil=True, cache=True)
+@jitable
 def _sort_exponents(lai, rates, x):
     """Sort the exponents by insertion, NaN first; the recursion divides by the widest difference."""
     for i in range(x.size):
@@ -318,7 +316,7 @@ def _sort_exponents(lai, rates, x):
         x[j] = exponent
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _recursion(x, difference, homogeneous):
     """Divided differences over distant exponents, by recursion on their number."""
     for i in range(x.size):
@@ -332,7 +330,7 @@ def _recursion(x, difference, homogeneous):
                 difference[i] = (difference[i + 1] - difference[i]) / spread
 
 
-@numba.njit(nogil=True, cache=True)
+@jitable
 def _series(x, start, count, homogeneous):
     """Divided difference over close exponents: e^c sum_n h_n(x - c) / (n + count - 1)!, h_n homogeneous."""
     centre = (x[start] + x[start + count - 1]) / 2
@@ -465,7 +463,8 @@ def scattered_again(lai, c):
     """
     shape, flat = as_rows(lai, c.ks, c.ko, c.a, c.sigma, c.m, c.sf, c.sb, c.vf, c.vb)
     out = np.empty((9, flat.shape[1]), flat.dtype)
-    nearly_vertical = _slabs(*flat, out)
+    nearly_vertical = np.zeros(flat.shape[1], bool)
+    _slabs(*flat, out, nearly_vertical)
     if nearly_vertical.any():
         out[:, nearly_vertical] = _by_chains(*flat[:, nearly_vertical])
     rso, rdo, rsd, rdd, tss, too, tsd, tdo, tdd = (each[()] for each in out.reshape(9, *shape))
@@ -600,10 +599,9 @@ def volume_scattering(inclination, sza, vza, raa):
 _LEAST_EXTINCTION = 0.1
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def _slabs(lai, ks, ko, a, sigma, m, sf, sb, vf, vb, out):
-    """Fields rso to tdd of `scattered_again`, and the cells that need `_by_chains` instead."""
-    left = np.zeros(lai.size, np.bool_)
+@compiled
+def _slabs(lai, ks, ko, a, sigma, m, sf, sb, vf, vb, out, left):
+    """Fill in the fields rso to tdd of `scattered_again`, and mark the cells that need `_by_chains` instead."""
     for i in range(lai.size):
         if (ks[i] + ko[i]).real < _LEAST_EXTINCTION or (min(ks[i].real, ko[i].real) + m[i].real) < _LEAST_EXTINCTION:
             left[i] = True
@@ -655,10 +653,9 @@ def _slabs(lai, ks, ko, a, sigma, m, sf, sb, vf, vb, out):
         out[6, i] = (sf[i] * diffuse * sun_out + sun_forward * (sun_diffuse - sun * sinh) / (ks[i] + m[i])) * slab
         out[7, i] = (vf[i] * diffuse * view_out + view_forward * (view_diffuse - view * sinh) / (ko[i] + m[i])) * slab
         out[8, i] = diffuse * slab
-    return left
 
 
-@register_jitable
+@jitable
 def _of_two(depth, p, q, through_p, through_q):
     """Chain of two rates from their transmittances, by its series where they are nearly equal."""
     x = (p - q) * depth
@@ -668,7 +665,7 @@ def _of_two(depth, p, q, through_p, through_q):
     return through_q * depth * (1 - x * (1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * series)))))
 
 
-@register_jitable
+@jitable
 def _of_three(depth, x, y, low, high, across, through):
     """Chain of the rates q + x, q + y and q: from those of (q + y, q), (q + x, q + y), (q + x, q) and e^(-q L)."""
     widest = max(abs(x), abs(y), abs(x - y))

@@ -3,12 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numba.extending import register_jitable
 
 from fifesim.base import files
+from fifesim.base.arrays import compiled, jitable, read_only
 from fifesim.base.caches import cached
-from fifesim.ground.canopy.leaf_area import outside, read_only, within
+from fifesim.ground.canopy.leaf_area import outside, within
 from fifesim.ground.canopy.prospect import interface_transmissivity
 from fifesim.ground.canopy.spectra import band_means
 
@@ -80,7 +79,7 @@ def in_cells(kernel, reflectance, change, *parameters, check):
     return np.moveaxis(out.reshape(bands, *shape), 0, -1)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _brighten(reflectance, brightness, line, out):
     by_cell, wrong = reflectance.shape[1] > 1, 0
     for first in range(0, brightness.size, _RUN):
@@ -169,14 +168,14 @@ def water_films(bands):
     return WaterFilms(surface, inside, entrance, np.ascontiguousarray(np.transpose(passed)))
 
 
-@register_jitable
+@jitable
 def below_film(below, passed, inside):
     """Light below a water film after one passage, and the share not reflected back; their quotient is the sum. [1]"""
     up = passed * below
     return up, 1 - inside * up
 
 
-@register_jitable
+@jitable
 def grains_in_water(dry, entrance):
     r"""Reflectance of a soil with grains in water, which refracts light less than air does.
 
@@ -260,7 +259,7 @@ def _moisten(dry, moisture, surface, inside, entrance, passed, out):
 
 
 # No divisor is 0; without this check the loop is vectorized.
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _films(dry, moisture, start, bare, surface, inside, entrance, passed, out):
     covered, by_cell, wrong = np.empty((_FILMS, _WATER_RUN)), dry.shape[1] > 1, 0
     for begin in range(0, bare.size, _WATER_RUN):
@@ -284,7 +283,7 @@ def _films(dry, moisture, start, bare, surface, inside, entrance, passed, out):
     return wrong
 
 
-@register_jitable
+@jitable
 def _covered(moisture, bare, covered):
     """Shares of a soil below one water film, two and more."""
     for i in range(moisture.size):

@@ -15,9 +15,9 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numba import njit
 from scipy import fft, optimize, special
 
+from fifesim.base.arrays import compiled
 from fifesim.base.caches import cached
 from fifesim.base.lattice import assemble, check_seed, generator
 
@@ -284,12 +284,13 @@ def white_noise(seed, row, column, shape):
     """
     first, last = column // 4, -(-(column + shape[1]) // 4)
     out = np.empty((shape[0], 4 * (last - first)), np.float32)
-    _fill(np.uint64(seed), np.int64(row), np.int64(first), out)
+    words, parts = np.empty((4, last - first), np.uint32), np.empty((6, last - first), np.float32)
+    _fill(np.uint64(seed), np.int64(row), np.int64(first), words, parts, parts[0].view(np.int32), out)
     skip = column - 4 * first
     return out[:, skip : skip + shape[1]]
 
 
-@njit(nogil=True, cache=True, inline="always")
+@compiled(inline="always")
 def philox(c0, c1, c2, c3, k0, k1):
     """
     Philox-4x32-10 output for one counter.
@@ -317,11 +318,11 @@ def philox(c0, c1, c2, c3, k0, k1):
     return c0, c1, c2, c3
 
 
-@njit(nogil=True, cache=True)
-def _fill(seed, row, first, out):
+@compiled
+def _fill(seed, row, first, words, parts, bits, out):
+    """Fill in white noise; `words` and `parts` are memory, and `bits` are the bits of the first part."""
     groups = out.shape[1] // 4
-    words = np.empty((4, groups), np.uint32)
-    normals = np.empty((4, groups), np.float32)
+    uniform, exponent, normals = parts[0], parts[1], parts[2:]
     k0, k1 = seed & _WORD, seed >> _HALF
     for i in range(out.shape[0]):
         place = np.uint64(row + i)
@@ -330,23 +331,20 @@ def _fill(seed, row, first, out):
             words[0, g], words[1, g], words[2, g], words[3, g] = philox(
                 group & _WORD, group >> _HALF, place & _WORD, place >> _HALF, k0, k1
             )
-        _box_muller(words[0], words[1], normals[0], normals[1])
-        _box_muller(words[2], words[3], normals[2], normals[3])
+        _box_muller(words[0], words[1], uniform, bits, exponent, normals[0], normals[1])
+        _box_muller(words[2], words[3], uniform, bits, exponent, normals[2], normals[3])
         for g in range(groups):
             for k in range(4):
                 out[i, 4 * g + k] = normals[k, g]
 
 
 # No divisor is 0; without this check the loop is vectorized.
-@njit(nogil=True, cache=True, error_model="numpy")
-def _box_muller(one, other, cosines, sines):
-    """Two normal deviates from two 32-bit words."""
+@compiled
+def _box_muller(one, other, uniform, bits, exponent, cosines, sines):
+    """Two normal deviates from two 32-bit words; `uniform` and `bits` are the same memory."""
     n = one.size
-    uniform = np.empty(n, np.float32)
     for i in range(n):
         uniform[i] = (np.float32(one[i]) + np.float32(0.5)) * _SPAN
-    bits = uniform.view(np.int32)
-    exponent = np.empty(n, np.float32)
     for i in range(n):
         exponent[i] = np.float32((bits[i] >> np.int32(23)) - np.int32(127))
         bits[i] = (bits[i] & np.int32(0x7FFFFF)) | np.int32(0x3F800000)

@@ -10,11 +10,10 @@ everywhere.
 from numbers import Integral
 
 import numpy as np
-from numba import njit
-from numba.extending import register_jitable
 from scipy import fft
 
 from fifesim.base.arguments import described
+from fifesim.base.arrays import compiled, jitable
 from fifesim.base.caches import cached
 from fifesim.ground.landscape import autoregression
 
@@ -236,7 +235,7 @@ def _knots(first, size, coarser):
     return (2 * (first + np.arange(size)) + 1 - coarser) // (2 * coarser) - 1
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _interpolate(lattice, rows, columns, down, across, along, factor, out):
     """Interpolate the lattice to cells."""
     # First along rows of the lattice, which are few, then for several cells of the ground at once.
@@ -257,7 +256,7 @@ def _interpolate(lattice, rows, columns, down, across, along, factor, out):
             cells[j] = scale[j] * (w0 * l0[j] + w1 * l1[j] + w2 * l2[j] + w3 * l3[j])
 
 
-@register_jitable
+@jitable
 def _expand(line, columns, across, along, out):
     """Interpolate a row of the lattice to the columns of the ground."""
     for j in range(columns.size):

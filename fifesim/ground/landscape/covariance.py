@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy import special, stats
 
+from fifesim.base.arrays import compiled
 from fifesim.base.lattice import check_seed, generator
 from fifesim.ground.landscape.autoregression import field_variance
 
@@ -142,7 +142,7 @@ def add_scores(values, scores, weight, out):
     _lookup(np.ascontiguousarray(values, float).ravel(), *scores, float(weight), out)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _lookup(values, nodes, scores, slopes, starts, steps, weight, out):
     """Add the weighted scores of values, linear between nodes."""
     lowest, highest, last = nodes[0], nodes[-1], np.uint32(nodes.size - 2)

@@ -16,10 +16,10 @@ from math import exp
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from scipy.stats import norm
 
 from fifesim.base.arguments import NUMBER, described
+from fifesim.base.arrays import compiled, jitable
 from fifesim.base.caches import cached
 from fifesim.base.lattice import assemble, generator
 
@@ -105,7 +105,7 @@ def pastures(seed, down, across, class_of=None):
     return out
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _paint(rows, columns, value, out):
     """Set all crossings of rows and columns to a value, several times as fast as numpy."""
     for i in rows:
@@ -151,7 +151,7 @@ def _square(seed, stream, index, row, column):
     return generator(seed, stream, (0, index, row, column)).random((_SQUARE, _SQUARE))
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _nearest(down, across, top, left, points, out):
     for i in range(down.size):
         row = int(np.floor(down[i])) - top
@@ -177,7 +177,7 @@ def _nearest(down, across, top, left, points, out):
                         out[i, j] = points[2, k, m]
 
 
-@njit(nogil=True, cache=True)
+@jitable
 def _knot_weights(place, first, weights):
     """Index of the first knot for a place along an axis, and the weights of the knots, whose squares sum to 1."""
     knot = int(np.floor(place)) - _REACH + 1
@@ -191,7 +191,7 @@ def _knot_weights(place, first, weights):
     return knot - first
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _weighted(down, across, top, left, knots, out):
     weights, line = np.empty(2 * _REACH), np.empty(knots.shape[1])
     starts, sides = np.empty(across.size, np.int64), np.empty((across.size, 2 * _REACH))

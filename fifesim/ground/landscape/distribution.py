@@ -9,12 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numba import njit
-from numba.extending import register_jitable
 from scipy import optimize, stats
 
 from fifesim.base import files
 from fifesim.base.annotations import FrozenDistribution, LaiDistribution
+from fifesim.base.arrays import compiled, jitable
 from fifesim.base.caches import cached
 from fifesim.base.files import in_a_line, read_csv
 from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS
@@ -299,7 +298,7 @@ def quantile_map_of_classes(field, numbers, tables):
     return out
 
 
-@register_jitable
+@jitable
 def _places(field, size, at, share):
     """Fill in the nodes of a table below deviates, and the weights of the next nodes."""
     per_deviate, last = (size - 1) / (2.0 * _REACH), np.uint32(size - 2)
@@ -312,7 +311,7 @@ def _places(field, size, at, share):
         share[i] = inside - at[i] if known else np.nan
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _map(field, table, out):
     at, share = np.empty(_RUN, np.uint32), np.empty(_RUN)
     for first in range(0, field.size, _RUN):
@@ -323,7 +322,7 @@ def _map(field, table, out):
             values[i] = table[k] * (1.0 - share[i]) + table[k + np.uint64(1)] * share[i]
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _map_classes(field, numbers, tables, same, out):
     at, share = np.empty(_RUN, np.uint32), np.empty(_RUN)
     flat, size = tables.reshape(-1), tables.shape[1]

@@ -13,9 +13,9 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.interpolate import PchipInterpolator
 
+from fifesim.base.arrays import compiled
 from fifesim.base.caches import cached
 from fifesim.base.lattice import assemble, centres, generator
 from fifesim.ground.terrain.spline import (
@@ -45,7 +45,6 @@ class StreamPower(NamedTuple):
     node: float  # distance of nodes [m]
 
 
-@njit(nogil=True, cache=True)
 def erode(start, erodibility, preference, law):
     """
     Ground after one unit of time of uplift, stream power and creep, with a fixed border.
@@ -70,32 +69,36 @@ def erode(start, erodibility, preference, law):
     [Braun2013]_
     """
     size, step = start.shape[0], 1.0 / law.steps
-    ground, new = start.copy().ravel(), np.empty(size * size)
-    receiver, order = np.empty(size * size, np.int32), np.empty(size * size, np.int32)
-    drained, distance = np.empty(size * size, np.int32), np.ones(size * size)
+    ground, new = np.array(start, float), np.empty(start.shape)
+    receiver, order, drained, above = (np.empty(size * size, np.int32) for _ in range(4))
     # Powers of areas, which are whole numbers of nodes; 0 where none has been asked for.
-    powers, factor = np.zeros(size * size + 1), np.empty(size * size)
+    distance, powers, factor = np.ones(size * size), np.zeros(size * size + 1), np.empty(size * size)
     # The explicit scheme is stable below a quarter.
     parts = int(law.creep * step / law.node**2 / 0.2) + 1
     share = law.creep * step / law.node**2 / parts
     for _ in range(law.steps):
-        _receivers(ground, preference, size, law.node, receiver, distance)
-        _drain(receiver, order, drained)
+        _receivers(ground.reshape(-1), preference, size, law.node, receiver, distance)
+        _drain(receiver, above, order, drained)
         _powers(drained, law.node**2, law.area_exponent, powers)
-        _factors(step, erodibility.ravel(), powers, drained, distance, receiver, factor)
-        _cut(order, receiver, factor, ground)
+        _factors(step, erodibility.reshape(-1), powers, drained, distance, receiver, factor)
+        _cut(order, receiver, factor, ground.reshape(-1))
         for _ in range(parts):
-            _creep(ground.reshape(size, size), share, law.uplift * step / parts, new.reshape(size, size))
+            _creep(ground, share, law.uplift * step / parts, new)
             ground, new = new, ground
-    return ground.reshape(size, size)
+    return ground
 
 
-@njit(nogil=True, cache=True)
 def least_ways(cost):
     """Least cost of a path from each node to the border, by sweeps until convergence, shape (n, n). [node]"""
-    size = cost.shape[0]
-    way = np.full((size, size), np.inf)
+    way = np.full(cost.shape, np.inf)
     way[0] = way[-1] = way[:, 0] = way[:, -1] = 0.0
+    _shorten(cost, way)
+    return way
+
+
+@compiled
+def _shorten(cost, way):
+    size = cost.shape[0]
     diagonal = np.sqrt(2.0)
     changed = True
     while changed:
@@ -112,10 +115,9 @@ def least_ways(cost):
                             if through < way[y, x]:
                                 way[y, x] = through
                                 changed = True
-    return way
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _receivers(ground, preference, size, node, receiver, distance):
     """Fill in the receiver of each node: its neighbour down the steepest weighted slope, itself on the border."""
     for i in range(size * size):
@@ -125,7 +127,8 @@ def _receivers(ground, preference, size, node, receiver, distance):
         first = y * size + 1
         here, to = ground[first : first + size - 2], receiver[first : first + size - 2]
         far = distance[first : first + size - 2]
-        steepest[:] = 0.0
+        for x in range(size - 2):
+            steepest[x] = 0.0
         k = 0
         # The loop over neighbours is outermost, so that inner loops over nodes have no branches.
         for a in range(-1, 2):
@@ -144,13 +147,13 @@ def _receivers(ground, preference, size, node, receiver, distance):
                 k += 1
 
 
-@njit(nogil=True, cache=True)
-def _drain(receiver, order, drained):
+@compiled
+def _drain(receiver, above, order, drained):
     """Fill in an order of nodes in which each precedes its receiver, and how many nodes drain through each."""
-    above = np.zeros(receiver.size, np.int32)
+    for i in range(receiver.size):
+        above[i], drained[i] = 0, 1
     for i in range(receiver.size):
         above[receiver[i]] += receiver[i] != i
-    drained[:] = 1
     # Sources, then whatever all water has come to that flows into it. An entry stays if the count goes on past it:
     # a branch would be guessed wrongly at every other node.
     filled = 0
@@ -167,7 +170,7 @@ def _drain(receiver, order, drained):
             filled += above[into] == 0
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _powers(drained, own, exponent, powers):
     """Fill in the missing powers of the areas of numbers of nodes."""
     for i in range(drained.size):
@@ -175,7 +178,7 @@ def _powers(drained, own, exponent, powers):
             powers[drained[i]] = (drained[i] * own) ** exponent
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _factors(step, erodibility, powers, drained, distance, receiver, factor):
     """Fill in the weight of the receiver of each node in the implicit step, 0 on the fixed border."""
     for i in range(factor.size):
@@ -183,7 +186,7 @@ def _factors(step, erodibility, powers, drained, distance, receiver, factor):
         factor[i] = cut if receiver[i] != i else 0.0
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _cut(order, receiver, factor, ground):
     """Apply one implicit step of stream power to the ground, from the border upstream."""
     for k in range(order.size - 1, -1, -1):
@@ -191,7 +194,7 @@ def _cut(order, receiver, factor, ground):
         ground[i] = (ground[i] + factor[i] * ground[receiver[i]]) / (1.0 + factor[i])
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _creep(ground, share, uplift, new):
     # A slice assignment of arrays would compile numba's error texts, which takes as long as all the rest.
     for y in range(ground.shape[0]):
@@ -387,14 +390,13 @@ def _detail(seed, south, east, ground):
         ground = ground + size * smooth_noise(seed, _ROUGH + k, step, south, east)
     for k, (height, share) in enumerate(BENCHES):
         clear = np.clip(0.5 + 0.5 * smooth_noise(seed, _BENCH + k, BENCH_NOISE, south, east), 0, 1)
-        _add_bench(ground, clear, height, share)
+        _add_bench(ground.reshape(-1), clear.reshape(-1), height, share)
     return ground
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _add_bench(ground, clear, height, share):
     """Add to the ground a sine of its elevation that changes its slope by a share, where `clear` is above 0."""
-    ground, clear = ground.ravel(), clear.ravel()
     for i in range(ground.size):
         turns = ground[i] / height
         turns -= np.rint(turns)
@@ -415,7 +417,7 @@ def hypsometry(eroded):
     return out
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _survey(eroded, knots, cubics, out):
     """Cubics between knots and lines beyond them, in one pass that is five times as fast as scipy."""
     first, last = knots[0], knots[-1]

@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numba.extending import register_jitable
 
+from fifesim.base.arrays import compiled, jitable
 from fifesim.base.caches import cached
 from fifesim.ground.terrain.slope import Vector, along_normal, slope_cosine
 
@@ -91,7 +90,7 @@ def horizon_tangent(dem, cell_y, cell_x, directions, reach):
     rows, columns = horizon_margin(cell_y, cell_x, reach)
     rays = _rays(tuple(np.asarray(directions, float).tolist()), float(cell_y), float(cell_x), float(reach))
     out = np.zeros((rays.ends.size - 1, dem.shape[0] - 2 * rows, dem.shape[1] - 2 * columns))
-    _march(dem, rays, rows, columns, out)
+    _march(dem.reshape(-1), dem.shape[1], rays, rows, columns, out)
     return out
 
 
@@ -145,19 +144,18 @@ def horizon_toward(tangents, directions, azimuth):
     return before * tangents[first] + after * tangents[(first + 1) % count]
 
 
-@njit(nogil=True, cache=True)
-def _march(dem, rays, top, left, out):
-    cells, columns, width = dem.ravel(), out.shape[2], dem.shape[1]
-    # Offsets of the cells of a sample from the cell of the ray, by row.
-    first = rays.first[:, 0] * width + rays.first[:, 1]
-    second = rays.second[:, 0] * width + rays.second[:, 1]
+@compiled
+def _march(cells, width, rays, top, left, out):
+    columns = out.shape[2]
     for direction in range(out.shape[0]):
         for i in range(out.shape[1]):
             start = (top + i) * width + left
             here = cells[start : start + columns]
             for n in range(rays.ends[direction], rays.ends[direction + 1], 2):
-                a, b = start + first[n], start + second[n]
-                c, d = start + first[n + 1], start + second[n + 1]
+                a = start + rays.first[n, 0] * width + rays.first[n, 1]
+                b = start + rays.second[n, 0] * width + rays.second[n, 1]
+                c = start + rays.first[n + 1, 0] * width + rays.first[n + 1, 1]
+                d = start + rays.second[n + 1, 0] * width + rays.second[n + 1, 1]
                 _raise_horizon(
                     (cells[a : a + columns], cells[b : b + columns], rays.share[n], rays.per_metre[n]),
                     (cells[c : c + columns], cells[d : d + columns], rays.share[n + 1], rays.per_metre[n + 1]),
@@ -165,7 +163,7 @@ def _march(dem, rays, top, left, out):
                 )  # fmt: skip
 
 
-@njit(nogil=True, cache=True)
+@jitable
 def _raise_horizon(near, far, here, line):
     """Raise the horizon of a row of cells by two more samples of their rays."""
     first, second, share, per_metre = near
@@ -226,7 +224,7 @@ def sky_vector(tangents, directions, east, north):
     return out.reshape(3, *shape)
 
 
-@register_jitable
+@jitable
 def sky_factor(vector, east, north):
     r"""
     Sky view factor: irradiance of a slope by a uniform sky relative to an open plain.
@@ -296,7 +294,7 @@ def horizon_sky_view(tangents, directions, east, north):
     return sky_factor(Vector(*sky_vector(tangents, directions, east, north)), east, north)
 
 
-@register_jitable
+@jitable
 def horizon_terrain_view(sky_view, cosine):
     r"""
     Terrain configuration factor: share of land in the view of a slope above its plane.
@@ -327,7 +325,7 @@ def horizon_terrain_view(sky_view, cosine):
     return (1 + cosine) / 2 - sky_view
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _sky_vector(tangents, sin, cos, east, north, out):
     count = tangents.shape[0]
     # So many places at a time that all of theirs stays near the processor.
@@ -340,7 +338,7 @@ def _sky_vector(tangents, sin, cos, east, north, out):
             _add_sector(tangents[k, part], tangents[n, part], here, there, east[part], north[part], found)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@jitable
 def _add_sector(tangents, next_tangents, toward, next_toward, east, north, out):
     """Add the terms of Lambert of the sky edge between two directions."""
     for cell in range(east.size):
@@ -360,7 +358,7 @@ def _add_sector(tangents, next_tangents, toward, next_toward, east, north, out):
         out.z[cell] += one.z + other.z
 
 
-@register_jitable
+@jitable
 def _arc(a, b):
     """Term of Lambert of the great circle from a to b, clockwise seen from above: its angle times its normal."""
     x, y, z = b.y * a.z - b.z * a.y, b.z * a.x - b.x * a.z, b.x * a.y - b.y * a.x

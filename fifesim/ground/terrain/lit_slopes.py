@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numba.extending import register_jitable
 
+from fifesim.base.arrays import compiled, jitable
 from fifesim.ground.terrain.horizon import horizon_terrain_view, sky_factor
 from fifesim.ground.terrain.slope import (
     Vector,
@@ -141,7 +140,7 @@ def _setting(cell, geometry):
 
 
 # Divided as numpy does: a check of each divisor for 0 would keep a loop from taking several cells at once.
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _slope_light(dem, sky, setting, light):
     columns = light.cosine.shape[1]
     above, below, gradient = np.empty((4, columns)), np.empty((4, columns)), np.empty((2, columns))
@@ -152,7 +151,7 @@ def _slope_light(dem, sky, setting, light):
         _light_of_row(gradient[0], gradient[1], above, below, sky.row_share[i], setting, line)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _slope_factors(rho, dem, sky, setting, direct, total, upwelling, reflected, kt, out):
     columns = out.shape[2]
     above, below, gradient = np.empty((4, columns)), np.empty((4, columns)), np.empty((2, columns))
@@ -162,19 +161,20 @@ def _slope_factors(rho, dem, sky, setting, direct, total, upwelling, reflected, 
         _gradient_of_row(dem[i], dem[i + 1], dem[i + 2], setting, gradient[0], gradient[1])
         _light_of_row(gradient[0], gradient[1], above, below, sky.row_share[i], setting, line)
         if not upwelling:
-            line.upwelling[:] = 1.0
+            for j in range(columns):
+                line.upwelling[j] = 1.0
         for band in range(out.shape[0]):
             _factor_of_row(rho[band, i], line, setting.sun.z, direct[band], total[band], kt[band, i])
             if reflected:
                 _reflect_row(rho[band, i], line.upwelling, kt[band, i], out[band, i])
 
 
-@register_jitable
+@jitable
 def _between(before, after, share):
     return (1 - share) * before + share * after
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@jitable
 def _sky_beside(sky, i, above, below):
     """Fill in the sky at the columns of a row of cells, for the rows of places above and below; unchanged rows stay."""
     row, last = sky.row[i], sky.layers.shape[1] - 1
@@ -190,7 +190,7 @@ def _sky_beside(sky, i, above, below):
     _sky_of_places(sky, min(row + 1, last), below)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@jitable
 def _sky_of_places(sky, row, out):
     last = sky.layers.shape[2] - 1
     for layer in range(out.shape[0]):
@@ -200,7 +200,7 @@ def _sky_of_places(sky, row, out):
             out[layer, j] = _between(places[before], places[min(before + 1, last)], sky.column_share[j])
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@jitable
 def _gradient_of_row(above, here, below, setting, east, north):
     """Gradient of one row of cells from its elevation and the neighbouring rows, each with a margin of one cell."""
     for j in range(east.size):
@@ -209,7 +209,7 @@ def _gradient_of_row(above, here, below, setting, east, north):
         north[j] = rise(below[j + 1], here[j + 1], above[j + 1]) * setting.per_y
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@jitable
 def _light_of_row(east, north, above, below, share, setting, light):
     for j in range(east.size):
         seen = Vector(
@@ -224,14 +224,14 @@ def _light_of_row(east, north, above, below, share, setting, light):
         light.upwelling[j] = upwelling_factor(along_normal(setting.sensor, east[j], north[j]), setting.sensor.z)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@jitable
 def _factor_of_row(rho, light, mu_s, direct, total, out):
     for j in range(out.size):
         land = horizon_terrain_view(light.sky_view[j], light.cosine[j])
         out[j] = topographic_factor(light.sky_view[j], land, rho[j], light.mu_s_local[j], mu_s, direct, total)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@jitable
 def _reflect_row(rho, upwelling, kt, out):
     for j in range(out.size):
         out[j] = rho[j] * kt[j] * upwelling[j]

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numba.extending import register_jitable
+
+from fifesim.base.arrays import compiled, jitable
 
 # Metres in one unit of elevation, and names that files use for it. NIST SP 811, App. B.8: the two feet differ by 2e-6.
 _UNITS = {
@@ -51,7 +51,7 @@ def bilinear(layer, rows, columns):
     return out
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _bilinear(layer, row, down, column, across, out):
     line = np.empty(layer.shape[1])
     last = layer.shape[0] - 1, layer.shape[1] - 1
@@ -73,7 +73,7 @@ class Vector(NamedTuple):
     z: float
 
 
-@register_jitable
+@jitable
 def rise(low, here, high):
     """Rise of the ground over two cells, by the other half if an end is missing, 0 if both are. [m]"""
     before = 2 * here - high if np.isnan(low) else low
@@ -116,7 +116,7 @@ def gradient(dem, cell_y, cell_x, rows=None, columns=None):
     return out[0], out[1]
 
 
-@register_jitable
+@jitable
 def slope_cosine(east, north):
     r"""
     Cosine of a slope.
@@ -141,7 +141,7 @@ def slope_cosine(east, north):
     return 1 / np.sqrt(1 + east * east + north * north)
 
 
-@register_jitable
+@jitable
 def along_normal(vector, east, north):
     r"""
     Component of a vector along the normal of a slope.
@@ -233,7 +233,7 @@ def steepness(dem, cell_y, cell_x):
     return np.degrees(np.arctan(out, out=out), out=out)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _gradient(dem, rows, columns, over_y, over_x, out):
     for i in range(rows.size):
         for j in range(columns.size):
@@ -247,7 +247,7 @@ def _gradient(dem, rows, columns, over_y, over_x, out):
 
 
 # Divided as numpy does: a check of each divisor for 0 would keep a loop from taking several cells at once.
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _tangent(dem, over_y, over_x, out):
     """Tangent of the slope."""
     for i in range(out.shape[0]):
@@ -264,7 +264,7 @@ def direction_vector(zenith, azimuth):
     return Vector(np.sin(zenith) * np.sin(azimuth), np.sin(zenith) * np.cos(azimuth), np.cos(zenith))
 
 
-@register_jitable
+@jitable
 def topographic_factor(sky_view, terrain_view, reflectance, mu_s_local, mu_s, direct_transmittance, transmittance_down):
     r"""
     Topographic correction factor: irradiance of a slope relative to level ground.
@@ -311,7 +311,7 @@ def topographic_factor(sky_view, terrain_view, reflectance, mu_s_local, mu_s, di
     return sky_view + terrain_view * reflectance + direct * (mu_s_local / mu_s - sky_view)
 
 
-@register_jitable
+@jitable
 def upwelling_factor(mu_v_local, mu_v):
     r"""
     Cosine correction of the light that leaves a slope toward the sensor.

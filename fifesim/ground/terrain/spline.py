@@ -8,11 +8,11 @@ that a margin of `MARGIN` cells makes it a local operation.
 
 from functools import partial
 
-import numba
 import numpy as np
 from scipy import ndimage, sparse
 from scipy.sparse import linalg
 
+from fifesim.base.arrays import compiled, jitable
 from fifesim.base.caches import cached
 from fifesim.base.lattice import assemble, generator
 
@@ -30,20 +30,20 @@ def spline_coefficients(values):
     return ndimage.spline_filter(values, order=DEGREE, output=np.float64, mode="mirror")
 
 
-@numba.njit(nogil=True, cache=True)
+@jitable
 def _weights(share, out):
     """Fill in the six nonzero quintic B-splines at a share of a cell past the third of their lattice points."""
     t = share
     s = 1.0 - t
-    out[0] = s**5 / 120.0
-    out[5] = t**5 / 120.0
+    out[0] = s * ((s * s) * (s * s)) / 120.0
+    out[5] = t * ((t * t) * (t * t)) / 120.0
     out[1] = (26.0 + t * (-50.0 + t * (20.0 + t * (20.0 + t * (-20.0 + 5.0 * t))))) / 120.0
     out[4] = (26.0 + s * (-50.0 + s * (20.0 + s * (20.0 + s * (-20.0 + 5.0 * s))))) / 120.0
     out[2] = (66.0 + t * t * (-60.0 + t * t * (30.0 - 10.0 * t))) / 120.0
     out[3] = (66.0 + s * s * (-60.0 + s * s * (30.0 - 10.0 * s))) / 120.0
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def spline_grid(coefficients, rows, columns):
     """Values of a spline on a grid parallel to its lattice, shape (rows, columns)."""
     # Positions are at least two lattice cells inside; 0 is the centre of the first cell.
@@ -70,7 +70,7 @@ def spline_grid(coefficients, rows, columns):
     return out
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def spline_points(coefficients, rows, columns):
     """Values of a spline at points, shape (y, x)."""
     # Positions are at least two lattice cells inside; 0 is the centre of the first cell.

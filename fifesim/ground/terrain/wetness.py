@@ -1,7 +1,8 @@
 """Topographic wetness index of an elevation model."""
 
 import numpy as np
-from numba import njit
+
+from fifesim.base.arrays import compiled
 
 # Exponent of the slope for the division of water among lower neighbours, Freeman (1991).
 EXPONENT = 1.1
@@ -76,7 +77,6 @@ def _steepness(ground, down, across):
     return np.maximum(np.hypot(*changes), LEAST_SLOPE)
 
 
-@njit(nogil=True, cache=True)
 def fill_pits(elevation):
     """
     Ground without pits: every cell has a descending path to the border, or to unknown cells.
@@ -101,8 +101,15 @@ def fill_pits(elevation):
     >>> fill_pits(bowl)[2, 2].round(3).item()
     1.0
     """
+    ground = np.full(elevation.shape, np.inf)
+    _lower(elevation, ground)
+    return ground
+
+
+@compiled
+def _lower(elevation, ground):
+    """Lower infinitely high ground to the surface of `fill_pits`, by sweeps until convergence."""
     rows, columns = elevation.shape
-    ground = np.full((rows, columns), np.inf)
     for y in range(rows):
         for x in range(columns):
             open_here = y == 0 or x == 0 or y == rows - 1 or x == columns - 1
@@ -131,10 +138,8 @@ def fill_pits(elevation):
                     if level < ground[y, x]:
                         ground[y, x] = level
                         changed = True
-    return ground
 
 
-@njit(nogil=True, cache=True)
 def drained_area(ground, down, across):
     """
     Area that drains through each cell, including the cell, by multiple flow directions.
@@ -163,9 +168,15 @@ def drained_area(ground, down, across):
     >>> drained_area(plane, 10.0, 10.0)[-1].sum().round(6).item()
     1200.0
     """
+    area = np.full(ground.shape, down * across)
+    _drain(ground, np.argsort(ground, axis=None, kind="stable"), float(down), float(across), area)
+    return area
+
+
+@compiled
+def _drain(ground, order, down, across, area):
+    """Pass the areas of cells, from the highest to the lowest, to their lower neighbours."""
     rows, columns = ground.shape
-    area = np.full(rows * columns, down * across)
-    order = np.argsort(ground.ravel())
     share = np.empty((3, 3))
     for k in range(order.size - 1, -1, -1):
         y, x = order[k] // columns, order[k] % columns
@@ -182,5 +193,4 @@ def drained_area(ground, down, across):
             for a in range(-1, 2):
                 for b in range(-1, 2):
                     if share[a + 1, b + 1] > 0.0:
-                        area[(y + a) * columns + x + b] += area[y * columns + x] * share[a + 1, b + 1] / total
-    return area.reshape(rows, columns)
+                        area[y + a, x + b] += area[y, x] * share[a + 1, b + 1] / total

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
-from numba import njit
 from scipy.sparse import csr_array
 
 from fifesim.base.arguments import check_fields
+from fifesim.base.arrays import compiled, jitable
 
 # Mean radius of the earth [m].
 EARTH_RADIUS = 6.371e6
@@ -565,7 +565,7 @@ def _table(spread):
     return _Table(spread.cumulative(np.linspace(-half, half, _NODES)), half, (_NODES - 1) / (2 * half))
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _cumulative(table, x):
     place = min(max((x + table.half) * table.scale, 0.0), table.cumulative.size - 1.0)
     index = min(int(place), table.cumulative.size - 2)
@@ -573,17 +573,17 @@ def _cumulative(table, x):
     return table.cumulative[index] * (1 - share) + table.cumulative[index + 1] * share
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _share(table, x, reach):
     return _cumulative(table, x + reach) - _cumulative(table, x - reach)
 
 
-@njit(nogil=True, cache=True)
+@jitable
 def _in_frame(frame, down, right):
     return frame[0, 0] * down + frame[0, 1] * right, frame[1, 0] * down + frame[1, 1] * right
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _cell_weight(i, j, row, column, frame, n, a, b, along, across):
     # Most cells of the box lie beyond the footprint's turned sides.
     u, v = _in_frame(frame, i + 0.5 - row, j + 0.5 - column)
@@ -600,7 +600,7 @@ def _cell_weight(i, j, row, column, frame, n, a, b, along, across):
     return weight
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _fill(boxes, along, across, window, pointers, indices, weights):
     used = 0
     top, bottom, left, right = window

@@ -28,8 +28,8 @@ def test_normals_are_those_of_box_and_muller():
     rng = np.random.default_rng(4)
     one, other = (rng.integers(0, 2**32, 20_000, dtype=np.uint32) for _ in range(2))
     one[:3] = 0, 1, 2**32 - 1
-    found = np.empty((2, one.size), np.float32)
-    _box_muller(one, other, *found)
+    memory, found = np.empty((2, one.size), np.float32), np.empty((2, one.size), np.float32)
+    _box_muller(one, other, memory[0], memory[0].view(np.int32), memory[1], *found)
     expected = np.sqrt(-2 * np.log((one + 0.5) / 2**32))
     clear = expected > 0.01
     np.testing.assert_allclose(np.hypot(*found.astype(float))[clear], expected[clear], rtol=0, atol=6e-6)

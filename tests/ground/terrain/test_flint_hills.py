@@ -174,7 +174,7 @@ def test_benches_are_sines_of_the_ground(height, share):
     ground = np.random.default_rng(2).uniform(300, 500, (40, 50))
     ground[0, :4] = height * np.array([30, 30.25, 30.5, 30.75])
     clear, found = np.random.default_rng(3).uniform(0, 1, ground.shape), ground.copy()
-    flint_hills._add_bench(found, clear, height, share)
+    flint_hills._add_bench(found.reshape(-1), clear.reshape(-1), height, share)
     turn = 2 * np.pi / height
     np.testing.assert_allclose(found, ground + share / turn * clear * np.sin(turn * ground), rtol=0, atol=1e-12)
 
