@@ -152,6 +152,8 @@ class _Model:
         if any(map(is_raster, vars(canopy).values())):
             raise ValueError("canopy must not have rasters: give what varies in canopies=, such as {'brown': [0, 0.3]}")
         self.bands, self.canopy = bands, canopy
+        if canopy.model != "sail":
+            raise ValueError(f"canopy_spectra computes SAIL, got model={canopy.model!r}: leave the model out")
         self.leaf_angles = canopy.leaf_angle_distribution
         self.leaf = canopy.leaf_optics or Leaf()
         if by_contents and not isinstance(self.leaf, Leaf):

@@ -132,7 +132,7 @@ class Section(BaseModel):
 
 COVERS = ("none", "pastures", "voronoi", "levels")
 VARYING = tuple(DRAWN)
-KEYS = {name: known for name, known in PROPERTIES.items() if known.default is not None}
+KEYS = {name: known for name, known in PROPERTIES.items() if known.default is not None and name != "model"}
 """Canopy properties that are single keys of a scenario."""
 COVARIATES = ("elevation", "wetness", "illumination")
 FIELD_LIMITS = {"deviations": (0, 1), "arps": (0, 0.2498), "covary": (-1, 1)}

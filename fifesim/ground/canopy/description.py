@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 
@@ -51,6 +51,9 @@ NumberByCell: TypeAlias = Annotated[
 ]
 
 
+MODELS_OF_LEAVES = ("sail", "discrete-ordinates")
+"""Models of radiative transfer in leaves."""
+
 # A smaller hot spot is narrower than the solar disc. [1]
 LEAST_HOTSPOT = 1e-6
 
@@ -72,6 +75,10 @@ class Canopy:
     leaf_angles : str or sequence of float, optional
         A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions; by
         default ``"spherical"``.
+    model : {"sail", "discrete-ordinates"}, optional
+        Radiative transfer in the leaves: "sail" (default) with four streams, up to 3 % off in the near infrared at
+        nadir, or "discrete-ordinates", exact but for the hot spot. The latter needs one direction of sun and view, and
+        green and dead leaves without dissociation.
     hotspot : float, optional
         Leaf size over canopy height, in [0, 10]; the default 0 means no hot spot. [1]
     brown : float or xarray.DataArray, dims (y, x), optional
@@ -127,6 +134,7 @@ class Canopy:
 
     leaf_optics: LeafOptics | None = None
     leaf_angles: LeafAngleInput | None = None
+    model: Literal["sail", "discrete-ordinates"] | None = None
     hotspot: float | None = None
     brown: NumberByCell | None = None
     dissociation: NumberByCell | None = None
@@ -221,6 +229,8 @@ def is_raster(value):
 
 def _check(name, value, known):
     """Raise ValueError if a field cannot have a value."""
+    if name == "model" and value not in MODELS_OF_LEAVES:
+        raise ValueError(f"model must be one of {', '.join(MODELS_OF_LEAVES)}, got {value!r}")
     if name == "leaf_angles":
         leaf_angle_classes(value)
     elif known.unit and not is_raster(value):

@@ -79,6 +79,11 @@ def canopy_kernel(lai, bands, stand, light, exact=False):
     leaves = stand.leaf + (stand.dead or ())
     if not directions.varying(light.geometry) and xr.DataArray not in map(type, leaves):
         return uniform_kernel(partial(scene_reflectance, exact=exact), lai, bands, stand, light)
+    if stand.canopy.model != "sail":
+        raise ValueError(
+            f"model={stand.canopy.model!r} needs one direction of sun and view, and the same leaves in all cells: use "
+            "model='sail', or numbers for the angles and leaf optics"
+        )
     varying, numbers = shares_of(stand.canopy, CELL_SHARES, lai)
     by_band = [_per_band(each) for each in (light.diffuse_fraction, *leaves)]
     rasters = [_per_band(stand.background, bands), by_band[0], *directions.angles(light.geometry), *by_band[1:]]
@@ -90,6 +95,8 @@ def canopy_kernel(lai, bands, stand, light, exact=False):
 
 def light_kernel(lai, bands, stand, light, weights, part):
     """Kernel of the light absorbed in bands, ``kernel(lai, *blocks)`` of shape (k, ...) [1], and its rasters."""
+    if stand.canopy.model != "sail":
+        raise ValueError(f"absorbed light is computed by SAIL, got model={stand.canopy.model!r}: use method='beer'")
     if xr.DataArray in map(type, stand.leaf + (stand.dead or ())):
         raise ValueError(
             "leaf optics vary by cell, absorbed light needs the same leaves in all cells of a class: use "
@@ -128,7 +135,8 @@ def shares_of(canopy, names, lai):
 def _uniform_scene(stand, light):
     own, at = stand.canopy, light.geometry
     angles, towards = own.leaf_angle_distribution, (at.sza, at.vza, at.raa)
-    return uniform_scene(stand.leaf, light.diffuse_fraction, towards, angles, own.hotspot, stand.dead, own.crown_shape)
+    given = stand.leaf, light.diffuse_fraction, towards, angles, own.hotspot, stand.dead, own.crown_shape
+    return uniform_scene(*given)._replace(model=own.model)
 
 
 def _on_soil(kernel, changed, count, lai, *blocks):
@@ -206,7 +214,7 @@ def level_reflectance(lai, bands, stand, light, exact=False, attrs=MappingProxyT
     below = "raster" if isinstance(below, xr.DataArray) else ",".join(map("{:g}".format, below))
     attrs = {"background": below} | dict(attrs)
     shares, angles = shares_in_words(stand.canopy), stand.canopy.leaf_angle_distribution.name
-    out = _labelled(out, lai, bands, light.geometry, angles, shares, attrs)
+    out = _labelled(out, lai, bands, light.geometry, angles, shares, attrs, _NAMES[stand.canopy.model])
     return out if out.chunks is None else made_of(out, even_canopy(lai, stand, light, exact))
 
 
@@ -220,9 +228,9 @@ def reflectance_of_classes(lai, cover, bands, stands, light, exact=False, attrs=
         distinct.append((stand, kernels[code]))
     out = by_class(kernels, cover, lai, bands=len(bands))
     angles = dict.fromkeys(each.canopy.leaf_angle_distribution.name for each in stands.values())
-    return _labelled(
-        out, lai, bands, light.geometry, " and ".join(angles), "", {"background": "by class"} | dict(attrs)
-    )
+    models = " and ".join(dict.fromkeys(_NAMES[each.canopy.model] for each in stands.values()))
+    attrs = {"background": "by class"} | dict(attrs)
+    return _labelled(out, lai, bands, light.geometry, " and ".join(angles), "", attrs, models)
 
 
 def same_properties(one, other, names):
@@ -235,7 +243,7 @@ def _same(one, other):
     if one is other:
         return True
     if isinstance(one, Canopy) and isinstance(other, Canopy):
-        return same_properties(one, other, ("hotspot", "crown_shape", *ABSORBING))
+        return same_properties(one, other, ("model", "hotspot", "crown_shape", *ABSORBING))
     if isinstance(one, tuple | list):
         return isinstance(other, tuple | list) and len(one) == len(other) and all(map(_same, one, other))
     if isinstance(one, np.ndarray):
@@ -243,7 +251,11 @@ def _same(one, other):
     return isinstance(one, str | float | int) and isinstance(other, str | float | int) and one == other
 
 
-def _labelled(reflectance, lai, bands, geometry, angles, shares, attrs):
+_NAMES = {"sail": "SAIL", "discrete-ordinates": "discrete ordinates"}
+"""Names of the models in a history."""
+
+
+def _labelled(reflectance, lai, bands, geometry, angles, shares, attrs, model):
     """Reflectance of a scene with its bands, grid, directions and attributes."""
     names, wavelengths = zip(*map(attrgetter("name", "wavelength"), bands), strict=True)
     coordinates = cf.band_coordinates(band=names, wavelength=wavelengths) | directions.coordinates_of(geometry)
@@ -252,7 +264,7 @@ def _labelled(reflectance, lai, bands, geometry, angles, shares, attrs):
     for name in ("sza", "vza"):
         angle = getattr(geometry, name)
         zeniths.append(f"{name} varying" if np.ndim(angle) else f"{name} {angle:.2f}")
-    history = f"surface_reflectance: SAIL, {angles} leaves, {shares}{', '.join(zeniths)}"
+    history = f"surface_reflectance: {model}, {angles} leaves, {shares}{', '.join(zeniths)}"
     return cf.label(out, "surface_reflectance", source=lai, history=history, leaf_angles=angles, **attrs)
 
 

@@ -21,6 +21,7 @@ from fifesim.ground.canopy.crowns import (
 from fifesim.ground.canopy.layers import extinction_coefficient, two_layers
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
 from fifesim.ground.canopy.leaf_area import check_lai, check_share
+from fifesim.ground.canopy.leaf_transfer import discrete_ordinates
 from fifesim.ground.canopy.optics import check_background, check_leaf_optics
 from fifesim.ground.canopy.sail_model import over_background, reflectance_factor, sail, with_background
 
@@ -297,6 +298,7 @@ class Scene(NamedTuple):
     dissociation: float | np.ndarray = 0.0
     crown_cover: float | np.ndarray = 1.0
     crown_shape: float = SHAPE
+    model: str = "sail"
 
     def varies(self):
         """Whether leaves or crowns vary from cell to cell."""
@@ -320,10 +322,26 @@ def leaves_of(lai, scene):
     """Reflectances and transmittances of leaves without gaps between crowns, from leaf area within crowns."""
     given = {name: getattr(scene, name) for name in ("sza", "vza", "raa", "leaf_angles", "hotspot")}
     leaf = _by_band(scene.leaf_reflectance), _by_band(scene.leaf_transmittance)
+    if scene.model != "sail":
+        return _exact_leaves(lai, leaf, scene, given)
     if _is(scene.brown, 0):
         return sail(lai, *leaf, **given)
     dead = _by_band(scene.brown_reflectance), _by_band(scene.brown_transmittance)
     return two_layers(lai, *leaf, *dead, brown=scene.brown, dissociation=scene.dissociation, **given)
+
+
+def _exact_leaves(lai, leaf, scene, given):
+    """Leaves by discrete ordinates; dead leaves are mixed with green ones."""
+    if any(np.size(given[name]) > 1 for name in ("sza", "vza", "raa")):
+        raise ValueError("model='discrete-ordinates' needs one direction of sun and view: use model='sail'")
+    if isinstance(scene.brown, np.ndarray) or (scene.brown != 0 and not _is(scene.dissociation, 0)):
+        raise ValueError(
+            "model='discrete-ordinates' needs one share of dead leaves without dissociation: use model='sail'"
+        )
+    if scene.brown != 0:
+        dead = _by_band(scene.brown_reflectance), _by_band(scene.brown_transmittance)
+        leaf = [(1 - scene.brown) * green + scene.brown * other for green, other in zip(leaf, dead, strict=True)]
+    return discrete_ordinates(lai, *leaf, **given)
 
 
 def sky_of(scene):

@@ -118,6 +118,7 @@ def test_the_default_is_tallgrass_of_which_nothing_was_given():
     assert {name: getattr(Canopy(), name) for name in PROPERTIES} == {
         "leaf_optics": None,
         "leaf_angles": "spherical",
+        "model": "sail",
         "hotspot": 0.0,
         "brown": 0.0,
         "dissociation": 0.0,

@@ -23,7 +23,13 @@ def test_numbers_have_these_defaults_and_ranges():
         "soil": (0.0, -1, 1),
         "moisture": (0.0, 0, 1),
     }
-    assert set(PROPERTIES) - set(NUMERIC_PROPERTIES) == {"leaf_optics", "leaf_angles", "brown_leaf", "background"}
+    assert set(PROPERTIES) - set(NUMERIC_PROPERTIES) == {
+        "leaf_optics",
+        "leaf_angles",
+        "model",
+        "brown_leaf",
+        "background",
+    }
     assert set(BY_CELL) == {"brown", "dissociation", "crown_cover", "soil", "moisture"}
     assert {name: each.effect for name, each in DRAWN.items()} == {
         "brown": "dead leaves",
