@@ -106,6 +106,8 @@ def fpar(
     >>> round(float(lai.fifesim.fpar(method="energy").mean()), 2)
     0.33
     """
+    if leaves not in ("all", "green"):
+        raise ValueError(f"leaves must be 'all' or 'green', got {leaves!r}: which of them absorb the light")
     if method == "energy":
         if fpar_inf != layers.FPAR_INF:
             raise ValueError(

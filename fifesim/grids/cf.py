@@ -153,7 +153,7 @@ QUANTITIES = {
     "gpp": Quantity("g m-2 d-1", "gross_primary_productivity_of_biomass_expressed_as_carbon",
         "gross primary production, mass of carbon", label="GPP", lowest=0, colours="YlGn", ends=(0, None)),
     "evapotranspiration": Quantity("kg m-2 d-1", "water_evapotranspiration_flux", "evapotranspiration",
-        shown_units="mm d-1", colours="YlGnBu", ends=(0, None)),
+        label="ET", shown_units="mm d-1", colours="YlGnBu", ends=(0, None)),
     "albedo": Quantity("1", "surface_albedo", "albedo of the ground", "direct and diffuse light mixed",
         label="albedo", lowest=0, highest=1, colours="gray"),
     "ren": Quantity("1", "", "relative equivalent noise", "uncertainty of an inferred variable over its value",

@@ -70,12 +70,16 @@ def test_light_sums_to_one_and_agrees_with_the_model(lai):
 
 
 @pytest.mark.parametrize("leaves", ["all", "green"])
-def test_fpar_of_varying_leaves_and_soil_agrees_with_the_model(lai, leaves):
+@pytest.mark.parametrize("even", [None, "brown", "soil"])
+def test_fpar_of_varying_leaves_and_soil_agrees_with_the_model(lai, leaves, even):
     land = varied(lai)
+    if even is not None:
+        land[even] = 0.2 if even == "brown" else 0.02
     land["lai"][0, 0] = np.nan
     made = land.fifesim.fpar(method="energy", leaves=leaves).values.ravel()
     parts = land.fifesim.light().to_array().values.reshape(4, -1)
-    by_band, shares = by_cell(*(land[name].values.ravel() for name in ("lai", "brown", "soil")))
+    fields = xr.broadcast(*(land[name] for name in ("lai", "brown", "soil")))
+    by_band, shares = by_cell(*(each.values.ravel() for each in fields))
     expected = np.einsum("pbn,b->pn", by_band, shares)
     np.testing.assert_allclose(parts, expected, rtol=0, atol=1e-9)
     np.testing.assert_allclose(made, expected[0] + expected[1] * (leaves == "all"), rtol=0, atol=1e-6)
@@ -120,6 +124,7 @@ def test_more_leaves_and_diffuse_light_absorb_as_published():
         ({"canopy": fifesim.Canopy(leaf_optics={"TM3": (0.1, 0.1)})}, "leaf_optics is given by band.*fifesim.Leaf"),
         ({"canopy": fifesim.Canopy(background={"TM3": 0.1})}, "background is given by band"),
         ({"method": "sail"}, "method"),
+        ({"leaves": "dead"}, "leaves"),
     ],
 )
 def test_impossible_requests_are_refused(lai, options, message):

@@ -53,11 +53,14 @@ def scene_light(lai, background, scene, weights, part):
     if part == "light" or isinstance(scene.dissociation, np.ndarray) or isinstance(scene.crown_cover, np.ndarray):
         check_cells(lai, ground, scene)
         return _by_model(lai, ground, scene, weights, part).reshape(-1, *cells)
-    by_brown = isinstance(scene.brown, np.ndarray)
-    table = _foliage_table(scene._replace(brown=-1.0) if by_brown else scene, by_brown, part)
-    by_band, wrong = interpolation.interpolate_foliage(table, lai, np.atleast_1d(scene.brown), ground)
-    if wrong:
+    if isinstance(scene.brown, np.ndarray):
+        table = _foliage_table(scene._replace(brown=-1.0), part)
+        by_band, wrong = interpolation.interpolate_foliage(table, lai, scene.brown, ground)
+        if wrong:
+            check_cells(lai, ground, scene)
+    else:
         check_cells(lai, ground, scene)
+        by_band = interpolation.interpolate_over(_terms_table(scene, part), lai, ground)
     return (np.array(weights) @ by_band).reshape(1, *cells)
 
 
@@ -91,25 +94,36 @@ def _optics(scene):
 def _table(background, scene, weights, part):
     """Table of the light of cells that differ only in leaf area."""
     ground = np.array(background)[:, None]
-    return interpolation.tabulate(
-        lambda lai: _model_light(lai, ground, scene, weights, part), decay(scene) / (scene.crown_cover or 1.0)
-    )
+    return interpolation.tabulate(lambda lai: _model_light(lai, ground, scene, weights, part), _rate(scene))
+
+
+@cached(8, "tables of absorbed light over any background")
+def _terms_table(scene, part):
+    """Table of terms that `over_background` combines to the light absorbed in each band."""
+    return interpolation.tabulate(lambda lai: _terms(lai, scene.brown, scene, part), _rate(scene), over_grounds)
 
 
 @cached(8, "tables of absorbed light by dead share over any background")
-def _foliage_table(scene, by_brown, part):
-    """Table of terms that `over_background` combines to the light absorbed in each band."""
+def _foliage_table(scene, part):
+    """As `_terms_table`, over leaf area and dead share."""
+    return interpolation.tabulate_foliage(
+        lambda lai, brown: _terms(lai, brown, scene, part), _rate(scene), combine=over_grounds
+    )
 
-    def terms(lai, brown):
-        found, _ = light_terms(
-            lai, *_optics(scene), brown=brown if by_brown else scene.brown, dissociation=scene.dissociation,
-            sza=scene.sza, leaf_angles=scene.leaf_angles, diffuse_fraction=sky_of(scene),
-            crown_cover=scene.crown_cover,
-        )  # fmt: skip
-        kinds = ("green",) if part == "green" else ("green", "brown")
-        alone = sum(getattr(found, kind) for kind in kinds)
-        through = found.down * sum(getattr(found, f"{kind}_below") for kind in kinds)
-        columns = np.broadcast_arrays(alone, 0.0, through, found.rdd_below)
-        return np.stack(columns, axis=1).reshape(-1, columns[0].shape[-1])
 
-    return interpolation.tabulate_foliage(terms, decay(scene) / (scene.crown_cover or 1.0), by_brown, over_grounds)
+def _rate(scene):
+    """Fastest decay of light with leaf area."""
+    return decay(scene) / (scene.crown_cover or 1.0)
+
+
+def _terms(lai, brown, scene, part):
+    """Terms of `over_background` for the light absorbed in each band, shape (4 bands, n)."""
+    found, _ = light_terms(
+        lai, *_optics(scene), brown=brown, dissociation=scene.dissociation, sza=scene.sza,
+        leaf_angles=scene.leaf_angles, diffuse_fraction=sky_of(scene), crown_cover=scene.crown_cover,
+    )  # fmt: skip
+    kinds = ("green",) if part == "green" else ("green", "brown")
+    alone = sum(getattr(found, kind) for kind in kinds)
+    through = found.down * sum(getattr(found, f"{kind}_below") for kind in kinds)
+    columns = np.broadcast_arrays(alone, 0.0, through, found.rdd_below)
+    return np.stack(columns, axis=1).reshape(-1, columns[0].shape[-1])
