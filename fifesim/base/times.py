@@ -27,13 +27,13 @@ _WRITTEN = re.compile(r"\s*\d{4}-?\d{2}-?\d{2}[T ]\d{2}(:?\d{2}.*)?\s*", re.ASCI
 _YEARS = 1700, 2200  # range of dates in nanoseconds
 
 
-def utc(time):
+def utc(time, name="time"):
     """Time in UTC, from text after ISO 8601 or a datetime; UTC is assumed if no time zone is given."""
     if isinstance(time, str) and re.fullmatch(r"\s*\d{4}-?\d{2}-?\d{2}\s*", time):
-        raise ValueError(f"time = {time!r} is a date alone: add the time of day, such as {time.strip()}T17:10Z")
+        raise ValueError(f"{name} = {time!r} is a date alone: add the time of day, such as {time.strip()}T17:10Z")
     if isinstance(time, str) and not _WRITTEN.fullmatch(time):
         raise ValueError(
-            f"time must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}: the year first, "
+            f"{name} must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}: the year first, "
             "then month and day, for other orders are read in several ways"
         )
     try:
@@ -42,7 +42,7 @@ def utc(time):
     except (TypeError, ValueError):
         stamp = pd.NaT
     if stamp is pd.NaT:
-        raise ValueError(f"time must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}")
+        raise ValueError(f"{name} must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}")
     if not _YEARS[0] <= stamp.year < _YEARS[1]:
-        raise ValueError(f"time must be a date and time of the years {_YEARS[0]} to {_YEARS[1]}, got {described(time)}")
+        raise ValueError(f"{name} must be in the years {_YEARS[0]} to {_YEARS[1]}, got {described(time)}")
     return pd.DatetimeIndex([stamp.tz_localize("UTC") if stamp.tzinfo is None else stamp.tz_convert("UTC")])

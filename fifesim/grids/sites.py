@@ -151,9 +151,7 @@ def sun_position(
     >>> season["sza"].round(1).values.tolist()
     [28.5, 66.0]
     """
-    values = time.values if isinstance(time, xr.DataArray) else time
-    if isinstance(values, xr.Dataset) or np.ndim(values) > 1 or (np.ndim(values) and not len(values)):
-        raise ValueError(f"time must be one time, or a list such as ['1987-06-06T16:35Z'], got {described(time)}")
+    values = one_or_several(time)
     if not np.ndim(values) and not any(np.ndim(each) for each in (latitude, longitude, altitude)):
         return geometry.sun_geometry(values, latitude, longitude, altitude)
     places = [np.asarray(each, float) for each in (latitude, longitude, altitude)]
@@ -162,6 +160,14 @@ def sun_position(
     names = "sza", "saa", "earth_sun_distance"
     data = {name: ("time", each, cf.attributes(name)) for name, each in zip(names, found, strict=True)}
     return xr.Dataset(data, {"time": ("time", utc, cf.TIME_ATTRIBUTES)})
+
+
+def one_or_several(time):
+    """One time, or a sequence of times, as given by a user."""
+    values = time.values if isinstance(time, xr.DataArray) else time
+    if isinstance(values, xr.Dataset) or np.ndim(values) > 1 or (np.ndim(values) and not len(values)):
+        raise ValueError(f"time must be one time, or a list such as ['1987-06-06T16:35Z'], got {described(time)}")
+    return values
 
 
 def check_same_sun(geometry, array):

@@ -81,7 +81,7 @@ def overpasses(
             "make dates with fifesim.sun_position"
         )
     row = table.loc[description.name]
-    first, last = utc(start)[0], utc(end)[0]
+    first, last = utc(start, "start")[0], utc(end, "end")[0]
     if not first < last:
         raise ValueError(f"end must be after start, got {end} and {start}: swap them")
     latitude, longitude = map(float, place)

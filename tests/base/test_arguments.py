@@ -73,7 +73,7 @@ ACCEPTED = {
                                                     "surface_reflectance", "to_surface", "to_toa",
                                                     "as_seen_by", "landscape", "sense_swath",
                                                     "calibrate", "canopy_spectra", "Setup", "light", "gpp",
-                                                    "evapotranspiration", "albedo", "brdf_normalise",
+                                                    "evapotranspiration", "albedo", "brdf_normalise", "cast_clouds",
                                                     "topographic_correction")},
     ("brdf_normalise", "to"): {"dataset"}, ("topographic_correction", "c"): LIST,
     # Numbers in any shape.
@@ -88,6 +88,7 @@ ACCEPTED = {
     # Names of three bands, which a raster without bands does not need; two limits; None where it says something.
     ("plot", "composite"): LIST, ("plot", "limits"): LIST, ("plot_comparison", "limits"): LIST,
     ("plot", "stretch"): LIST,
+    **{("cloud_field", name): LIST for name in ("thickness", "height", "drift")}, ("overpasses", "place"): LIST,
     ("train", "levels"): LIST, ("retrieve", "intervals"): LIST, ("train", "path"): {"str"},
     ("score", "by"): LIST, ("score", "truth"): {"crs"}, ("rgb", "stretch"): LIST,
     ("calibrate", "saturated"): {"none"}, ("simulate", "chunks"): {"none"},
@@ -142,6 +143,9 @@ def calls(tmp_path_factory):
     radiance = placed(np.full((1, *wide.shape), 80.0), wide, "toa_radiance").assign_coords(band=["MODIS1"])
     radiance.attrs |= {"instrument": "MODIS", "units": "W m-2 sr-1 um-1"}
     swath = fifesim.sense_swath(radiance, "MODIS", min_valid=0.1)
+    coarse = fifesim.fife_site(1100.0, window=((0, 12), (0, 12)))
+    avhrr = placed(np.full((1, *coarse.shape), 0.2), coarse, "toa_reflectance").assign_coords(band=["AVHRR1"])
+    samples = fifesim.sense_swath(avhrr, "AVHRR", min_valid=0.1, quantise=False)
     many = fifesim.Study(tiny, {"visibility": {"uniform": [10, 60]}}, landscapes=3)
     chips = fifesim.dataset(many, folder / "training.zarr", 3)
     retrieval = fifesim.train(chips, "line", path=folder / "line.nc")
@@ -172,6 +176,13 @@ def calls(tmp_path_factory):
         "simulate": {"scenario": tiny},
         "sweep": {"scenario": tiny, "axes": {"visibility": [20.0, 40.0]}},
         "budget": {"scenario": None, "realisations": 1, "cells": 90},
+        "cloud_field": {"grid": grid, "cover": 0.3, "thickness": 8.0, "length": 100.0, "height": 1500.0, "seed": 0},
+        "cast_clouds": {"scene": lai, "clouds": fifesim.cloud_field(grid, 0.3, length=100.0, margin=1500.0)},
+        "overpasses": {"instrument": "TM", "start": "1987-06-01T00:00Z", "end": "1987-06-20T00:00Z",
+                       "place": (39.1, -96.5)},
+        "phenology": {"time": ["1987-06-06"], "green_up": 120.0, "senescence": 260.0, "width": 10.0, "winter": 0.0},
+        "to_gac": {"swath": samples},
+        "sensitivity": {"study": study, "quantity": "lai", "n": 2},
         "chips_of": {"study": study, "n": 1},
         "dataset": {"study": study, "folder": folder / "chips.zarr", "n": 1, "overwrite": True},
         "explore": {"scenario": None, "path": folder / "page.html", "overwrite": True},

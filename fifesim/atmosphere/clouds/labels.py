@@ -24,6 +24,7 @@ from fifesim.grids import grid as grids
 from fifesim.grids.dates import by_date, joined
 from fifesim.grids.directions import Directions
 from fifesim.grids.grid import with_crs_of
+from fifesim.grids.sites import one_or_several
 
 HIGHEST_CLOUD = 20_000.0  # of clouds [m]
 LOWEST_SUN = 85.0  # zenith angle beyond which shadows have no end [degree]
@@ -108,9 +109,12 @@ def cloud_field(
     >>> round(float((sky.optical_thickness > 0).mean()), 2)
     0.3
     """
+    time = one_or_several(time)
     if np.ndim(time):
         options = {"thickness": thickness, "length": length, "height": height, "seed": seed, "drift": drift}
-        each = [cloud_field(grid, cover, **options, time=one, margin=margin, chunks=chunks) for one in time]
+        # Seconds have no date, which is the coordinate of several skies.
+        dates = [utc(one)[0] for one in time]
+        each = [cloud_field(grid, cover, **options, time=one, margin=margin, chunks=chunks) for one in dates]
         return each[0].assign(optical_thickness=joined([one["optical_thickness"] for one in each]))
     grid = grids.check_grid(grid)
     base, top = _base_and_top(height)

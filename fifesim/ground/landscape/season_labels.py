@@ -8,6 +8,7 @@ import xarray as xr
 from fifesim.base.annotations import Times
 from fifesim.base.times import utc
 from fifesim.grids import cf
+from fifesim.grids.sites import one_or_several
 
 
 def double_logistic(day, green_up, senescence, width):
@@ -87,8 +88,8 @@ def phenology(
         )
     if not (width > 0 and 0 <= winter <= 1):
         raise ValueError(f"width must be above 0 and winter from 0 to 1, got {width:g} and {winter:g}")
-    each = [time] if np.ndim(time) == 0 else list(np.asarray(time).tolist() if isinstance(time, xr.DataArray) else time)
-    stamps = [utc(np.datetime64(one, "ns") if isinstance(one, int) else one)[0] for one in each]
+    times = one_or_several(time)
+    stamps = [utc(one)[0] for one in (times if np.ndim(times) else [times])]
     day = np.array([stamp.dayofyear + stamp.hour / 24 for stamp in stamps])
     values = winter + (1 - winter) * double_logistic(day, green_up, senescence, width)
     dates = np.array([stamp.tz_localize(None).to_datetime64() for stamp in stamps])
