@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from fifesim.ground.canopy.leaf_area import check_map, check_source, warn_of_large
+from fifesim.ground.canopy.leaf_area import check_fraction, check_map, check_share, check_source, warn_of_large, within
 
 
 def test_percent_is_not_told_to_be_tenths():
@@ -28,3 +28,23 @@ def test_a_mean_beyond_dense_forest_is_a_warning():
     with warnings.catch_warnings(action="error"):
         warn_of_large(np.array([7.9, 8.1, np.nan]))
         warn_of_large(np.full(3, np.nan))
+
+
+def test_fractions_are_told_from_others():
+    assert within(np.array([0.0, 1.0, np.nan]), 0, 1) and within(0.5, 0, 1) and within(np.empty(0), 0, 1)
+    for wrong in (-1e-9, 1 + 1e-9, np.inf, -np.inf):
+        for cells in (np.array([0.5, wrong]), np.array([[0.5, wrong]] * 4).T, np.array([[0.5, wrong]] * 4)[::2, ::-1]):
+            assert not within(cells, 0, 1)
+    assert check_share("brown", 0.3) == 0.3
+
+
+@pytest.mark.parametrize("check", [check_fraction, check_share])
+def test_others_are_refused_by_name_and_value(check):
+    with pytest.raises(ValueError, match=r"brown must be in \[0, 1\], got 40: give a fraction, not percent"):
+        check("brown", np.array([0.4, 40.0]))
+
+
+def test_no_data_pass_where_there_are_cells():
+    check_share("brown", np.array([0.4, np.nan]))
+    with pytest.raises(ValueError, match="got nan"):
+        check_fraction("brown", np.array([0.4, np.nan]))

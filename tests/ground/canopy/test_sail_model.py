@@ -3,9 +3,21 @@
 import numpy as np
 import pytest
 from oracles_canopy import four_streams, sunlit_and_seen, turned_leaves
+from scipy.linalg import expm
+from scipy.optimize import brentq
 
+from fifesim.ground.canopy import sail_model
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes, leaf_projection
-from fifesim.ground.canopy.sail_model import sail, volume_scattering, with_background
+from fifesim.ground.canopy.sail_model import (
+    bidirectional_gap,
+    direction_distance,
+    exponential_chain,
+    hotspot_decay,
+    leaf_scattering,
+    sail,
+    volume_scattering,
+    with_background,
+)
 
 SHAPES = ["spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform", "90: 1", "0: 1"]
 LAI = np.array([0, 1e-6, 0.01, 0.5, 2, 8, 20, 100])[:, None, None, None]
@@ -160,3 +172,121 @@ def test_everything_broadcasts_at_once():
 def test_relative_azimuth_is_folded():
     first, second = (sail(1.0, 0.1, 0.1, sza=20, vza=40, raa=raa).rso for raa in (50, 310))
     np.testing.assert_allclose(first, second, rtol=1e-14)
+
+
+@pytest.mark.parametrize("alpha", [0.0, 1e-3, 1.0, 40.0, np.inf])
+@pytest.mark.parametrize("lai", [0.01, 2.0, 30.0])
+def test_gap_and_leaf_area_are_those_of_quadrature(lai, alpha):
+    ks, ko = 0.7, 0.55
+    tsstoo, seen = bidirectional_gap(lai, ks, ko, alpha)
+    if np.isinf(alpha):
+        expected, gap = -np.expm1(-(ks + ko) * lai) / (ks + ko), np.exp(-(ks + ko) * lai)
+    else:
+        expected = sunlit_and_seen(lai, ks, ko, alpha)
+        overlap = 1.0 if alpha == 0 else -np.expm1(-alpha) / alpha
+        gap = np.exp(-(ks + ko) * lai + np.sqrt(ks * ko) * lai * overlap)
+    np.testing.assert_allclose([seen, tsstoo], [expected, gap], rtol=1e-9)
+
+
+def test_directions_are_as_far_apart_as_their_tangents():
+    """By complex numbers on the plane; 0 in the hot spot, and no hot spot without size."""
+    sza, vza, raa = np.array([30, 60, 45]), np.array([50, 0, 45]), np.array([70, 10, 180])
+    sun, view = np.tan(np.radians(sza)), np.tan(np.radians(vza)) * np.exp(1j * np.radians(raa))
+    np.testing.assert_allclose(direction_distance(sza, vza, raa), np.abs(sun - view), rtol=1e-13)
+    assert hotspot_decay(40.0, 40.0, 0.0, 1.2, np.array(0.1)) == 0
+    assert hotspot_decay(40.0, 10.0, 0.0, 1.2, np.array(0.0)) == np.inf
+    np.testing.assert_allclose(hotspot_decay(60.0, 0.0, 0.0, 1.2, np.array(0.1)), 2 * np.sqrt(3) / (1.2 * 0.1))
+
+
+FIELDS = ("rso", "rdo", "rsd", "rdd", "tss", "too", "tsd", "tdo", "tdd")
+
+
+def by_chains(monkeypatch, *args, **options):
+    with monkeypatch.context() as patch:
+        patch.setattr(sail_model, "_slabs", lambda *given: given[-1].fill(True))
+        return sail(*args, **options)
+
+
+@pytest.mark.parametrize("leaf_angles", ["spherical", "planophile", "campbell(80)", "0: 1", "90: 1"])
+@pytest.mark.parametrize("angles", [(28.5, 10, 40), (0, 0, 0), (60, 60, 0), (75, 50, 180)])
+def test_slab_is_the_sum_of_its_chains(leaf_angles, angles, monkeypatch):
+    """From almost no leaves to LAI 60, from black to conservative ones."""
+    random = np.random.default_rng(7)
+    lai = np.concatenate([random.uniform(0, 8, 200), 10 ** random.uniform(-8, 1.8, 200), [0.0]])
+    absorbed = 10 ** random.uniform(-9, 0, lai.size)
+    absorbed[:40], absorbed[40:80] = 0, 1
+    rho = (1 - absorbed) * random.uniform(0, 1, lai.size)
+    tau = np.maximum(1 - absorbed - rho, 0)
+    given = dict(zip(("sza", "vza", "raa"), angles, strict=True), leaf_angles=leaf_angles)
+    found, expected = sail(lai, rho, tau, **given), by_chains(monkeypatch, lai, rho, tau, **given)
+    for name in FIELDS:
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=0, atol=1e-14, err_msg=name)
+
+
+def test_rates_that_are_nearly_equal_are_not_singular(monkeypatch):
+    """Sun, view and diffuse light that fade at the same rate, to 1e-14 of it and to a hundredth."""
+    classes = leaf_angle_classes("spherical")
+    angles = 40.0, 40.0, 30.0
+    rate = float(leaf_scattering(0.1, 0.1, *angles, classes).ks)
+    leaf = brentq(lambda each: float(leaf_scattering(each, each, *angles, classes).m) - rate, 0, 0.49)
+    random = np.random.default_rng(8)
+    rho = leaf + 10 ** random.uniform(-14, -2, 2000) * random.choice([-1, 1], 2000)
+    lai = 10 ** random.uniform(-4, 1.5, 2000)
+    given = {"sza": 40.0, "vza": 40.0 + 10 ** random.uniform(-12, -1, 2000), "raa": 30.0}
+    found, expected = sail(lai, rho, rho, **given), by_chains(monkeypatch, lai, rho, rho, **given)
+    for name in FIELDS:
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=0, atol=1e-14, err_msg=name)
+
+
+def test_only_leaves_that_hardly_intercept_light_take_the_slow_way(monkeypatch):
+    asked = []
+    chains = sail_model._by_chains
+    monkeypatch.setattr(sail_model, "_by_chains", lambda *given: asked.append(len(given[0])) or chains(*given))
+    sail(np.array([1.0, 2.0]), 0.45, 0.42, sza=np.array([30.0, 0.0]), leaf_angles="90: 1")
+    assert asked == [1]
+    sail(np.array([1.0, 2.0]), 0.45, 0.42, sza=30.0)
+    assert asked == [1]
+
+
+def test_directions_of_cells_that_are_equal_are_summed_once_and_stay_in_their_place():
+    sza = np.array([[30.0, 50.0], [50.0, np.nan]])
+    found = sail(1.0, 0.07, 0.04, sza=sza, vza=20.0, raa=200.0, hotspot=0.1)
+    for place in np.ndindex(2, 2):
+        one = sail(1.0, 0.07, 0.04, sza=sza[place], vza=20.0, raa=160.0, hotspot=0.1)
+        np.testing.assert_array_equal(found.rso[place], one.rso)
+
+
+@pytest.mark.parametrize("gap", [0, 1e-12, 1e-6, 0.01, 0.66, 0.67, 0.68, 1, 10, 1000])
+def test_chain_matches_a_triangular_matrix_exponential(gap):
+    """Opitz: the corner of exp of a bidiagonal matrix is the divided difference. Across the series' limit too."""
+    rates = np.array([0.3, 0.3 + gap, 0.1, 0.3, 0.2 + 2 * gap])
+    corner = expm(3.0 * (np.diag(-rates) + np.diag(np.ones(4), 1)))[0, -1]
+    np.testing.assert_allclose(exponential_chain(3.0, *rates), corner, rtol=1e-11)
+
+
+@pytest.mark.parametrize("gap", [0, 0.01, 10])
+def test_compiled_chains_stay_within_their_arrays(gap):
+    """Beside the same in plain Python, which would notice a place beyond."""
+    x, difference, homogeneous = np.sort([-0.9, -0.9 - 3 * gap, -0.3, -0.9]), np.empty(4), np.empty(4)
+    sail_model._recursion.py_func(x, difference, homogeneous)
+    assert 3.0**3 * difference[0] == pytest.approx(exponential_chain(3.0, *(-x / 3)), rel=1e-12)
+
+
+def test_arrays_broadcast_and_cells_do_not_touch_each_other():
+    """In any order of the rates; one that is not a number stays in its cell."""
+    rng = np.random.default_rng(2)
+    lai, one, other, third = rng.gamma(2, 1, (3, 1)), rng.uniform(0, 3, 4), 1e-9, rng.uniform(0, 3, (2, 1, 1))
+    found = exponential_chain(lai, one, other, third)
+    assert found.shape == (2, 3, 4)
+    np.testing.assert_allclose(found, exponential_chain(lai, third, one, other), rtol=1e-12)
+    assert found[1, 2, 3] == exponential_chain(lai[2, 0], one[3], other, third[1, 0, 0])
+    one[1] = np.nan
+    holed = exponential_chain(lai, one, other, third)
+    assert np.isnan(holed[..., 1]).all()
+    np.testing.assert_array_equal(np.delete(holed, 1, -1), np.delete(found, 1, -1))
+
+
+def test_a_chain_of_two_is_the_integral_of_one_exponential():
+    lai = np.array([0.0, 0.1, 3.0, 50.0])
+    np.testing.assert_allclose(exponential_chain(lai, 0.7, 0.0), -np.expm1(-0.7 * lai) / 0.7, rtol=1e-13)
+    assert isinstance(exponential_chain(1.0, 0.7, 0.0), float)

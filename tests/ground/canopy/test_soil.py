@@ -2,11 +2,21 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import fifesim
 from fifesim.base import files
 from fifesim.base.bands import Band
-from fifesim.ground.canopy.soil import brightened, soil_line
+from fifesim.ground.canopy.soil import (
+    FILM,
+    WaterFilms,
+    below_film,
+    brightened,
+    grains_in_water,
+    moistened,
+    soil_line,
+    water_films,
+)
 
 TM = tuple(band.response for band in fifesim.instrument("TM").select(None))
 
@@ -46,3 +56,103 @@ def test_what_no_soil_has_is_one_line(call, message):
     with pytest.raises(ValueError, match=message) as caught:
         call()
     assert len(str(caught.value)) <= 500
+
+
+DRY = np.linspace(0.02, 0.9, 12)
+
+
+def wet_soil(below, passed, surface, inside):
+    """Reflectance of a soil below one film of water."""
+    up, kept = below_film(below, passed, inside)
+    return surface + (1 - surface) * (1 - inside) * up / kept
+
+
+def test_a_film_is_light_thrown_back_and_forth():
+    """Order by order: what enters is absorbed by water and soil, and part of what returns is thrown back below."""
+    surface, inside, passed = 0.021, 0.47, 0.8
+    light, out = 1 - surface, surface
+    for _ in range(200):
+        light *= passed * DRY
+        out = out + light * (1 - inside)
+        light *= inside
+    np.testing.assert_allclose(wet_soil(DRY, passed, surface, inside), out, rtol=1e-12)
+
+
+def test_grains_in_what_bends_light_as_air_does_stay_as_they_are():
+    np.testing.assert_allclose(grains_in_water(DRY, 1.0), DRY, rtol=1e-12)
+    assert np.all(grains_in_water(DRY, 1.08) < DRY)
+
+
+def test_water_that_does_nothing_leaves_the_soil():
+    nothing = WaterFilms(np.zeros(1), np.zeros(1), np.ones(1), np.ones((1, 6)))
+    for moisture in (0.0, 0.4, 1.0):
+        np.testing.assert_allclose(moistened(DRY[:, None], np.full(12, moisture), nothing)[:, 0], DRY, rtol=1e-12)
+
+
+def test_clear_water_loses_no_light():
+    """White ground stays white below any number of films."""
+    films = water_films((narrow(0.45),))
+    white = films._replace(passed=np.ones((1, 6)))
+    assert moistened(np.ones(1), 1.0, white) == pytest.approx(1, abs=1e-12)
+
+
+def test_dry_soil_is_left_to_the_bit():
+    background = np.array([0.15, 0.19, 0.3, 0.31, 0.32, 0.33])
+    assert (moistened(background, 0.0, water_films(TM)) == background).all()
+
+
+def test_films_lie_by_chance():
+    """The sum over twenty films of Poisson's law in scipy, with the absorption of one wavelength."""
+    place = 1.65
+    films = water_films((narrow(place),))
+    table = files.table("prospect_d.csv")
+    absorption = float(np.interp(place, table["wavelength"], table["water"]))
+    for moisture in (0.1, 0.5, 1.0):
+        counts = np.arange(20)
+        passed = np.exp(-2 * absorption * FILM * counts)
+        below = grains_in_water(0.3, films.entrance[0])
+        each = np.where(counts == 0, 0.3, wet_soil(below, passed, films.surface[0], films.inside[0]))
+        expected = np.sum(stats.poisson.pmf(counts, 2 * moisture) * each)
+        # More than six films count as six: 0.5 % of the wettest soil.
+        assert moistened(np.array([0.3]), moisture, films)[0] == pytest.approx(expected, abs=2e-4)
+
+
+def test_surfaces_reflect_as_fresnel_says():
+    """Mean over the hemisphere at n = 1.333: 0.066 from above, 0.475 from below (Lekner and Dorf's figures)."""
+    films = water_films((narrow(0.55),))
+    assert films.inside[0] == pytest.approx(1 - (1 - 0.066) / 1.333**2, abs=1e-3)
+    # Near the normal it is ((n - 1) / (n + 1))**2 = 0.0204, and little more up to 40 degrees.
+    assert 0.0204 < films.surface[0] < 0.0225
+
+
+def test_moisture_darkens_and_most_in_the_shortwave_infrared():
+    """Nearly alike where water is clear, which a third of the light is lost to, and more where it absorbs."""
+    moisture = np.linspace(0, 1, 11)
+    found = moistened(np.full(6, 0.3), moisture, water_films(TM)) / 0.3
+    assert np.all(np.diff(found, axis=0) < 0)
+    tm1, _, tm3, tm4, tm5, tm7 = found[-1]
+    assert 0.6 < tm3 < 0.75 and abs(tm1 - tm4) < 0.01
+    assert tm7 < tm5 < tm4
+
+
+def test_numbers_are_broadcast_and_missing_ones_stay_missing():
+    films = water_films(TM[:2])
+    cells = np.array([[0.1, 0.2], [np.nan, 0.4], [0.3, 0.5]])
+    found = moistened(cells, np.array([0.5, 0.5, np.nan]), films)
+    assert np.isnan(found).tolist() == [[False, False], [True, False], [True, True]]
+    np.testing.assert_array_equal(found[0], moistened(cells[0], 0.5, films))
+
+
+@pytest.mark.parametrize("moisture", [30.0, -0.1])
+def test_moisture_that_is_no_share_is_one_line(moisture):
+    with pytest.raises(ValueError, match=rf"moisture must be in \[0, 1\], got {moisture:g}: .* moisture=0.3"):
+        moistened(np.full(1, 0.2), moisture, water_films(TM[:1]))
+
+
+def test_cells_are_those_of_any_part():
+    """More than are done at once."""
+    rng = np.random.default_rng(3)
+    dry, moisture, films = rng.uniform(0, 0.5, (40_000, 6)), rng.uniform(0, 1, 40_000), water_films(TM)
+    whole = moistened(dry, moisture, films)
+    for part in (slice(0, 20_000), slice(17_001, 40_000), slice(39_999, None)):
+        np.testing.assert_array_equal(whole[part], moistened(dry[part], moisture[part], films))

@@ -2,8 +2,21 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
+from scipy.stats import norm
 
-from fifesim.ground.landscape.cover import PATTERNS, Patches, patch_classes
+from fifesim.ground.landscape.cover import (
+    PATTERNS,
+    Patches,
+    _blocks,
+    _drawn,
+    _fenced,
+    _nearest,
+    pastures,
+    patch_classes,
+    smooth_field,
+    voronoi,
+)
 
 SHARES = (0.2, 0.3, 0.5)
 
@@ -72,3 +85,74 @@ def test_shares_go_by_name_or_in_order():
         named.shares_of(["grass", "water"])
     with pytest.raises(ValueError, match="2 shares for 3 classes"):
         Patches("levels", 10, [0.5, 0.5]).shares_of(["a", "b", "c"])
+
+
+@pytest.mark.parametrize("make", [voronoi, pastures])
+def test_patches_have_the_mean_area_asked_for(make):
+    """1600 patches of area 1: those that the border cuts count by half, and their squared sizes vary by half."""
+    place = (np.arange(1200) + 0.5) / 30
+    numbers = make(5, place, place)
+    assert 1600 < np.unique(numbers).size < 1600 + 4 * 40 * 1.3
+    inner = np.unique(numbers[60:-60, 60:-60])
+    cut = np.unique(np.concatenate([numbers[0], numbers[-1], numbers[:, 0], numbers[:, -1]]))
+    areas = np.array([np.sum(numbers == each) for each in np.setdiff1d(inner, cut)[:200]]) / 900
+    assert abs(areas.mean() - 1) < 4 * areas.std() / np.sqrt(areas.size)
+    assert areas.std() > 0.15
+
+
+def test_voronoi_cells_are_those_of_a_search_tree():
+    down, across = np.arange(200) * 0.37 - 40, np.arange(200) * 0.37 + 30
+    (top, rows), (left, columns) = (_blocks(each, 2) for each in (down, across))
+    points = _drawn(11, 8, top, left, (rows, columns), 3)
+    points[0] += np.arange(top, top + rows)[:, None]
+    points[1] += np.arange(left, left + columns)
+    tree = cKDTree(points[:2].reshape(2, -1).T)
+    places = np.stack(np.meshgrid(down, across, indexing="ij"), -1).reshape(-1, 2)
+    _, nearest = tree.query(places)
+    np.testing.assert_array_equal(voronoi(11, down, across).ravel(), points[2].ravel()[nearest])
+
+
+def test_nearest_point_may_lie_two_squares_away():
+    """As it seldom does: here those of the squares between turn their backs."""
+    points = np.empty((3, 5, 5))
+    points[2] = np.arange(25).reshape(5, 5)
+    points[:2] = np.indices((5, 5)) + np.where(np.indices((5, 5)) < 2, 0.0, 0.99)
+    points[:2, 2, 0] = 2.5, 0.99
+    number = np.empty((1, 1))
+    _nearest(np.array([2.5]), np.array([2.02]), 0, 0, points, number)
+    away = np.hypot(points[0] - 2.5, points[1] - 2.02)
+    assert away.argmin() == 10 and number[0, 0] == 10
+
+
+def test_points_of_patches_are_even_over_their_squares():
+    drawn = _drawn(2, 8, 0, 0, (64, 64), 3).reshape(3, -1)
+    np.testing.assert_allclose(drawn.mean(axis=1), 0.5, rtol=0, atol=4 / np.sqrt(12 * 4096))
+    assert np.abs(np.corrcoef(drawn) - np.eye(3)).max() < 4 / 64
+
+
+def test_smooth_field_is_standard_normal_and_has_its_length():
+    """300 x 300 lengths; the correlation of a Gaussian is 1/e at distance 1, the same down and across."""
+    place = np.arange(1200) / 4
+    field = smooth_field(3, place - 30, place + 800)
+    # A field of area A has some A / pi independent values.
+    independent = 300**2 / np.pi
+    assert abs(field.mean()) < 4 / np.sqrt(independent)
+    assert abs(field.var() - 1) < 4 * np.sqrt(2 / independent)
+    for lag in (2, 4, 6):
+        expected = np.exp(-((lag / 4) ** 2))
+        found = np.mean(field[:, lag:] * field[:, :-lag]), np.mean(field[lag:] * field[:-lag])
+        np.testing.assert_allclose(found, expected, rtol=0, atol=4 / np.sqrt(independent))
+    assert abs(np.mean(field < norm.ppf(0.2)) - 0.2) < 4 * np.sqrt(0.16 / independent)
+
+
+def test_pastures_are_rectangles_that_fill_their_block():
+    parts = [part for part, _ in _fenced(7, 3, -4)]
+    areas = [(bottom - top) * (right - left) for top, left, bottom, right in parts]
+    assert len(parts) == 9 and abs(sum(areas) - 1) < 1e-12
+    # The largest is parted first, at 3/8 to 5/8: no pasture is 8 / 3 as large as one that was parted.
+    assert max(areas) / min(areas) < (8 / 3) ** 2
+    place = (np.arange(90) + 0.5) / 30
+    inside = pastures(7, place + 9, place - 12)
+    for (top, left, bottom, right), number in _fenced(7, 3, -4):
+        rows, columns = ((place >= 3 * low) & (place < 3 * high) for low, high in ((top, bottom), (left, right)))
+        assert (inside[np.ix_(rows, columns)] == number).all()

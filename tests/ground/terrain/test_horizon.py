@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
-from oracles_terrain import hills, march, plane
+from oracles_terrain import dozier, hills, march, plane, plane_gradient
 
 from fifesim.ground.terrain import horizon as horizons
+from fifesim.ground.terrain.horizon import horizon_sky_view, horizon_terrain_view, sky_factor, sky_vector
+from fifesim.ground.terrain.slope import Vector, slope_aspect
 
 
 def tangents_of(dem, cell_y, cell_x, azimuths, reach):
@@ -93,3 +95,136 @@ def test_too_few_directions_are_refused(count):
 def test_reach_below_a_cell_is_refused():
     with pytest.raises(ValueError, match="at least one cell of 30 x 30 m, got 10 m"):
         horizons.horizon_margin(30, 30, 10)
+
+
+def sky_of(slope, aspect, horizon):
+    """Sky factor of slopes under a horizon of zenith angles [degree]."""
+    directions = np.arange(len(horizon)) * (360 / len(horizon))
+    return horizon_sky_view(horizons.tangent(horizon), directions, *plane_gradient(slope, aspect))
+
+
+@pytest.mark.parametrize("count", [16, 17, 32])
+@pytest.mark.parametrize("slope", [0, 5, 30, 45, 60])
+def test_a_wide_plane_sees_the_sky_above_its_own_horizon(slope, count):
+    for aspect in (0.0, 3.0, 11.25, 100.0):
+        found = sky_of(slope, aspect, np.full(count, 90.0))
+        np.testing.assert_allclose(found, (1 + np.cos(np.radians(slope))) / 2, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_sky_factor_is_doziers_integral(seed):
+    rng = np.random.default_rng(seed)
+    count = 24
+    horizon = rng.uniform(50, 90, count)
+    slope, aspect = rng.uniform(0, 60), rng.uniform(0, 360)
+    tangents, step = horizons.tangent(horizon), 2 * np.pi / count
+
+    def great_circles(phi):
+        first = (phi // step).astype(int)
+        part = phi - first * step
+        return (tangents[first] * np.sin(step - part) + tangents[(first + 1) % count] * np.sin(part)) / np.sin(step)
+
+    # The midpoint rule meets kinks of the horizon: 1e-9 with this many steps.
+    expected = dozier(slope, aspect, great_circles)
+    np.testing.assert_allclose(sky_of(slope, aspect, horizon), expected, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("steepest", [30.0, 75.0, 89.0])
+def test_arcs_of_every_length_are_lamberts(steepest):
+    """Horizons that leap, so that an arc is up to a right angle long, by their angles and normals one by one."""
+    rng, count = np.random.default_rng(3), 16
+    tangents = np.tan(np.radians(rng.uniform(0, steepest, (count, 50))))
+    tangents[:, 0] = np.where(np.arange(count) % 2, np.tan(np.radians(steepest)), 0.0)
+    directions = np.arange(count) * (360 / count)
+    expected = np.zeros((3, 50))
+    for cell in range(50):
+        edge = [(*np.sin(np.radians((a, 90 - a))), t) for a, t in zip(directions, tangents[:, cell], strict=True)]
+        for a, b in zip(edge, edge[1:] + edge[:1], strict=True):
+            normal = np.cross(b, a)
+            sine = np.linalg.norm(normal)
+            expected[:, cell] += np.arctan2(sine, np.dot(a, b)) * normal / sine / (2 * np.pi)
+    found = sky_vector(tangents, directions, np.zeros(50), np.zeros(50))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=3e-14)
+
+
+@pytest.mark.parametrize("wall", [5.0, 20.0, 45.0])
+def test_bottom_of_a_v_valley_sees_what_its_walls_leave(wall):
+    """Across a long valley Vd is half the sum of the sines from the normal to the two limits of the sky."""
+    azimuth = np.radians(np.arange(32) * 11.25)
+    horizon = horizons.zenith(np.tan(np.radians(wall)) * np.abs(np.sin(azimuth)))
+    np.testing.assert_allclose(sky_of(0.0, 0.0, horizon), np.cos(np.radians(wall)), rtol=5e-3)
+    # The foot of the west wall faces east: behind, its own plane, ahead, the other wall.
+    found = sky_of(wall, 90.0, horizon)
+    np.testing.assert_allclose(found, (1 + np.cos(np.radians(2 * wall))) / 2, rtol=5e-3)
+
+
+def test_horizon_below_the_horizontal_is_open_and_unknown_is_open():
+    assert sky_of(0.0, 0.0, np.full(16, 95.0)) == pytest.approx(1, abs=1e-12)
+    assert sky_of(0.0, 0.0, np.full(16, np.nan)) == pytest.approx(1, abs=1e-12)
+
+
+def cells_of(dem, cell, reach, count=32):
+    """Slope, aspect and sky factor on a raster, NaN beyond it."""
+    azimuths = horizons.azimuths(count)
+    m, n = horizons.horizon_margin(cell, cell, reach)
+    padded = np.pad(dem, ((m, m), (n, n)), constant_values=np.nan)
+    slope, aspect = slope_aspect(np.pad(dem, 1, constant_values=np.nan), cell, cell)
+    horizon = horizons.horizon_zenith(padded, cell, cell, azimuths, reach)
+    return slope, aspect, sky_of(slope, aspect, horizon)
+
+
+@pytest.mark.parametrize("slope", [0.0, 10.0, 30.0, 60.0])
+def test_plane_on_a_raster(slope):
+    """Where the plane dips below the horizontal between two directions, the horizon's great circle cuts the corner."""
+    found = cells_of(plane((40, 50), 30.0, 30.0, slope, 33.0), 30.0, 600.0)[2]
+    np.testing.assert_allclose(found, (1 + np.cos(np.radians(slope))) / 2, rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("depth", [0.2, 0.5, 0.8])
+def test_spherical_pit_on_a_raster(depth):
+    """Everywhere in a pit of a sphere of radius R: Vd = 1 - depth / 2R, for the light that enters is spread evenly."""
+    radius, size = 100.0, 281
+    rim = radius * np.sqrt(depth * (2 - depth))
+    cell = 2.1 * rim / size
+    y, x = (np.mgrid[:size, :size] - size // 2) * cell
+    wall = radius * (1 - depth) - np.sqrt(np.maximum(radius**2 - x**2 - y**2, 0))
+    dem = np.where(np.hypot(x, y) < rim, wall, 0.0)
+    slope, _, found = cells_of(dem, cell, 210.0)
+    inside = np.hypot(x, y) < 0.7 * rim
+    np.testing.assert_allclose(found[inside].mean(), 1 - depth / 2, rtol=5e-3)
+    # The rim is cut by cells, which single directions see.
+    np.testing.assert_allclose(found[inside], 1 - depth / 2, rtol=0.012)
+    # What the land takes: in the pit as much as it hides of the sky above its own plane.
+    view = horizon_terrain_view(found, np.cos(np.radians(slope)))
+    np.testing.assert_allclose(view[inside], ((1 + np.cos(np.radians(slope))) / 2)[inside] - 1 + depth / 2, atol=0.012)
+
+
+def test_v_valley_on_a_raster():
+    """Walls of 20 degrees that end at a level upland: on the floor, and half way up."""
+    wall, half, cell = np.radians(20.0), 60, 5.0
+    x = (np.arange(3 * half * 2 + 1) - 3 * half) * cell
+    profile = np.minimum(np.abs(x), half * cell) * np.tan(wall)
+    dem = np.broadcast_to(profile, (401, x.size))
+    _, _, found = cells_of(dem, cell, 1000.0)
+    middle = found[200]
+    # Half way up: behind, the plane of the wall; ahead the far rim, half a depth up and three quarters of a width away.
+    rim = np.arctan(np.tan(wall) / 3)
+    sky = (1 + np.cos(rim + wall)) / 2
+    np.testing.assert_allclose(middle[3 * half], np.cos(wall), rtol=5e-3)
+    np.testing.assert_allclose(middle[3 * half + half // 2], sky, rtol=5e-3)
+
+
+def test_open_hills_lose_no_sky_twice():
+    """Vd lies between nothing and a wide plane's."""
+    slope, _, found = cells_of(hills((60, 70)), 10.0, 300.0)
+    assert (found > 0.3).all()
+    assert (found <= (1 + np.cos(np.radians(slope))) / 2 + 1e-12).all()
+
+
+def test_sky_of_a_place_nearby_is_kept_within_its_limits():
+    """The vector of level open ground, seen from a steep slope, and one that the slope turns away from."""
+    east, north = plane_gradient(60.0, 30.0)
+    open_sky = Vector(*sky_vector(np.zeros(16), np.arange(16) * 22.5, 0.0, 0.0))
+    assert sky_factor(open_sky, east, north) == pytest.approx(0.5, abs=1e-12)
+    assert sky_factor(Vector(0.0, 0.0, 2.0), east, north) == pytest.approx(0.75, abs=1e-12)
+    assert sky_factor(Vector(east, north, 0.1), east, north) == 0

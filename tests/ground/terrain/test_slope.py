@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 from oracles_terrain import hills, plane, plane_gradient
+from scipy.interpolate import RegularGridInterpolator
 
+from fifesim.ground.terrain import slope as lights
 from fifesim.ground.terrain import slope as terrain
+from fifesim.ground.terrain.slope import bilinear
 
 
 @pytest.mark.parametrize("aspect", [0, 37.0, 90, 135, 201.5, 270, 359])
@@ -66,3 +69,49 @@ def test_component_along_the_normal_is_that_of_vectors():
 def test_angles_and_gradient_are_inverse():
     slope, aspect = np.array([0.5, 45.0, 80.0]), np.array([359.0, 180.0, 37.0])
     np.testing.assert_allclose(terrain.slope_angles(*plane_gradient(slope, aspect)), [slope, aspect], rtol=1e-12)
+
+
+def test_values_are_those_of_a_linear_interpolation():
+    rng = np.random.default_rng(1)
+    layer = rng.standard_normal((6, 9))
+    rows, columns = np.sort(rng.uniform(0, 5, 40)), np.sort(rng.uniform(0, 8, 30))
+    found = bilinear(layer, *((at.astype(int), at - at.astype(int)) for at in (rows, columns)))
+    known = RegularGridInterpolator((np.arange(6), np.arange(9)), layer)
+    expected = known(np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13)
+
+
+def test_past_the_last_place_there_is_its_value():
+    layer = np.array([[1.0, 2.0], [3.0, 5.0]])
+    found = bilinear(layer, (np.array([1]), np.array([0.5])), (np.array([1]), np.array([0.7])))
+    assert found.item() == 5.0
+
+
+def test_unknown_places_make_cells_beside_them_unknown():
+    layer = np.array([[1.0, np.nan, 2.0, 2.0]])
+    at = np.array([0, 0, 2]), np.array([0.0, 0.5, 0.5])
+    np.testing.assert_array_equal(
+        np.isnan(bilinear(layer, (np.array([0]), np.array([0.0])), at))[0], [True, True, False]
+    )
+
+
+def test_directions_point_where_angles_say():
+    rng = np.random.default_rng(1)
+    zenith, azimuth = rng.uniform(0, [[90], [360]], (2, 50))
+    a, b = np.radians((zenith, azimuth))
+    toward = np.stack([np.sin(a) * np.sin(b), np.sin(a) * np.cos(b), np.cos(a)])
+    np.testing.assert_allclose(lights.direction_vector(zenith, azimuth), toward, atol=1e-15)
+
+
+def test_kt_is_the_light_on_a_slope_over_that_on_level_ground():
+    """Sunbeam, skylight and light of the land, each by itself."""
+    rng = np.random.default_rng(2)
+    sky, land, rho, local, level, direct = rng.uniform(0.1, 0.9, (6, 40))
+    total = direct + rng.uniform(0.01, 0.1, 40)
+    light = direct * local / level + (total - direct) * sky + total * rho * land
+    found = lights.topographic_factor(sky, land, rho, local, level, direct, total)
+    np.testing.assert_allclose(found, light / total, rtol=1e-12)
+
+
+def test_a_slope_that_faces_away_is_not_seen():
+    assert lights.upwelling_factor(np.array([0.3, 0.6, -0.2]), 0.6).tolist() == [0.5, 1.0, 0.0]

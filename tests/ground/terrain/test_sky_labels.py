@@ -1,12 +1,65 @@
-"""Places at which the sky is found: the same in all windows, and cells between them."""
+"""Horizons of labelled elevation, and the sky that they leave."""
 
 import numpy as np
 import pytest
 from elevations import labelled
+from lazy import check_raster_function, no_compute
+from oracles_terrain import hills, plane
 
 import fifesim
+from fifesim.base.geometry import Geometry
 from fifesim.grids import grid as grids
+from fifesim.ground.terrain import sky_labels as sky_raster
 from fifesim.ground.terrain.sky_labels import places_of
+
+SUN = Geometry(70.0, 117.0, 20.0, 40.0)
+
+
+def test_horizon_keeps_the_promises_of_rasters(dem):
+    dem.attrs["source_resolution"] = 10.0
+    found = check_raster_function(lambda each: sky_raster.horizon(each, reach=60.0), dem, quantity="horizon")
+    assert found.sizes == {"direction": 32, "y": 15, "x": 18}
+    assert found["y"].isin(dem["y"]).all() and found["x"].isin(dem["x"]).all()
+
+
+def test_coarse_horizons_stay_near_those_at_every_cell():
+    """Ground of 200 m waves and more, which 30 m cells resolve; the figures of the docstring."""
+    grid = fifesim.grid_at("EPSG:26914", 700000, 4330000, 900, 900, 10 / 3)
+    z = hills((270, 270), seed=2, relief=26.0, length=60.0)
+    coarse, fine = labelled(grid, z), labelled(grid, z, source_resolution=10 / 3)
+    difference = fifesim.sky_view(coarse) - fifesim.sky_view(fine)
+    assert float(fifesim.sky_view(fine).std()) > 0.003
+    assert float(abs(difference).max()) < 0.004
+    assert float(difference.std()) < 5e-4
+
+
+def test_sun_below_every_horizon_is_refused(site):
+    steep = labelled(site, plane(tuple(site.shape), 10 / 3, 10 / 3, 40.0, 0.0))
+    for function in (fifesim.shadow, fifesim.illumination):
+        with pytest.raises(ValueError, match=r"sza 60, 178.* from grid north.*below the horizon of every slope"):
+            function(steep, Geometry(60.0, 180.0))
+
+
+def test_horizons_longer_than_a_chunk_leave_no_seams(around, lai):
+    around.attrs["source_resolution"] = 10 / 3
+    whole = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"], dem=around, geometry=SUN)
+    for chunks in ({"y": 37, "x": 50}, {"y": 165, "x": 29}):
+        parts = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"], dem=around.chunk(chunks), geometry=SUN)
+        np.testing.assert_array_equal(parts, whole)
+
+
+@pytest.mark.parametrize("options", [{"directions": 12}, {"reach": 1.0}, {"resolution": 0.0}])
+def test_horizon_of_too_little_is_refused(dem, options):
+    with pytest.raises(ValueError, match=r"from 16 up|at least one cell|positive metres"):
+        fifesim.horizon(dem, **options)
+
+
+def test_lazy_horizon_beside_a_scene_has_a_chunk_for_each_of_its(around, dem):
+    whole = fifesim.horizon(around, reach=90.0, resolution=10.0)
+    with no_compute():
+        lazy = fifesim.horizon(around.chunk(50), reach=90.0, resolution=10.0, beside=dem.chunk({"y": 15, "x": 27}))
+    assert [len(sizes) for sizes in lazy.chunks[1:]] == [5, 4]
+    np.testing.assert_array_equal(lazy, whole)
 
 
 def test_horizon_that_does_not_cover_is_refused(lai, dem, around):

@@ -1,0 +1,560 @@
+"""Elevation models of any unit, orientation and coordinate reference system."""
+
+import re
+import tracemalloc
+import warnings
+from contextlib import nullcontext
+
+import numpy as np
+import pyproj
+import pytest
+import rasterio
+import rioxarray
+import xarray as xr
+from affine import Affine
+from elevations import AMPLITUDE, CRS, NORTH, WEST, grid, model, surface, tilted, truth, with_hole, write
+from lazy import check_place, no_compute
+
+import fifesim
+from fifesim.grids import cf, projection
+from fifesim.grids import grid as grids
+from fifesim.ground.terrain import source_labels as sources
+from fifesim.ground.terrain.elevation_labels import _mean_slope, source_dem
+from fifesim.ground.terrain.source_labels import (
+    ELEVATION_TILE,
+    beside_altitude,
+    looked_up,
+    model_under,
+    open_source,
+    source_resolution,
+)
+
+
+@pytest.mark.parametrize("unit", ["ft", "US survey foot", "fathom"])
+def test_other_units_are_refused_unless_given(tmp_path, unit):
+    values, affine = model()
+    where = write(tmp_path / "feet.tif", values / 0.3048, affine, unit=unit)
+    with pytest.raises(ValueError, match=rf"in '{unit}', not in metres: give their units.*vertical_units"):
+        fifesim.fine_dem(where, grid())
+    dem = fifesim.fine_dem(where, grid(), vertical_units="ft")
+    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-3 * AMPLITUDE)
+
+
+def test_units_of_a_compound_reference_system(tmp_path):
+    """NAD83 / UTM 14N with NAVD88 heights in US survey feet, and in metres."""
+    values, affine = model()
+    feet = write(tmp_path / "feet.tif", values / (1200 / 3937), affine, "EPSG:26914+6360")
+    with pytest.raises(ValueError, match="US survey foot"):
+        fifesim.fine_dem(feet, grid())
+    metres = write(tmp_path / "metres.tif", values, affine, "EPSG:26914+5703")
+    same = fifesim.fine_dem(metres, grid())
+    np.testing.assert_allclose(fifesim.fine_dem(feet, grid(), vertical_units="us-ft"), same, rtol=0, atol=1e-9)
+
+
+def test_units_of_an_array(path):
+    raster = rioxarray.open_rasterio(path, masked=True).assign_attrs(units="ft")
+    with pytest.raises(ValueError, match="in 'ft'"):
+        fifesim.fine_dem(raster, grid())
+
+
+def test_missing_reference_system_is_refused(tmp_path):
+    values, affine = model()
+    where = write(tmp_path / "nowhere.tif", values, affine, crs=None)
+    for raster in (where, rioxarray.open_rasterio(where)):
+        with pytest.raises(ValueError, match="has no CRS: give it one"):
+            fifesim.fine_dem(raster, grid())
+
+
+def test_what_is_no_model_is_refused(tmp_path, path):
+    with pytest.raises(ValueError, match="cannot read"):
+        fifesim.fine_dem(tmp_path / "missing.tif", grid())
+    with pytest.raises(TypeError, match=r"path_or_raster must be the path of a file, or an xarray\.DataArray"):
+        fifesim.fine_dem(np.zeros((3, 3)), grid())
+    bands = xr.concat([rioxarray.open_rasterio(path)] * 2, "band")
+    with pytest.raises(ValueError, match="has one band"):
+        fifesim.fine_dem(bands, grid())
+
+
+@pytest.mark.parametrize(
+    "affine",
+    [
+        Affine(30, 0, WEST - 600, 0, 30, NORTH - 1500),
+        Affine(-30, 0, WEST + 1500, 0, -30, NORTH + 600),
+        Affine.translation(WEST - 900, NORTH + 900) @ Affine.rotation(0) @ Affine(30, 2, 0, 1, -30, 0),
+    ],
+    ids=["south-up", "west-right", "rotated"],
+)
+def test_orientation_of_the_source_does_not_matter(tmp_path, affine):
+    values, _ = model(affine=affine, shape=(100, 100) if affine.b else (70, 70))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+        dem = fifesim.fine_dem(write(tmp_path / "turned.tif", values, affine), grid())
+    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1.5e-3 * AMPLITUDE)
+
+
+def test_change_of_datum_has_a_known_accuracy(path):
+    """
+    NAD27 against NAD83: identity of degrees would be 30 m off, the operation is good to 11 m and agrees with itself.
+
+    On slopes of 0.36 at most, 1 cm of height is 3 cm of place.
+    """
+    old = fifesim.grid_at("EPSG:26714", WEST + 30, NORTH - 210, 500, 500, 10.0)
+    dem = fifesim.fine_dem(path, old)
+    pipeline, _ = projection.operation("EPSG:26714", CRS, projection.degrees(old))
+    x, y = projection.carry(pipeline, "EPSG:26714", CRS, *np.meshgrid(dem["x"], dem["y"]))
+    np.testing.assert_allclose(dem, surface(x, y), rtol=0, atol=1e-3 * AMPLITUDE)
+
+
+def test_arrays_give_what_their_file_gives(path):
+    """Read masked or not, in chunks or not, with the rows of either order."""
+    whole = fifesim.fine_dem(path, grid())
+    for options in ({}, {"masked": True}, {"masked": True, "chunks": {"y": 23, "x": 31}}):
+        raster = rioxarray.open_rasterio(path, **options)
+        before = raster.copy(deep=True)
+        with no_compute():
+            dem = fifesim.fine_dem(raster, grid())
+        assert (dem.chunks is not None) == ("chunks" in options)
+        np.testing.assert_allclose(dem, whole, rtol=0, atol=1e-9)
+        xr.testing.assert_identical(raster, before)
+        upside_down = raster.sortby("y").squeeze("band")
+        np.testing.assert_allclose(fifesim.fine_dem(upside_down, grid()), whole, rtol=0, atol=1e-6)
+
+
+def test_window_of_a_source_may_reach_beyond_it(path):
+    """NaN there, from a file as from a window of its cells."""
+    source, values = open_source(path), model()[0]
+    rows, columns = values.shape
+    np.testing.assert_array_equal(source.read(0, 0, rows, columns), values)
+    window = source.read(-3, columns - 2, 8, 9)
+    np.testing.assert_array_equal(window[3:, :2], values[:5, -2:])
+    assert np.isnan(window[:3]).all() and np.isnan(window[:, 2:]).all()
+    assert np.isnan(source.read(rows + 5, 0, 3, 3)).all()
+
+
+@pytest.fixture(scope="module")
+def continent(tmp_path_factory):
+    """A file of 20,000 x 20,000 cells (1.6 GB) of which it holds those around the grid, and the first of these."""
+    where = tmp_path_factory.mktemp("continent") / "continent.tif"
+    values, affine = model(margin=1500.0)
+    first, count = 9984, 20_000
+    affine = affine @ Affine.translation(-first, -first)
+    profile = {"driver": "GTiff", "width": count, "height": count, "count": 1, "dtype": "float32", "nodata": -9999.0}
+    with rasterio.open(where, "w", crs=CRS, transform=affine, tiled=True, sparse_ok=True, **profile) as file:
+        file.write(values.astype("f4"), 1, window=rasterio.windows.Window(first, first, *values.shape[::-1]))
+    return where, first + 1500 // 30
+
+
+@pytest.mark.parametrize("margin", [None, 900.0])
+def test_no_more_of_a_file_is_read_than_lies_near_the_grid(continent, monkeypatch, margin):
+    """
+    Tiles of 504 fine cells are 56 of the model's, a spline looks 37 around, the look for terraces 237; with a margin
+    of 30, tiles are 504 of the model's.
+    """
+    (where, first), read = continent, []
+    windows = sources._file_window
+
+    def noted(file, rows, columns):
+        read.append((rows, columns))
+        return windows(file, rows, columns)
+
+    monkeypatch.setattr(sources, "_file_window", noted)
+    if margin is None:
+        dem = fifesim.fine_dem(where, grid(), chunks="auto").compute()
+        np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-3 * AMPLITUDE)
+    else:
+        source_dem(where, grid(), margin)
+    around = max(56 + 37, 237) if margin is None else 30 + 504 + 37
+    outline = [(min(part.start for part in axis), max(part.stop for part in axis)) for axis in zip(*read, strict=True)]
+    assert all(first - around < start < first and first + 30 < stop < first + 30 + around for start, stop in outline)
+
+
+@pytest.mark.parametrize("opened", [str, rioxarray.open_rasterio], ids=["path", "opened, not read"])
+def test_large_model_is_never_held_whole(continent, opened):
+    raster = opened(continent[0])
+    tracemalloc.start()
+    try:
+        dem = fifesim.fine_dem(raster, grid(), chunks="auto").compute()
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-3 * AMPLITUDE)
+    assert peak < 60e6
+
+
+@pytest.mark.parametrize("fill", [True, 0, -3])
+def test_fill_is_a_distance(path, fill):
+    with pytest.raises((TypeError, ValueError), match=r"fill (is a distance|must be a number, got True)"):
+        fifesim.fine_dem(path, grid(), fill=fill)
+
+
+def test_fill_goes_at_most_250_cells_of_the_source(path):
+    """Of 30 m."""
+    model_under(grid(), path, 7500, None)
+    with pytest.raises(ValueError, match=r"fill=7501 is more than 250 cells .* at most fill=7500"):
+        model_under(grid(), path, 7501, None)
+
+
+def test_a_window_too_fine_to_read_is_refused(path, monkeypatch):
+    fifesim.fine_dem(path, grid())
+    monkeypatch.setattr("fifesim.ground.terrain.source_labels._MOST_CELLS", 100)
+    with pytest.raises(ValueError, match=r"far finer than the cells.*gdalwarp -r average"):
+        fifesim.fine_dem(path, grid(size=600.0))
+
+
+def test_filled_hole_is_the_same_in_any_chunks(tmp_path):
+    where = with_hole(tmp_path)
+    whole = fifesim.fine_dem(where, grid(), fill=90)
+    np.testing.assert_array_equal(fifesim.fine_dem(where, grid(), fill=90, chunks=100).compute(), whole)
+
+
+def test_finer_source_is_averaged(tmp_path):
+    """A wave of two cells of the source is gone, the mean of the surface stays."""
+    values, affine = model(cell=10.0)
+    ripple = 5.0 * (-1.0) ** np.arange(values.shape[1])
+    where = write(tmp_path / "fine.tif", values + ripple, affine)
+    dem = fifesim.fine_dem(where, grid(40.0, size=880.0))
+    assert dem.attrs["source_resolution"] == pytest.approx(40)
+    expected = fifesim.fine_dem(write(tmp_path / "smooth.tif", values, affine), grid(40.0, size=880.0))
+    np.testing.assert_allclose(dem, expected, rtol=0, atol=1e-9)
+    # A mean over 40 m of waves of 160 m is 0.9 of their amplitude.
+    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=0.1 * 2 + 0.05 * 4 + 0.2)
+
+
+def test_cells_of_the_grid_need_not_be_square(path):
+    square = fifesim.grid_at(CRS, WEST, NORTH, 900, 900, 5.0)
+    tall = type(square)((90, 180), Affine(5.0, 0, WEST, 0, -10.0, NORTH), CRS)
+    dem = fifesim.fine_dem(path, tall)
+    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-3 * AMPLITUDE)
+
+
+def test_lazy_array_gives_the_same_bits_in_any_chunks(path):
+    raster = rioxarray.open_rasterio(path, masked=True)
+    whole = fifesim.fine_dem(raster, grid())
+    for chunks in ({"y": 100, "x": 77}, "auto"):
+        lazy = fifesim.fine_dem(raster.chunk({"y": 17, "x": 40}), grid(), chunks=chunks)
+        np.testing.assert_array_equal(lazy.compute(), whole)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:26914", "EPSG:26915"])
+def test_window_of_a_part_holds_what_its_tiles_read(path, crs):
+    """Under a grid of the source's own rows and columns, and under one that is turned and bent."""
+    place = {} if crs == "EPSG:26914" else {"west": 187700.0, "north": 4340000.0}
+    under = model_under(grid(crs=crs, **place), path, 60.0, None)
+    rows, columns = slice(20, 60), slice(100, 101)
+    window = under.tile_window(rows, columns)
+    origin = grids.lattice_position(under.place.grid)
+    first = [
+        (start + part.start) // ELEVATION_TILE * ELEVATION_TILE - start
+        for start, part in zip(origin, (rows, columns), strict=True)
+    ]
+    top, left, height, width = under.window(*under.place.positions(*(at + np.arange(ELEVATION_TILE) for at in first)))
+    for part, start, length, size in zip(window, (top, left), (height, width), under.source.shape, strict=True):
+        assert part.start <= max(start, 0) and part.stop >= min(start + length, size)
+
+
+def test_places_beyond_all_cells_are_unknown():
+    known = np.array([[True, False], [True, True]])
+    found = looked_up(known, np.array([[-0.6], [-0.4], [1.4], [1.6]]), np.array([[0.4, 0.6, 1.6]]))
+    np.testing.assert_array_equal(found, [[False] * 3, [True, False, False], [True, True, False], [False] * 3])
+    assert not looked_up(np.ones((0, 3), bool), np.zeros((2, 1)), np.zeros((1, 2))).any()
+
+
+def slopes(values, cell):
+    down, across = np.gradient(values, cell)
+    return np.hypot(down, across)[1:-1, 1:-1]
+
+
+def test_band_limited_surface_is_recovered(path):
+    dem = fifesim.fine_dem(path, grid())
+    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-3 * AMPLITUDE)
+    check_place(dem, CRS)
+    assert cf.attributes("dem").items() <= dem.attrs.items()
+    assert dem.attrs["source_resolution"] == pytest.approx(30)
+    assert "hills.tif" in dem.attrs["history"]
+
+
+def test_slope_is_free_of_the_source_cells(path):
+    """Within 0.1 % of the slope of the surface itself, rms, and 0.6 % at worst of a largest slope of 0.36."""
+    dem = fifesim.fine_dem(path, grid())
+    error = slopes(dem.values, 30 / 9) - slopes(truth(dem), 30 / 9)
+    assert np.sqrt(np.mean(error**2)) < 4e-4
+    assert np.abs(error).max() < 2.2e-3
+
+
+@pytest.mark.parametrize("cell", [30 / 9, 7.0, 45.0])
+@pytest.mark.parametrize("margin", [0.0, 600.0])
+def test_plane_stays_a_plane(tmp_path, cell, margin):
+    """Also up to the outer edge of the outermost cells of the source, and for sources finer than the grid."""
+    where = write(tmp_path / "plane.tif", *model(tilted, margin=margin))
+    dem = fifesim.fine_dem(where, grid(cell))
+    np.testing.assert_allclose(dem, truth(dem, tilted), rtol=0, atol=1e-8)
+    np.testing.assert_allclose(slopes(dem.values, cell), np.hypot(0.1, 0.05), rtol=0, atol=1e-9)
+
+
+def test_source_in_degrees(tmp_path):
+    """A lattice in degrees of the same surface; positions go by PROJ's own operation."""
+    to_degrees = pyproj.Transformer.from_crs(CRS, "EPSG:4269", always_xy=True)
+    back = pyproj.Transformer.from_crs("EPSG:4269", CRS, always_xy=True)
+    west, north = to_degrees.transform(WEST - 600, NORTH + 600)
+    affine = Affine(3e-4, 0, west, 0, -2.4e-4, north)
+    values, _ = model(lambda x, y: surface(*back.transform(x, y)), affine=affine, shape=(90, 90))
+    dem = fifesim.fine_dem(write(tmp_path / "degrees.tif", values, affine, "EPSG:4269"), grid())
+    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-3 * AMPLITUDE)
+    assert dem.attrs["source_resolution"] == pytest.approx((3e-4 * 86500 + 2.4e-4 * 111000) / 2, rel=0.01)
+
+
+@pytest.mark.parametrize("chunks", [{"y": 100, "x": 77}, {"y": 31, "x": 270}, "auto"])
+def test_chunks_and_windows_change_no_bit(path, chunks):
+    whole = fifesim.fine_dem(path, grid())
+    with no_compute():
+        lazy = fifesim.fine_dem(path, grid(), chunks=chunks)
+    assert lazy.chunks is not None
+    xr.testing.assert_identical(lazy.compute(), whole)
+    part = fifesim.fine_dem(path, grid()[37:150, 11:112])
+    xr.testing.assert_equal(part, whole[37:150, 11:112])
+
+
+def test_source_around_the_grid(path):
+    """On cells of about the source's size that the grid's corner is a corner of; the model reaches 600 m."""
+    dem, reach = fifesim.source_dem(path, grid(), 450.0)
+    assert dem.odc.geobox.affine == Affine(30, 0, WEST - 450, 0, -30, NORTH + 450)
+    assert dem.shape == (60, 60)
+    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-6)
+    assert reach == {"north": 450, "east": 450, "south": 450, "west": 450}
+    check_place(dem, CRS)
+    assert dem.attrs["source_resolution"] == pytest.approx(30)
+
+
+@pytest.mark.parametrize("chunks", ["auto", {"y": 31, "x": 27}])
+def test_lazy_source_is_the_same_with_and_without_holes(tmp_path, chunks):
+    values, affine = model()
+    values[:, :15], values[3, 40] = np.nan, np.nan
+    for crs in (CRS, "EPSG:32614"):
+        where = write(tmp_path / "cut.tif", values, affine, crs)
+        for fill in (None, 60.0):
+            whole, reach = fifesim.source_dem(where, grid(), 6000.0, fill=fill)
+            with no_compute():
+                lazy, same_reach = fifesim.source_dem(where, grid(), 6000.0, fill=fill, chunks=chunks)
+            assert lazy.chunks is not None and reach == same_reach
+            xr.testing.assert_identical(lazy.compute(), whole)
+
+
+def test_source_reaches_as_far_as_its_data(tmp_path):
+    values, affine = model()
+    values[:, :15], values[3, 40] = np.nan, np.nan
+    dem, reach = fifesim.source_dem(write(tmp_path / "cut.tif", values, affine), grid(), 6000.0)
+    assert reach == {"north": 480, "east": 600, "south": 600, "west": 150}
+    assert dem.odc.geobox.affine == Affine(30, 0, WEST - 150, 0, -30, NORTH + 600)
+    assert dem.shape == (70, 55)
+    assert int(dem.isnull().sum()) == 1
+    with pytest.raises(ValueError, match="does not reach the grid"):
+        fifesim.source_dem(tmp_path / "cut.tif", grid(west=WEST + 90000), 100.0)
+    with pytest.raises(ValueError, match="margin must be 0 m or more"):
+        fifesim.source_dem(tmp_path / "cut.tif", grid(), -1.0)
+
+
+FINE = fifesim.fife_site(10, window=((120, 180), (120, 180)))
+
+
+def hills(cell=30):
+    return fifesim.flint_hills(fifesim.fife_site(cell, window=((0, 100), (0, 100))), seed=7)
+
+
+@pytest.mark.parametrize("fill", [-9999.0, -32768.0, 32767.0, 9999.0, -3.4e38])
+@pytest.mark.parametrize("form", ["file", "array", "lazy"])
+def test_undeclared_fill_values_next_to_the_grid_are_refused(tmp_path, fill, form):
+    """The spline would carry them into the grid: 210 to 650 m instead of 338 to 412 m."""
+    dem = hills()
+    dem[40:60, 61:] = fill
+    path = write(tmp_path / "dem.tif", dem.values, dem.odc.geobox.affine, nodata=None)
+    given = {"file": path, "array": dem, "lazy": dem.chunk(x=50)}[form]
+    with pytest.raises(ValueError, match=rf"elevations such as {fill:.0f} m.*-a_nodata, \.rio\.write_nodata"):
+        fifesim.fine_dem(given, FINE).compute()
+    with pytest.raises(ValueError, match=f"elevations such as {fill:.0f} m"):
+        fifesim.source_dem(given, FINE, margin=500.0)
+    if form != "lazy":
+        declared = dem.rio.write_nodata(fill)
+        expected = fifesim.fine_dem(dem.where(dem > 0).where(dem < 9000), FINE)
+        np.testing.assert_array_equal(fifesim.fine_dem(declared, FINE), expected)
+
+
+@pytest.mark.parametrize("cell", [10, 30])
+def test_feet_without_a_unit_are_a_warning_by_their_slope(cell):
+    dem = hills(cell)
+    grid = fifesim.fife_site(10, window=((20, 80), (20, 80)))
+    steep = 300 + 12 * (dem - 300)
+    with pytest.warns(
+        UserWarning, match="mean slope of dem is .* degrees at 30 m.*feet or decimetres.*vertical_units='m'"
+    ):
+        fifesim.fine_dem(steep.rename("dem"), grid)
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        fifesim.fine_dem(dem, grid)
+        fifesim.fine_dem(steep, grid, vertical_units="m")
+
+
+def test_mean_slope_is_that_of_a_plane_at_30_m():
+    """Roughness below 30 m is averaged away."""
+    rows, columns = np.mgrid[:90, :120]
+    rough = 10 * (rows * np.tan(np.radians(25)) + 0.5 * ((rows + columns) % 2))
+    assert _mean_slope(rough, (10.0, 10.0)) == pytest.approx(25, abs=0.1)
+    assert np.isnan(_mean_slope(rough[:3], (10.0, 10.0)))
+
+
+def test_voids_of_zero_are_a_warning():
+    dem = hills()
+    dem[48:50, 48:50] = 0.0
+    with pytest.warns(UserWarning, match=r"elevations of exactly 0 m beside others.*-a_nodata 0"):
+        fifesim.fine_dem(dem, FINE)
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        fifesim.fine_dem(hills() - float(hills()[48, 48]), FINE)
+
+
+@pytest.mark.parametrize("units", ["ft", "US survey foot", "km"])
+def test_other_units_are_refused(dem, units):
+    dem.attrs["units"] = units
+    with pytest.raises(ValueError, match=f"units '{units}', dem needs 'm'"):
+        fifesim.slope(dem)
+
+
+def test_units_may_be_spelled_out(dem):
+    xr.testing.assert_identical(fifesim.slope(dem.assign_attrs(units="metre")), fifesim.slope(dem))
+
+
+def test_geographic_and_unplaced_elevation_are_refused(dem):
+    degrees = dem.drop_vars("spatial_ref").assign_coords(y=39 - 1e-4 * np.arange(45), x=-96 + 1e-4 * np.arange(54))
+    with pytest.raises(ValueError, match="geographic CRS"):
+        fifesim.sky_view(degrees.rio.write_crs("EPSG:4326"))
+    with pytest.raises(ValueError, match="no CRS"):
+        fifesim.slope(dem.drop_vars("spatial_ref"))
+    with pytest.raises(ValueError, match="north up"):
+        fifesim.slope(dem.isel(y=slice(None, None, -1)))
+
+
+def test_a_dem_of_integers_is_an_elevation_and_an_undeclared_mark_is_not(dem):
+    whole = dem.round().astype("int16").assign_attrs(dem.attrs)
+    np.testing.assert_array_equal(fifesim.slope(whole), fifesim.slope(whole.astype(float).assign_attrs(dem.attrs)))
+    with pytest.raises(ValueError, match="masked=True"):
+        fifesim.slope(dem.rio.write_nodata(-9999.0))
+    with pytest.raises(TypeError, match=r"dem must be an xarray.DataArray .* fine_dem"):
+        fifesim.slope("hill.tif")
+
+
+def test_resolution_of_the_source_is_given_or_carried_or_thirty_metres(dem):
+    assert source_resolution(dem) == 30.0
+    assert source_resolution(dem.assign_attrs(source_resolution=10.0)) == 10.0
+    assert source_resolution(dem.assign_attrs(source_resolution=10.0), 12.5) == 12.5
+    for wrong in (0.0, -3.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="must be positive metres"):
+            source_resolution(dem, wrong)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "altitude", "said"),
+    [
+        (
+            1239,
+            1393,
+            0.4,
+            r"1239 to 1393 m beside .* of 0.4 km: where they are feet, take dem .*Atmosphere.altitude=1.3",
+        ),
+        (656, 700, 0.2, "feet"),
+        (2500, 3100, 1.5, "1.5 km: give fifesim.Atmosphere.altitude=2.8"),
+        (0, 100, 2.0, "2 km: give fifesim.Atmosphere.altitude=0.1"),
+        (320, 440, 0.4, None),
+        (300, 2000, 0.4, None),
+        (-50, 120, 0.0, None),
+    ],
+)
+def test_elevations_of_another_place_than_the_air_are_told(site, low, high, altitude, said):
+    """At once, or when lazy ones compute; by their mean, their height may also be right."""
+    cells = np.linspace(low, high, site.shape.y * site.shape.x).reshape(site.shape)
+    cells[0, 0] = np.nan
+    dem = grids.place(xr.DataArray(cells, dims=("y", "x")), site)
+    expected = pytest.warns(UserWarning, match=said) if said else nullcontext()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error" if said is None else "always")
+        with expected:
+            assert beside_altitude(dem, altitude) is dem
+        with no_compute():
+            lazy = beside_altitude(dem.chunk(), altitude)
+        with expected:
+            np.testing.assert_array_equal(lazy.compute(scheduler="synchronous"), cells)
+
+
+def test_masked_elevation_is_refused_in_a_line(dem):
+    with pytest.raises(TypeError, match=r"^dem must be an xarray\.DataArray over \(y, x\), got a masked numpy array"):
+        fifesim.slope(np.ma.masked_less(dem.values, 0))
+    with pytest.raises(ValueError, match=r"^the dem marks missing cells as -9999, .*masked=True"):
+        fifesim.slope(dem.assign_attrs(_FillValue=-9999.0))
+
+
+def test_model_that_ends_inside_the_grid_is_refused_by_how_much(path):
+    beyond = grid(west=WEST + 700, north=NORTH - 900)
+    with pytest.raises(ValueError, match="lacks up to") as error:
+        fifesim.fine_dem(path, beyond)
+    found = dict((side, float(metres)) for metres, side in re.findall(r"(\d+) m in the (\w+)", str(error.value)))
+    assert found == {"south": pytest.approx(300, abs=20), "east": pytest.approx(100, abs=20)}
+    with pytest.raises(
+        ValueError, match=r"hills.tif holds no elevation on the grid.*it spans 707520 to .*latitude 39.1"
+    ):
+        fifesim.fine_dem(path, grid(west=WEST + 90000))
+
+
+@pytest.mark.parametrize(("east", "south"), [(700, 900), (-700, -800), (650, 0)])
+def test_model_that_ends_inside_the_grid_says_what_it_covers(path, east, south):
+    """What it names is covered, and a pixel of 30 m more is not."""
+    with pytest.raises(ValueError, match="it covers west=") as error:
+        fifesim.fine_dem(path, grid(west=WEST + east, north=NORTH - south))
+    found = re.search(r"west=(\S+), north=(\S+), width=(\S+), height=(\S+?)(;|$)", str(error.value)).groups()[:4]
+    west, north, width, height = map(float, found)
+    dem = fifesim.fine_dem(path, fifesim.grid_at("EPSG:26914", west, north, width, height, 30 / 9))
+    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=0.1 * AMPLITUDE)
+    more = {"east": (west, width + 30), "west": (west - 30, width + 30)}["east" if east > 0 else "west"]
+    with pytest.raises(ValueError, match="does not cover"):
+        fifesim.fine_dem(path, fifesim.grid_at("EPSG:26914", more[0], north, more[1], height, 30 / 9))
+
+
+def test_hole_is_refused_by_its_place_and_size(tmp_path):
+    where = with_hole(tmp_path)
+    with pytest.raises(ValueError, match=r"a hole of (\d+) x (\d+) m at (\d+) E (\d+) N: fill=(\d+)") as error:
+        fifesim.fine_dem(where, grid())
+    tall, wide, east, north, fill = map(
+        float, re.findall(r"a hole of (\d+) x (\d+) m at (\d+) E (\d+) N: fill=(\d+)", str(error.value))[0]
+    )
+    assert (tall, wide) == (pytest.approx(90, abs=16), pytest.approx(120, abs=16))
+    assert east == pytest.approx(WEST - 600 + 30 * 30, abs=20)
+    assert north == pytest.approx(NORTH + 600 - 31.5 * 30, abs=20)
+    dem = fifesim.fine_dem(where, grid(), fill=fill)
+    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=0.1 * AMPLITUDE)
+
+
+def test_hole_too_large_to_fill_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="a hole of"):
+        fifesim.fine_dem(with_hole(tmp_path, 12, 12), grid(), fill=60)
+
+
+def test_lazy_array_tells_of_its_hole_when_computed(tmp_path):
+    raster = rioxarray.open_rasterio(with_hole(tmp_path), masked=True, chunks={"y": 20, "x": 20})
+    dem = fifesim.fine_dem(raster, grid())
+    with pytest.raises(ValueError, match="a hole of"):
+        dem.compute()
+
+
+def test_terraces_of_whole_numbers_are_warned_of(tmp_path, path):
+    def gentle(x, y):
+        return np.rint(tilted(x, y) / 10)
+
+    with pytest.warns(UserWarning, match="vertical resolution of 1 m"):
+        fifesim.fine_dem(write(tmp_path / "steps.tif", *model(gentle)), grid())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        fifesim.fine_dem(path, grid())
+
+
+def test_marks_of_no_data_are_no_heights(tmp_path):
+    """An undeclared -9999 is below all land."""
+    values, affine = model()
+    values[25, 25] = -9999.0
+    where = write(tmp_path / "marked.tif", values, affine, nodata=-1.0)
+    with pytest.raises(ValueError, match=r"holds elevations such as -\d+ m, land has -500 to 9000 m"):
+        fifesim.fine_dem(where, grid())
