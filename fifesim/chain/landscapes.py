@@ -23,17 +23,21 @@ from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.classes import NO_CLASS
 from fifesim.grids.grid import north_up
-from fifesim.grids.inputs import MASKS_TOO, Raster
+from fifesim.grids.inputs import MASKS_TOO, Raster, unpacked
 from fifesim.grids.windows import origin_of
 from fifesim.ground.canopy import optics_labels
 from fifesim.ground.canopy.interpolation import RUN, table_places, value_at
-from fifesim.ground.canopy.labels import BandCanopy, EvenCanopy
+from fifesim.ground.canopy.labels import BandCanopy, EvenCanopy, even_canopy
 from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS, check_map
 from fifesim.ground.canopy.optics import DEAD_LEAF
 from fifesim.ground.canopy.properties import NUMERIC_PROPERTIES, PROPERTIES
 from fifesim.ground.canopy.reflectance_table import scene_reflectance, surface_table
+from fifesim.ground.canopy.upright import upright_reflectance
 from fifesim.ground.landscape.classes import CoverClass
 from fifesim.ground.landscape.labels import classes_of
+from fifesim.ground.terrain import labels as terrain_labels
+from fifesim.ground.terrain.horizon import horizon_terrain_view
+from fifesim.ground.terrain.lit_slopes import slope_light
 
 _TALLGRASS = {"background": "soil and litter", "brown_leaf": "dead leaves", "leaf_optics": "green leaves"}
 """Optics with FIFE's tallgrass as default."""
@@ -122,6 +126,42 @@ def _seen(lai, table, terms, out):
                 refused |= np.isinf(toa)
                 seen[k] = toa
     return refused
+
+
+def upright_plants(level, stand, light, lai, sun):
+    """Reflectance of upright plants on the slopes of a Sunlight, dims (band, y, x). [1]"""
+    even = None if stand is None else even_canopy(lai, stand, light, False)
+    if even is None or even.scene.model != "sail":
+        raise ValueError(
+            "slopes='upright' needs cells that differ in leaf area only, and SAIL: leave out classes, dead leaves, "
+            "crowns and rasters of the canopy, or take slopes='kt'"
+        )
+
+    def kernel(cells, elevation, sky, cell, seen):
+        return _upright(cells, slope_light(elevation, sky, cell, seen), even, seen)
+
+    plain = unpacked(lai).transpose("y", "x")
+    data = terrain_labels.on_slopes(kernel, sun.dem, sun.horizon, sun.geometry, plain, leading=(level.sizes["band"],))
+    return terrain_labels.labelled_slopes(data, level, sun, "terrain: upright plants (SAIL on slopes)")
+
+
+def _upright(lai, light, canopy, seen):
+    """Reflectance of upright plants in cells, shape (band, rows, columns). [1]"""
+    scene, known = canopy.scene, ~np.isnan(check_map(lai) + light.cosine)
+    slope = {
+        "cosine": light.cosine[known],
+        "mu_s_local": light.mu_s_local[known],
+        "mu_v_local": light.upwelling[known] * seen.mu_v,
+        "sky_view": light.sky_view[known],
+        "terrain_view": horizon_terrain_view(light.sky_view[known], light.cosine[known]),
+    }
+    bands = (np.array(each)[:, None] for each in (scene.leaf_reflectance, scene.leaf_transmittance, canopy.background))
+    angles = {name: getattr(scene, name) for name in ("sza", "vza", "raa", "leaf_angles", "hotspot")}
+    out = np.full((len(scene.sky), *lai.shape), np.nan)
+    out[:, known] = upright_reflectance(
+        lai[known], *bands, **angles, **slope, diffuse_fraction=np.array(scene.sky)[:, None]
+    )
+    return out
 
 
 class Land(NamedTuple):

@@ -325,6 +325,7 @@ def surface_reflectance(
     dem: xr.DataArray | None = None,
     horizon: Horizon | None = None,
     upwelling: bool = True,
+    slopes: Literal["kt", "upright"] = "kt",
     atmosphere: Atmosphere | None = None,
     geometry: Directions | None = None,
     time: Time | None = None,
@@ -353,6 +354,9 @@ def surface_reflectance(
         Horizon of a larger elevation model, from `horizon`. [degree]
     upwelling : bool, optional
         Whether to apply the cosine of the view angle on slopes, Eq. 5.
+    slopes : {"kt", "upright"}, optional
+        Model of slopes: reflectance of level ground times Kt, as in the paper, or SAIL on each slope with upright
+        plants and the sum of the light between slopes, without Eq. 5, where cells differ in leaf area only.
     atmosphere : Atmosphere, optional
         Determines the diffuse fraction; saved with the result. The default is midlatitude summer, continental aerosol,
         45 km visibility and 0.4 km altitude, with a warning for rasters from other sources.
@@ -405,8 +409,9 @@ def surface_reflectance(
     >>> rho.mean(["y", "x"]).round(3).values
     array([0.089, 0.229])
     """
-    if dem is None and horizon is not None:
-        raise ValueError("a horizon needs an elevation: give dem= too")
+    if dem is None and (horizon is not None or slopes != "kt"):
+        what = "a horizon" if horizon is not None else f"slopes={slopes!r}"
+        raise ValueError(f"{what} needs an elevation: give dem= too")
     land = landscapes.land_of(lai)
     lai = north_up(land.lai)
     description = given_instrument(instrument, lai)
@@ -435,8 +440,10 @@ def surface_reflectance(
         return coupled_ground.reflectance_streams(land, selected, canopies, light, skies, level)
     if dem is None:
         return level
-    light = sunlight(dem, horizon, atmosphere, responses, geometry, "surface_reflectance on slopes")
-    return terrain_labels.terrain_reflectance(level, light, upwelling)
+    sun = sunlight(dem, horizon, atmosphere, responses, geometry, "surface_reflectance on slopes")
+    if slopes == "upright":
+        return landscapes.upright_plants(level, None if land.cover is not None else canopies[None], light, lai, sun)
+    return terrain_labels.terrain_reflectance(level, sun, upwelling)
 
 
 @by_date

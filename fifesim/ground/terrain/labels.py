@@ -264,6 +264,11 @@ def _lit(kernel, level, light, *options, leading=()):
     return on_slopes(kernel_in_light, light.dem, light.horizon, light.geometry, level, leading=leading)
 
 
+def labelled_slopes(data, level, light, history):
+    """Label reflectance on slopes, made from the ground on level ground and the light on its slopes."""
+    return _labelled(data, level, light, "surface_reflectance", history)
+
+
 def _labelled_kt(data, level, light):
     return _labelled(data, level, light, "kt", "kt: Eq. 4")
 
