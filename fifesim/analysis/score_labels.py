@@ -110,8 +110,12 @@ def score(
     values, levels = _pixel_scores(given, truth)
     sums = _sums_by_landscape(values, group, truth, landscape, len(labels))
     if not sums[..., 0].sum():
-        raise ValueError("no pixel has both an estimate and a true value: do the rasters overlap?")
+        raise ValueError(
+            "no pixel has both an estimate and a true value: do the rasters overlap, and is any pixel not flagged?"
+        )
     found = _dataset(sums, levels, "crps" in values, unit)
+    if "width" in found and bool((found["width"].fillna(0) == 0).all("group").any()):
+        raise ValueError("low and high of a level are equal in every pixel: give both ends of the intervals")
     if by is None:
         return found.isel(group=0)
     return found.assign_coords(group=labels).rename(group=_group_name(by, truth))

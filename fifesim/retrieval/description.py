@@ -41,6 +41,8 @@ class Estimated(NamedTuple):
     """Shape (n, quantities, levels)."""
     flag: np.ndarray
     """Bits, shape (n,)."""
+    diagnostics: tuple[np.ndarray, ...] = ()
+    """Layers of `Retrieval.diagnostics`, each of shape (n,)."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Retrieval:
 
     Attributes
     ----------
-    method : {"line", "lookup", "quantiles"}
+    method : {"line", "lookup", "quantiles", "optimal-estimation"}
     level : {"toa", "surface"}
         Level of the images.
     instrument : str
@@ -96,6 +98,11 @@ class Retrieval:
     score: xr.Dataset | None = field(default=None, repr=False)
     _in_words: ClassVar[str] = "a fifesim.Retrieval, as fifesim.train gives it"
 
+    @property
+    def diagnostics(self) -> tuple[str, ...]:
+        """Names of further layers of the estimates, a tuple of str: those of optimal estimation."""
+        return methods.diagnostics_of(self.tables)
+
     def estimate(self, reflectance: np.ndarray, angles: np.ndarray) -> Estimated:
         """
         Estimate the quantities of pixels.
@@ -115,27 +122,32 @@ class Retrieval:
         count, kinds = len(reflectance), len(self.quantities)
         shape = count, kinds, len(self.levels)
         median, sd, low, high = (np.full(each, np.nan) for each in ((count, kinds), (count, kinds), shape, shape))
-        flag = np.zeros(count, np.int8)
+        flag, diagnostics = np.zeros(count, np.int8), tuple(np.full(count, np.nan) for _ in self.diagnostics)
         if known.any():
             light, own = reflectance[known], angles[known]
             found = methods.ESTIMATORS[self.method](self.tables, light, own, levels=self.levels)
-            allowed = np.array([RETRIEVED[name] for name in self.quantities]).T
-            median[known], sd[known] = np.clip(found.median, *allowed), found.sd
+            median[known], sd[known] = found.median, found.sd
             for at, level in enumerate(self.levels):
                 ends = methods.ends_of(found.quantiles, self.levels, level)
                 factor = self.tables["stretch"][:, at]
                 for out, end in zip((low, high), ends, strict=True):
-                    out[known, :, at] = np.clip(found.median + factor * (end - found.median), *allowed)
-            least, most = self.tables["prior_range"]
-            at_edge = ((found.median < least) | (found.median > most)).any(1)
+                    out[known, :, at] = found.median + factor * (end - found.median)
+            for layer, values in zip(diagnostics, found.diagnostics, strict=True):
+                layer[known] = values
             first, last = self.tables["angle_range"]
             astray = ((own < first - ANGLE_MARGIN) | (own > last + ANGLE_MARGIN)).any(1)
-            outside = methods.is_outside(self.tables, light) | astray
-            flag[known] = OUTSIDE * outside + EDGE * at_edge
+            flag[known] = OUTSIDE * (methods.is_outside(self.tables, light) | astray)
+            flag[known] |= NOT_CONVERGED * np.logical_not(found.converged).astype(np.int8)
         # Factors differ by level; a wider interval contains the narrower ones.
         np.minimum.accumulate(low, axis=2, out=low)
         np.maximum.accumulate(high, axis=2, out=high)
-        return Estimated(median, sd, low, high, flag)
+        least, most = self.tables["prior_range"]
+        flag |= EDGE * ((median < least) | (median > most)).any(1).astype(np.int8)
+        allowed = np.array([RETRIEVED[name] for name in self.quantities]).T
+        np.clip(median, *allowed, out=median)
+        for end in (low, high):
+            np.clip(end, *allowed[..., None], out=end)
+        return Estimated(median, sd, low, high, flag, diagnostics)
 
     def to_netcdf(self, path: FilePath) -> None:
         """

@@ -105,7 +105,7 @@ def retrieve(image: xr.DataArray, retrieval: RetrievalLike, intervals: Sequence[
     places = [retrieval.levels.index(level) for level in levels]
     count, kinds = len(levels), len(retrieval.quantities)
     kernel = partial(_estimates, retrieval=retrieval, places=places)
-    layers = kinds * (2 + 2 * count) + 1
+    layers = kinds * (2 + 2 * count) + len(retrieval.diagnostics) + 1
     found = chunks.pointwise(kernel, light, *angles, bands=layers, dtype=np.float32)
     numbers = iter(range(layers))
     history = f"retrieve: {retrieval.method} of {', '.join(retrieval.bands)}; prior: {retrieval.prior}"
@@ -118,6 +118,9 @@ def retrieve(image: xr.DataArray, retrieval: RetrievalLike, intervals: Sequence[
             whole = xr.concat(parts, xr.DataArray(list(levels), dims="level", name="level"), combine_attrs="override")
             out[f"{name}_{end}"] = whole
         out[name].attrs["ancillary_variables"] = f"{name}_sd flag"
+    for name in retrieval.diagnostics:
+        out[name] = swaths.placed_as(found.isel(band=next(numbers)), image).rename(name)
+        out[name].attrs = {"long_name": name.replace("_", " "), "units": "1", "history": history}
     out["flag"] = _flag(found.isel(band=-1), image, history)
     return xr.Dataset(out)
 
@@ -136,8 +139,10 @@ def _levels(retrieval, intervals):
 
 def _check_level(image, level):
     """Raise ValueError for digital numbers, radiance or reflectance of the other level."""
-    if "gain" in image.coords:
-        raise ValueError("the image holds digital numbers: convert it with .fifesim.to_reflectance() first")
+    if "gain" in image.coords or image.dtype.kind in "iu":
+        raise ValueError(
+            "the image holds digital numbers: convert it with .fifesim.to_reflectance(), or apply its scale and offset"
+        )
     name, wanted = image.attrs.get("standard_name", ""), _STANDARD_NAMES[level]
     if name and name != wanted:
         where = {"toa": "at the top of the atmosphere", "surface": "of the surface"}[level]
@@ -224,9 +229,10 @@ def _estimates(light, *angles, retrieval, places):
         for kind in range(len(retrieval.quantities)):
             layers += [found.median[:, kind], found.sd[:, kind]]
             layers += [end[:, kind, place] for end in (found.low, found.high) for place in places]
-        return [*layers, np.where(np.isnan(found.median[:, 0]), np.nan, found.flag)]
+        return [*layers, *found.diagnostics, np.where(np.isnan(found.median[:, 0]), np.nan, found.flag)]
 
-    return _in_batches(layers_of, len(retrieval.quantities) * (2 + 2 * len(places)) + 1, light, *angles)
+    count = len(retrieval.quantities) * (2 + 2 * len(places)) + len(retrieval.diagnostics) + 1
+    return _in_batches(layers_of, count, light, *angles)
 
 
 def _layer(found, at, image, name, history, what=""):

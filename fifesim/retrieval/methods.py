@@ -7,7 +7,8 @@ from scipy import stats
 
 from fifesim.analysis import regression
 from fifesim.analysis.indices import normalized_difference
-from fifesim.retrieval.inversion import table_posterior
+from fifesim.retrieval.forward import DIRECTIONS, DRAWN_STATES, axes_of, interpolated, simulated_tables
+from fifesim.retrieval.inversion import optimal_estimation, table_posterior
 from fifesim.retrieval.networks import Network, network, train_quantiles
 
 
@@ -25,10 +26,6 @@ class TrainingPixels(NamedTuple):
     landscape: np.ndarray
     """Number of the landscape, shape (n,)."""
 
-    def where(self, chosen):
-        """TrainingPixels chosen by a mask or by their numbers."""
-        return TrainingPixels(*(each[chosen] for each in self))
-
 
 class Estimates(NamedTuple):
     """Estimates by pixel and quantity."""
@@ -39,6 +36,10 @@ class Estimates(NamedTuple):
     """Shape (n, quantities)."""
     quantiles: np.ndarray
     """Shape (n, quantities, probabilities)."""
+    converged: np.ndarray | bool = True
+    """Shape (n,), or True for methods without iterations."""
+    diagnostics: tuple[np.ndarray, ...] = ()
+    """Layers of the method, each of shape (n,)."""
 
 
 def probabilities_of(levels):
@@ -51,7 +52,7 @@ def probabilities_of(levels):
 _LINE = ("slope", "intercept", "r2", "n", "residual_deviation", "x_mean", "x_sum_of_squares")
 
 
-def fit_line(pixels, levels, seed, *, red_and_near_infrared):
+def fit_line(pixels, red_and_near_infrared):
     """Table of a line on NDVI for each quantity."""
     red, near = red_and_near_infrared
     ndvi = normalized_difference(pixels.reflectance[:, near], pixels.reflectance[:, red])
@@ -165,10 +166,92 @@ def by_quantiles(tables, reflectance, angles, levels):
     return Estimates(quantiles[..., len(levels)], width / (2 * stats.norm.ppf((1 + levels[at]) / 2)), quantiles)
 
 
-FITS = {"line": fit_line, "lookup": fit_lookup, "quantiles": fit_quantiles}
-"""Functions that fit a method to training pixels, by its name."""
+def fit_optimal_estimation(pixels, study, states, level, bands, quantities):
+    """Tables of reflectance and quantities, and the prior and the covariance of the error."""
+    # The truth of the pixels are the unknowns.
+    axes, angles = axes_of(pixels.truth, states, pixels.angles), pixels.angles.mean(0)
+    light, values = simulated_tables(study, level, bands, quantities, axes, angles)
+    found = {f"axis_{name}": np.array(ends) for name, ends in axes.items()}
+    modelled = np.empty_like(pixels.reflectance)
+    for part in _parts(len(modelled)):
+        modelled[part] = interpolated(light, _axes(found), pixels.truth[part], _given(found, pixels.angles[part]))[0]
+    # Noise, blur, registration, variation within pixels and properties that are no unknowns.
+    rest = pixels.reflectance - modelled
+    light[(0,) * len(axes)] += rest.mean(0)
+    error, prior = (np.atleast_2d(np.cov(each.T)) for each in (rest, pixels.truth))
+    found |= {"reflectance": light, "quantities": values, "error_covariance": error + 1e-10 * np.eye(len(error))}
+    return found | {"prior_mean": pixels.truth.mean(0), "prior_covariance": prior}
 
-ESTIMATORS = {"line": by_line, "lookup": by_lookup, "quantiles": by_quantiles}
+
+def by_optimal_estimation(tables, reflectance, angles, levels):
+    """Most probable state, and the normal distribution of each quantity from the posterior covariance."""
+    axes, unknowns = _axes(tables), len(tables["prior_mean"])
+    score, parts = stats.norm.ppf(probabilities_of(levels)), []
+    for part in _parts(len(reflectance)):
+        given = _given(tables, angles[part])
+
+        def forward(states, pixels, given=given):
+            return interpolated(tables["reflectance"], axes, states, given[pixels])
+
+        found = optimal_estimation(
+            reflectance[part],
+            forward,
+            tables["prior_mean"],
+            tables["prior_covariance"],
+            tables["error_covariance"],
+            limits=tuple(axes[:unknowns].T),
+        )
+        median, slope = interpolated(tables["quantities"], axes, found.state, given)
+        sd = np.sqrt(np.einsum("nqk,nkl,nql->nq", slope, found.covariance, slope))
+        kernel = np.diagonal(found.averaging_kernel, axis1=1, axis2=2)
+        layers = np.column_stack([found.degrees_of_freedom, found.chi_square, kernel])
+        parts.append((median, sd, found.converged, layers))
+    median, sd, converged, layers = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return Estimates(median, sd, median[..., None] + sd[..., None] * score, converged, tuple(layers.T))
+
+
+def diagnostics_of(tables):
+    """Names of the diagnostics of a method."""
+    if "prior_mean" not in tables:
+        return ()
+    kernels = (f"averaging_kernel_{name}" for name in _names(tables)[: len(tables["prior_mean"])])
+    return "degrees_of_freedom", "chi_square", *kernels
+
+
+# Pixels whose tables are contracted at once, so that they stay in the cache of the processor.
+_AT_ONCE = 512
+
+
+def _parts(count):
+    """Slices of pixels."""
+    return [slice(start, start + _AT_ONCE) for start in range(0, count, _AT_ONCE)]
+
+
+def _names(tables):
+    """Names of the axes of the tables, in order."""
+    return [name for name in ("lai", *DRAWN_STATES, *DIRECTIONS) if f"axis_{name}" in tables]
+
+
+def _axes(tables):
+    """Lowest and highest value along each axis, shape (axes, 2)."""
+    return np.stack([tables[f"axis_{name}"] for name in _names(tables)])
+
+
+def _given(tables, angles):
+    """Angles along axes of the tables, shape (n, axes)."""
+    names = _names(tables)
+    return angles[:, [at for at, name in enumerate(DIRECTIONS) if name in names]]
+
+
+FITS = {"lookup": fit_lookup, "quantiles": fit_quantiles}
+"""Functions that fit a method to training pixels alone, by its name."""
+
+ESTIMATORS = {
+    "line": by_line,
+    "lookup": by_lookup,
+    "quantiles": by_quantiles,
+    "optimal-estimation": by_optimal_estimation,
+}
 """Functions that estimate with the tables of a method, by its name."""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Literal
@@ -14,10 +14,8 @@ from fifesim.analysis.score_labels import score
 from fifesim.base.annotations import FilePath, Names
 from fifesim.base.arguments import Kind, described
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
-from fifesim.output.chips.store import chip_arrays, layout_of
-from fifesim.retrieval import methods
+from fifesim.retrieval import methods, training_chips
 from fifesim.retrieval.description import FORMAT, RETRIEVED, Retrieval
-from fifesim.scenario.chips import chips_of
 from fifesim.scenario.studies import Study, read_study
 
 StudyOrDataset = Annotated[
@@ -25,19 +23,17 @@ StudyOrDataset = Annotated[
     Kind("the path of a study, a fifesim.Study, or a dataset of chips as fifesim.dataset gives it", dimensions=0),
 ]
 
-# TrainingPixels of the training that are used, more do not improve a network of this size, and of the other parts.
-_PIXELS, _UNSEEN = 100_000, 20_000
-
 _LEVELS = (0.5, 0.8, 0.95)
 
 
 def train(
     source: StudyOrDataset,
-    method: Literal["line", "lookup", "quantiles"] = "quantiles",
+    method: Literal["line", "lookup", "quantiles", "optimal-estimation"] = "quantiles",
     *,
     bands: Names | None = None,
     quantities: Names = ("lai", "fpar"),
     level: Literal["toa", "surface"] = "toa",
+    pixels: Literal["chain", "uniform"] = "chain",
     levels: Sequence[float] = _LEVELS,
     chips: int | None = None,
     seed: int = 0,
@@ -54,17 +50,25 @@ def train(
     ----------
     source : path, fifesim.Study or xarray.Dataset
         Study, whose chips are made in memory, or chips from `fifesim.dataset`.
-    method : {"quantiles", "lookup", "line"}, optional
+    method : {"quantiles", "lookup", "line", "optimal-estimation"}, optional
         "quantiles" is a network trained for quantiles; "lookup" weights at most 20,000 simulated pixels by their
         likelihood, with the covariance of noise, blur and registration found in the chips; "line" is a regression on
-        NDVI, whose intervals are not stretched.
+        NDVI, whose intervals are not stretched. "optimal-estimation" finds the most probable LAI together with the soil
+        brightness, soil moisture, share of dead leaves, chlorophyll and logarithm of the aerosol optical depth that the
+        study draws, from a table of uniform ground of a single stand. It needs the study, or a dataset from
+        `fifesim.dataset`.
     bands : str or sequence of str, optional
         Bands, by default all of the chips.
     quantities : str or sequence of str, optional
         Any of "lai", "fpar" and "green_fpar".
     level : {"toa", "surface"}, optional
-        Level of the images: reflectance at the top of the atmosphere, from ``toa_reflectance`` of the chips, or of the
-        surface, from a variable ``surface_reflectance`` that you add to the dataset.
+        Level of the images: reflectance at the top of the atmosphere or of the surface. Chips have
+        ``toa_reflectance``. It is corrected with an aerosol optical depth whose error has a standard deviation of 0.05
+        + 0.15 times the depth [Levy2010]_, unless the dataset has a variable ``surface_reflectance`` of your processor.
+    pixels : {"chain", "uniform"}, optional
+        Pixels to which the method is fitted: images of the whole chain, or uniform ground with the same true
+        properties, to which errors with the covariance of the effects of the chain are added. Intervals and scores are
+        from the chain in both cases. "uniform" needs the study, or a dataset from `fifesim.dataset`.
     levels : sequence of float, optional
         Levels of the central intervals. [1]
     chips : int, optional
@@ -81,7 +85,8 @@ def train(
     Raises
     ------
     ValueError
-        If the dataset lacks bands, quantities or one of the parts train, validation and test, or has no valid pixel.
+        If the dataset lacks bands, quantities, its study or one of the parts train, validation and test, or has no
+        valid pixel; or if optimal estimation or uniform pixels are wanted for a landscape of several classes.
 
     See Also
     --------
@@ -97,28 +102,31 @@ def train(
     ('lookup', ('TM3', 'TM4'), ('lai', 'fpar'))
     """
     names = (quantities,) if isinstance(quantities, str) else tuple(quantities)
-    _check(method, names, levels)
+    _check(method, names, levels, level, pixels)
     dataset = source if isinstance(source, xr.Dataset) else _made(source, chips)
-    variable = "toa_reflectance" if level == "toa" else "surface_reflectance"
-    _check_dataset(dataset, variable, names)
+    levels = tuple(sorted(float(each) for each in levels))
+    variable = f"{level}_reflectance"
+    _check_dataset(dataset, names)
     chosen = _chosen_bands(dataset, bands)
-    parts = {part: _pixels(dataset, variable, chosen, names, part, seed) for part in ("train", "validation", "test")}
-    learned, levels = parts["train"], tuple(sorted(float(each) for each in levels))
+    dataset, fitted = _levelled(dataset, level, pixels, seed)
+    take = partial(training_chips.pixels_of, variable=variable, bands=chosen, seed=seed)
+    learned = take(fitted, names=names, part="train")
     wavelengths = tuple(float(each) for each in dataset["wavelength"].sel(band=list(chosen)).values)
-    fit: Callable = methods.FITS[method]
-    if method == "line":
-        places = tuple(nearest_band(wavelengths, window) for window in (RED, NEAR_INFRARED))
-        if None in places:
-            raise ValueError(f"line needs a red and a near infrared band, got {', '.join(chosen)}: add them")
-        fit = partial(fit, red_and_near_infrared=places)
-    tables = fit(learned, levels, seed) | methods.domain_of(learned.reflectance)
+    tables = methods.domain_of(learned.reflectance)
+    if method == "optimal-estimation":
+        described, states = training_chips.with_states(fitted)
+        known, kind = take(described, names=[f"state_{name}" for name in states], part="train"), (level, chosen, names)
+        tables |= methods.fit_optimal_estimation(known, _study_of_one_stand(dataset), states, *kind)
+    elif method == "line":
+        tables |= methods.fit_line(learned, _red_and_near_infrared(wavelengths, chosen))
+    else:
+        tables |= methods.FITS[method](learned, levels, seed)
     tables["prior_range"] = np.quantile(learned.truth, (0.005, 0.995), axis=0)
     tables["angle_range"] = np.stack([learned.angles.min(0), learned.angles.max(0)])
     tables["stretch"] = np.ones((len(names), len(levels)))
-    raw = partial(methods.ESTIMATORS[method], tables, levels=levels)
     if method != "line":
-        unseen = parts["validation"]
-        found = raw(unseen.reflectance, unseen.angles)
+        unseen = take(dataset, names=names, part="validation")
+        found = methods.ESTIMATORS[method](tables, unseen.reflectance, unseen.angles, levels=levels)
         tables["stretch"] = methods.stretch_factors(found, unseen.truth, unseen.landscape, levels)
     retrieval = Retrieval(
         method=method,
@@ -133,15 +141,19 @@ def train(
         tables=tables,
         version=FORMAT,
     )
-    retrieval = replace(retrieval, score=_score(retrieval, parts["test"]))
+    retrieval = replace(retrieval, score=_score(retrieval, take(dataset, names=names, part="test")))
     if path is not None:
         retrieval.to_netcdf(path)
     return retrieval
 
 
-def _check(method, names, levels):
-    if method not in methods.FITS:
-        raise ValueError(f"method must be one of {', '.join(methods.FITS)}, got {method!r}")
+def _check(method, names, levels, level, pixels):
+    for argument, value, allowed in (
+        ("method", method, methods.ESTIMATORS), ("level", level, ("toa", "surface")),
+        ("pixels", pixels, ("chain", "uniform")),
+    ):  # fmt: skip
+        if value not in allowed:
+            raise ValueError(f"{argument} must be one of {', '.join(allowed)}, got {value!r}")
     wrong = [name for name in names if name not in RETRIEVED]
     if wrong or not names or len(set(names)) < len(names):
         raise ValueError(f"quantities must be different names among {', '.join(RETRIEVED)}, got {described(names)}")
@@ -150,27 +162,48 @@ def _check(method, names, levels):
 
 
 def _made(source, count):
-    """Chips of a study in memory, as a dataset."""
-    study = source if isinstance(source, Study) else read_study(source)
-    chips = chips_of(study, 10 * study.landscapes if count is None else count)
-    layout = layout_of(chips)
-    arrays = chip_arrays(chips, np.arange(len(chips)), layout)
-    variables = {name: (("chip", *layout.variables[name][0]), values) for name, values in arrays.items()}
-    found = xr.Dataset(variables, layout.bands.coords).assign_coords(
-        landscape=("chip", chips.landscape), split=("chip", chips.split)
-    )
-    return found.assign_attrs(instrument=study.scenario.sensor.description.name)
+    return training_chips.made(source if isinstance(source, Study) else read_study(source), count)
 
 
-def _check_dataset(dataset, variable, names):
-    wanted = (variable, *names, "landscape", "split", "sza", "saa", "vza", "vaa")
-    lacking = [name for name in wanted if name not in dataset.variables]
+def _levelled(dataset, level, pixels, seed):
+    """Chips with reflectance at the level, and those to which the method is fitted."""
+    is_own = level == "surface" and "surface_reflectance" in dataset
+    if is_own and pixels == "uniform":
+        raise ValueError("the surface_reflectance of the dataset is not of uniform ground: use pixels='chain'")
+    fitted = dataset
+    if pixels == "uniform":
+        fitted = training_chips.with_uniform_ground(
+            dataset.isel(chip=np.flatnonzero(dataset["split"] == "train")), seed
+        )
+    if level == "toa" or is_own:
+        return dataset, fitted
+    return tuple(training_chips.with_surface_reflectance(each, seed) for each in (dataset, fitted))
+
+
+def _red_and_near_infrared(wavelengths, names):
+    places = tuple(nearest_band(wavelengths, window) for window in (RED, NEAR_INFRARED))
+    if None in places:
+        raise ValueError(f"line needs a red and a near infrared band, got {', '.join(names)}: add them")
+    return places
+
+
+def _study_of_one_stand(dataset):
+    study = training_chips.study_of(dataset, "optimal-estimation")
+    if study.scenario.landscape.cover != "none":
+        raise ValueError(
+            f"optimal-estimation needs a single stand, got landscape.cover = {study.scenario.landscape.cover!r}: use "
+            "quantiles"
+        )
+    return study
+
+
+def _check_dataset(dataset, names):
+    wanted = ("toa_reflectance", *names, "lai", "landscape", "split", "sza", "saa", "vza", "vaa")
+    lacking = [name for name in dict.fromkeys(wanted) if name not in dataset.variables]
     if lacking:
-        cure = "give chips as fifesim.dataset makes them"
-        if "surface_reflectance" in lacking:
-            cure = "add the corrected reflectance of your processor to the dataset, or use level='toa'"
-        if set(lacking) <= set(RETRIEVED):
-            cure = "choose other quantities"
+        cure = (
+            "choose other quantities" if set(lacking) <= set(RETRIEVED) else "give chips as fifesim.dataset makes them"
+        )
         raise ValueError(f"source has no {', '.join(lacking)}: {cure}")
     parts = set(np.unique(dataset["split"].values).tolist())
     if missing := {"train", "validation", "test"} - parts:
@@ -186,27 +219,6 @@ def _chosen_bands(dataset, bands):
     if missing := [name for name in wanted if name not in known]:
         raise ValueError(f"the chips have no band {', '.join(missing)}, they have {', '.join(known)}")
     return tuple(wanted)
-
-
-def _pixels(dataset, variable, bands, names, part, seed):
-    """Valid pixels of one part of a dataset, a random choice of them if there are many."""
-    own = dataset.isel(chip=np.flatnonzero(dataset["split"].values == part)).sel(band=list(bands))
-    light = np.asarray(own[variable].transpose("chip", "y", "x", "band").values, float)
-    chips, rows, columns, width = light.shape
-    truth = np.stack([np.asarray(own[name].transpose("chip", "y", "x").values, float) for name in names], axis=-1)
-    angles = np.stack(
-        [own["sza"].values, own["vza"].values, methods.azimuth_difference(own["saa"].values, own["vaa"].values)], axis=1
-    )
-    # A view at nadir has no azimuth.
-    angles[:, 2] = np.where(angles[:, 1] < 0.5, 0.0, angles[:, 2])
-    chip = np.repeat(np.arange(chips), rows * columns)
-    flat, true = light.reshape(-1, width), truth.reshape(-1, len(names))
-    valid = np.flatnonzero(np.isfinite(flat).all(1) & np.isfinite(true).all(1))
-    if not valid.size:
-        raise ValueError(f"no pixel of the part {part} has both reflectance and truth")
-    chosen = np.sort(np.random.default_rng(seed).permutation(valid)[: _PIXELS if part == "train" else _UNSEEN])
-    whole = chip[chosen]
-    return methods.TrainingPixels(flat[chosen], angles[whole], true[chosen], whole, own["landscape"].values[whole])
 
 
 def _prior(pixels, names):

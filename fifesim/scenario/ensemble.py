@@ -55,6 +55,17 @@ def realise_arrays(scenario, *, complete=False):
     return _image(scene) | light, truth if isinstance(truth, dict) else _values(truth)
 
 
+def uniform_reflectance(scenario, ground):
+    """Planetary reflectance of pixels of uniform ground without noise, shape (band, y, x). [1]"""
+    setup = setup_of(scenario)
+    driver = _driver(scenario, setup)
+    if scenario.landscape.is_one():
+        return driver.toa(driver.reflectance(ground["lai"]))
+    pixels = grids.aligned_grid(as_carried(scenario.geobox()), scenario.sensor.size)
+    variables = {name: xr.Variable(("y", "x"), each, {"units": "1"}) for name, each in ground.items()}
+    return driver.toa(reflectance_of(setup, _placed(variables, grids.coordinates(pixels))).values)
+
+
 def _values(dataset):
     return {str(name): each.values for name, each in dataset.data_vars.items()}
 

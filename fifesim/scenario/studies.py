@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -171,7 +172,16 @@ def read_study(path: FilePath) -> Study:
     >>> from fifesim import read_study
     >>> study = read_study("study.toml")  # doctest: +SKIP
     """
-    values = load_values(path)
+    return _study_of(load_values(path), Path(path).parent)
+
+
+def parse_study(text):
+    """Study from the TOML text of `Study.to_toml`."""
+    return _study_of(tomllib.loads(text), Path())
+
+
+def _study_of(values, folder):
+    """Study from the values of a TOML file in a folder."""
     plan, draws = values.pop("dataset", {}), values.pop("draw", None)
     known = ("sequence", "seed", "landscapes", "split")
     wrong = [
@@ -186,7 +196,7 @@ def read_study(path: FilePath) -> Study:
     if wrong:
         raise ValueError("\n".join(wrong))
     if isinstance(draws, Mapping):
-        draws = {name: _with_whole_paths(name, table, Path(path).parent) for name, table in _flat(draws)}
+        draws = {name: _with_whole_paths(name, table, folder) for name, table in _flat(draws)}
     return Study(scenario, draws, **plan)
 
 

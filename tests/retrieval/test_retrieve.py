@@ -1,14 +1,18 @@
 """Training on a study, and retrieval from images: intervals, flags, files and refusals."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.retrieval import labels, methods, training
+from fifesim.chain.driver import Driver
+from fifesim.retrieval import forward, labels, methods, training_chips
 from fifesim.retrieval.description import Retrieval
+from fifesim.scenario.ensemble import uniform_reflectance
+from fifesim.scenario.simulation import setup_of
 from tests.lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 
 CHIP = fifesim.Scenario(
@@ -26,10 +30,10 @@ STUDY = fifesim.Study(
 
 @pytest.fixture(scope="module")
 def chips():
-    return training._made(STUDY, 96)
+    return training_chips.made(STUDY, 96)
 
 
-@pytest.fixture(scope="module", params=["line", "lookup", "quantiles"])
+@pytest.fixture(scope="module", params=["line", "lookup", "quantiles", "optimal-estimation"])
 def retrieval(request, chips):
     return fifesim.train(chips, request.param)
 
@@ -137,6 +141,96 @@ def test_lookup_knows_the_covariance_of_the_error_within_chips():
     assert np.linalg.inv(scale @ scale.T) == pytest.approx(np.array([[4e-4, 3e-4], [3e-4, 9e-4]]), rel=0.1)
 
 
+def test_table_of_optimal_estimation_is_the_chain_and_its_derivatives(chips):
+    """Against the chain at states between the nodes, and against central differences."""
+    tables = fifesim.train(chips, "optimal-estimation", quantities=["lai", "fpar"]).tables
+    study = training_chips.study_of(chips, "test")
+    axes, rng = methods._axes(tables), np.random.default_rng(5)
+    assert methods._names(tables) == ["lai", "soil", "log_aot"]
+    light, values = forward.simulated_tables(
+        study,
+        "toa",
+        ("MSI4", "MSI8"),
+        ("lai", "fpar"),
+        dict(zip(methods._names(tables), axes, strict=True)),
+        (28.5, 0, 0),
+    )
+    states = axes[:, 0] + rng.uniform(0, 1, (20, 3)) * (axes[:, 1] - axes[:, 0])
+    found, slopes = forward.interpolated(light, axes, states, np.empty((20, 0)))
+    quantities, _ = forward.interpolated(values, axes, states, np.empty((20, 0)))
+    for state, spectrum, quantity in zip(states, found, quantities, strict=True):
+        geometry = {"sza": 28.5, "saa": 0.0, "vza": 0.0, "vaa": 0.0}
+        scenario = CHIP.replace(soil=state[1], visibility=None, aot=np.exp(state[2]), **geometry)
+        driver = Driver(setup_of(scenario))
+        lai = state[:1, None]
+        assert spectrum == pytest.approx(driver.toa(driver.reflectance(lai))[1:, 0, 0], abs=2e-4)
+        assert quantity == pytest.approx([state[0], driver.fpar(lai, 0.94).item()], abs=1e-6)
+    for at in range(3):
+        step = np.zeros(3)
+        step[at] = 1e-5
+        ends = [forward.interpolated(light, axes, states + side * step, np.empty((20, 0)))[0] for side in (1, -1)]
+        assert slopes[:, :, at] == pytest.approx((ends[0] - ends[1]) / 2e-5, abs=1e-7)
+
+
+def test_diagnostics_of_optimal_estimation(chips, image, monkeypatch):
+    retrieval = fifesim.train(chips, "optimal-estimation")
+    light = image["image"]["dn"].fifesim.to_reflectance()
+    found = light.fifesim.retrieve(retrieval).compute()
+    kernels = [found[f"averaging_kernel_{name}"] for name in ("lai", "soil", "log_aot")]
+    assert np.allclose(sum(kernels), found.degrees_of_freedom, atol=1e-5, equal_nan=True)
+    assert float(found.degrees_of_freedom.max()) < 3 and float(found.averaging_kernel_lai.min()) > 0.5
+    # The misfit has as many degrees of freedom as bands, less because blur and registration errors depend on LAI.
+    spectra = chips.toa_reflectance.transpose("chip", "y", "x", "band").values.reshape(-1, 3).astype(float)
+    estimates = retrieval.estimate(spectra, np.tile([28.5, 0.0, 0.0], (len(spectra), 1)))
+    assert 1.5 < estimates.diagnostics[1].mean() < 3.2
+    assert not bool((found.flag & 4).where(found.flag >= 0, 0).any())
+    monkeypatch.setattr(methods, "optimal_estimation", partial(methods.optimal_estimation, iterations=1))
+    hasty = light.fifesim.retrieve(retrieval)
+    assert bool((hasty.flag & 4).where(hasty.flag >= 0, 4).all())
+
+
+def test_uniform_ground_is_each_canopy_and_is_corrected_exactly(chips):
+    """SAIL of each pixel by another way than the table of leaf area, and the way back to the surface."""
+    scenario = next(training_chips._scenarios(chips, "test"))
+    lai = np.linspace(0.1, 3, 900).reshape(30, 30)
+    toa = uniform_reflectance(scenario, {"lai": lai})
+    setup = setup_of(scenario)
+    expected = fifesim.canopy_spectra(
+        {"lai": lai.ravel()}, "MSI", bands=setup.bands, canopy=setup.canopy, geometry=setup.geometry,
+        atmosphere=setup.atmosphere,
+    )  # fmt: skip
+    np.testing.assert_allclose(Driver(setup).corrected(toa).reshape(3, -1).T, expected.reflectance, rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize("method", ["quantiles", "optimal-estimation"])
+def test_training_at_the_surface_and_on_uniform_ground(chips, image, method):
+    """Surface images are retrieved about as well as those with atmosphere; so is a method fitted to uniform ground."""
+    light = image["image"]["dn"].fifesim.to_reflectance()
+    surface = light.fifesim.to_surface()
+    rmse = {}
+    for level, pixels, own in (("toa", "chain", light), ("surface", "chain", surface), ("surface", "uniform", surface)):
+        retrieval = fifesim.train(chips, method, level=level, pixels=pixels)
+        rmse[level, pixels] = float(fifesim.score(own.fifesim.retrieve(retrieval), image["truth"]["lai"]).rmse)
+        assert abs(float(retrieval.score.coverage.sel(quantity="lai", level=0.8)) - 0.8) < 0.15
+    assert max(rmse.values()) < 1.5 * rmse["toa", "chain"]
+
+
+def test_training_that_needs_the_study_is_refused_without_it(chips):
+    bare = chips.drop_attrs(deep=False).assign_attrs(instrument="MSI")
+    for options in ({"method": "optimal-estimation"}, {"level": "surface"}, {"pixels": "uniform"}):
+        with pytest.raises(ValueError, match="needs the study of the chips"):
+            fifesim.train(bare, **options)
+    corrected = bare.assign(surface_reflectance=bare.toa_reflectance)
+    assert fifesim.train(corrected, "line", level="surface").level == "surface"
+    with pytest.raises(ValueError, match="is not of uniform ground"):
+        fifesim.train(corrected, "line", level="surface", pixels="uniform")
+    pastures = fifesim.Study(CHIP.replace(cover="pastures"), {"visibility": {"uniform": [20, 60]}}, landscapes=3)
+    several = chips.assign_attrs(study=pastures.to_toml())
+    for options in ({"method": "optimal-estimation"}, {"pixels": "uniform"}):
+        with pytest.raises(ValueError, match=r"single stand|of one stand"):
+            fifesim.train(several, **options)
+
+
 def test_sl2p_maps_sentinel_2_reflectance(image):
     names = [f"MSI{name}" for name in ("3", "4", "5", "6", "7", "8A", "11", "12")]
     spectrum = [0.058, 0.0079, 0.0936, 0.2585, 0.2825, 0.3087, 0.1708, 0.0698]
@@ -179,6 +273,11 @@ def test_digital_numbers_and_unknown_levels_are_refused(chips, image):
     retrieval = fifesim.train(chips, "line")
     with pytest.raises(ValueError, match="digital numbers"):
         image["image"]["dn"].fifesim.retrieve(retrieval)
+    with pytest.raises(ValueError, match="digital numbers"):
+        image["image"]["dn"].drop_vars(["gain", "offset"]).fifesim.retrieve(retrieval)
+    # Numbers with a fraction cannot be told from reflectance.
+    light = image["image"]["dn"].fifesim.to_reflectance()
+    assert bool((light.copy(data=1e4 * light.data).fifesim.retrieve(retrieval).flag != 0).all())
     light = image["image"]["dn"].fifesim.to_reflectance()
     with pytest.raises(ValueError, match=r"among the levels of the training, 0\.5, 0\.8, 0\.95, got \[0\.9\]"):
         light.fifesim.retrieve(retrieval, intervals=[0.9])
@@ -193,8 +292,9 @@ def test_digital_numbers_and_unknown_levels_are_refused(chips, image):
         ({"quantities": "lia"}, "different names among lai, fpar, green_fpar"),
         ({"quantities": "green_fpar"}, "no green_fpar"),
         ({"levels": [0.5, 1.0]}, "between 0 and 1"),
+        ({"level": "boa"}, "level must be one of toa, surface|'surface'"),
+        ({"pixels": "mixed"}, "pixels must be one of chain, uniform|'uniform'"),
         ({"bands": "MSI2"}, "no band MSI2, they have MSI3, MSI4, MSI8"),
-        ({"level": "surface"}, "no surface_reflectance: add the corrected reflectance"),
         ({"method": "line", "bands": ["MSI3", "MSI4"]}, "needs a red and a near infrared band"),
     ],
 )
