@@ -15,7 +15,7 @@ import pandas as pd
 import xarray as xr
 
 import fifesim
-from fifesim.retrieval import training_chips
+from fifesim.retrieval import training
 
 TABLE = Path(__file__).with_name("intervals.csv")
 BANDS = {
@@ -59,18 +59,18 @@ def study(
 def learned(instrument, **options):
     """Chips of 100 landscapes for training."""
     split = {"train": 0.6, "validation": 0.3, "test": 0.1}
-    return training_chips.made(study(instrument, 100, split, 1, **options), 200)
+    return training.made(study(instrument, 100, split, 1, **options), 200)
 
 
 def unseen(instrument, seed, **options):
     """Chips of 40 other landscapes."""
-    return training_chips.made(study(instrument, 40, {"test": 1.0}, seed, **options), 120)
+    return training.made(study(instrument, 40, {"test": 1.0}, seed, **options), 120)
 
 
 def scored(retrieval, chips):
     """RMSE of LAI, width of the 95 % interval, coverage by level and its standard error, and the flagged share."""
     if retrieval.level == "surface":
-        chips = training_chips.with_surface_reflectance(chips, 1)
+        chips = training.with_surface_reflectance(chips, 1)
     light = (
         chips[f"{retrieval.level}_reflectance"]
         .transpose("chip", "y", "x", "band")

@@ -7,8 +7,15 @@ from scipy import stats
 
 from fifesim.analysis import regression
 from fifesim.analysis.indices import normalized_difference
-from fifesim.retrieval.forward import DIRECTIONS, DRAWN_STATES, axes_of, interpolated, simulated_tables
-from fifesim.retrieval.inversion import optimal_estimation, table_posterior
+from fifesim.retrieval.inversion import (
+    DRAWN_STATES,
+    TABLE_ANGLES,
+    axes_of,
+    interpolated,
+    optimal_estimation,
+    simulated_tables,
+    table_posterior,
+)
 from fifesim.retrieval.networks import Network, network, train_quantiles
 
 
@@ -229,7 +236,7 @@ def _parts(count):
 
 def _names(tables):
     """Names of the axes of the tables, in order."""
-    return [name for name in ("lai", *DRAWN_STATES, *DIRECTIONS) if f"axis_{name}" in tables]
+    return [name for name in ("lai", *DRAWN_STATES, *TABLE_ANGLES) if f"axis_{name}" in tables]
 
 
 def _axes(tables):
@@ -240,7 +247,7 @@ def _axes(tables):
 def _given(tables, angles):
     """Angles along axes of the tables, shape (n, axes)."""
     names = _names(tables)
-    return angles[:, [at for at, name in enumerate(DIRECTIONS) if name in names]]
+    return angles[:, [at for at, name in enumerate(TABLE_ANGLES) if name in names]]
 
 
 FITS = {"lookup": fit_lookup, "quantiles": fit_quantiles}

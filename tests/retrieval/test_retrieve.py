@@ -9,7 +9,7 @@ import xarray as xr
 
 import fifesim
 from fifesim.chain.driver import Driver
-from fifesim.retrieval import forward, labels, methods, training_chips
+from fifesim.retrieval import inversion, labels, methods, training
 from fifesim.retrieval.description import Retrieval
 from fifesim.scenario.ensemble import uniform_reflectance
 from fifesim.scenario.simulation import setup_of
@@ -30,7 +30,7 @@ STUDY = fifesim.Study(
 
 @pytest.fixture(scope="module")
 def chips():
-    return training_chips.made(STUDY, 96)
+    return training.made(STUDY, 96)
 
 
 @pytest.fixture(scope="module", params=["line", "lookup", "quantiles", "optimal-estimation"])
@@ -144,10 +144,10 @@ def test_lookup_knows_the_covariance_of_the_error_within_chips():
 def test_table_of_optimal_estimation_is_the_chain_and_its_derivatives(chips):
     """Against the chain at states between the nodes, and against central differences."""
     tables = fifesim.train(chips, "optimal-estimation", quantities=["lai", "fpar"]).tables
-    study = training_chips.study_of(chips, "test")
+    study = training.study_of(chips, "test")
     axes, rng = methods._axes(tables), np.random.default_rng(5)
     assert methods._names(tables) == ["lai", "soil", "log_aot"]
-    light, values = forward.simulated_tables(
+    light, values = inversion.simulated_tables(
         study,
         "toa",
         ("MSI4", "MSI8"),
@@ -156,8 +156,8 @@ def test_table_of_optimal_estimation_is_the_chain_and_its_derivatives(chips):
         (28.5, 0, 0),
     )
     states = axes[:, 0] + rng.uniform(0, 1, (20, 3)) * (axes[:, 1] - axes[:, 0])
-    found, slopes = forward.interpolated(light, axes, states, np.empty((20, 0)))
-    quantities, _ = forward.interpolated(values, axes, states, np.empty((20, 0)))
+    found, slopes = inversion.interpolated(light, axes, states, np.empty((20, 0)))
+    quantities, _ = inversion.interpolated(values, axes, states, np.empty((20, 0)))
     for state, spectrum, quantity in zip(states, found, quantities, strict=True):
         geometry = {"sza": 28.5, "saa": 0.0, "vza": 0.0, "vaa": 0.0}
         scenario = CHIP.replace(soil=state[1], visibility=None, aot=np.exp(state[2]), **geometry)
@@ -168,7 +168,7 @@ def test_table_of_optimal_estimation_is_the_chain_and_its_derivatives(chips):
     for at in range(3):
         step = np.zeros(3)
         step[at] = 1e-5
-        ends = [forward.interpolated(light, axes, states + side * step, np.empty((20, 0)))[0] for side in (1, -1)]
+        ends = [inversion.interpolated(light, axes, states + side * step, np.empty((20, 0)))[0] for side in (1, -1)]
         assert slopes[:, :, at] == pytest.approx((ends[0] - ends[1]) / 2e-5, abs=1e-7)
 
 
@@ -191,7 +191,7 @@ def test_diagnostics_of_optimal_estimation(chips, image, monkeypatch):
 
 def test_uniform_ground_is_each_canopy_and_is_corrected_exactly(chips):
     """SAIL of each pixel by another way than the table of leaf area, and the way back to the surface."""
-    scenario = next(training_chips._scenarios(chips, "test"))
+    scenario = next(training._scenarios(chips, "test"))
     lai = np.linspace(0.1, 3, 900).reshape(30, 30)
     toa = uniform_reflectance(scenario, {"lai": lai})
     setup = setup_of(scenario)
