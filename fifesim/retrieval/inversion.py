@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from fifesim.base.arrays import compiled
 from fifesim.chain.driver import Driver
 from fifesim.ground.canopy.properties import NUMERIC_PROPERTIES
 from fifesim.scenario.simulation import setup_of
-
-from fifesim.base.arrays import compiled
 
 # Members whose log-likelihood is lower than the best one by more than this have no effect on a quantile.
 _NEGLIGIBLE = 20.0
