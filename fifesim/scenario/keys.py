@@ -378,6 +378,8 @@ class CloudKeys(Section):
     base: float = number(1200.0, "m", "height of the base above the altitude of the atmosphere", ge=0, le=20_000)
     top: float = number(1800.0, "m", "height of the top", ge=0, le=20_000)
     seed: int = seed(7, "seed of the clouds; each date has an independent sky")
+    # The limit of the cloud mask of MODIS (Ackerman et al., 2008, doi:10.1175/2007JTECHA1053.1).
+    mask: float = number(0.4, "1", "optical thickness from which a budget leaves out clouds and shadows", gt=0, le=100)
 
     @model_validator(mode="after")
     def _base_below_top(self):

@@ -383,16 +383,21 @@ def with_clouds(toa, clouds, atmosphere, bands, geometry, *, elevation=None):
                 f"the clouds were cast with {name} {float(clouds[name]):g}, the reflectance has "
                 f"{getattr(geometry, name):g}: cast them again with cast_clouds"
             )
-    terms = engines.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
+    sky = cloud_tables(atmosphere, bands, geometry)
     columns = [clouds[name].drop_vars([*ANGLES, "earth_sun_distance"], errors="ignore") for name in COLUMNS]
-    sky = layer.sky_tables(
+    plain = toa.drop_vars(["band", *ANGLES], errors="ignore")
+    out = chunks.pointwise(layer.under_clouds, plain, *columns, bands=len(bands), sky=sky).astype(toa.dtype, copy=False)
+    out = toa.copy(deep=False, data=out.transpose(*toa.dims).data)
+    return cf.label(out, "toa_reflectance", source=toa, history="to_toa: with clouds")
+
+
+def cloud_tables(atmosphere, bands, geometry):
+    """Tables of `layer.under_clouds` for an atmosphere, bands and one direction of sun and sensor."""
+    terms = engines.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
+    return layer.sky_tables(
         [layer.band_co_albedo(band) for band in bands],
         terms.gas_transmittance * terms.path_reflectance,
         terms.diffuse_fraction,
         [coupling.band_gas_transmittance(atmosphere, band, geometry, ("o3",)) for band in bands],
         geometry.sza, geometry.vza, geometry.raa,
     )  # fmt: skip
-    plain = toa.drop_vars(["band", *ANGLES], errors="ignore")
-    out = chunks.pointwise(layer.under_clouds, plain, *columns, bands=len(bands), sky=sky).astype(toa.dtype, copy=False)
-    out = toa.copy(deep=False, data=out.transpose(*toa.dims).data)
-    return cf.label(out, "toa_reflectance", source=toa, history="to_toa: with clouds")

@@ -71,6 +71,8 @@ STAGE_WORDS = {
     "noise": "random errors of the detectors",
     "topography": "slopes face the sun or turn away from it",
     "atmosphere": "haze and gases reduce the contrast",
+    "clouds": "thin clouds pass the mask",
+    "shadows": "shadows of thin clouds pass the mask",
     "soil": "soil brightness varies",
     "dead leaves": "their fraction varies",
     "cover": "plants and background differ between fields",

@@ -31,7 +31,7 @@ MECHANISMS = {
     "iii. Regularization by the sensor": ("point spread",),
     "Registration of the pixels (not discussed in the paper)": ("registration",),
     "Digital numbers and noise": ("quantisation", "noise"),
-    "Terrain and atmosphere": ("topography", "atmosphere"),
+    "Terrain and atmosphere": ("topography", "atmosphere", "clouds", "shadows"),
     "Variation of ground properties other than leaf area": tuple(IDEAL_PROPERTIES),
 }
 

@@ -242,8 +242,10 @@ def budget_cases(scenario, *, realisations, cells, seed=None):
     for number in range(realisations):
         ground = land.model_copy(update={"seed": first + number})
         sensor = own.model_copy(update={"seed": own.seed + number})
+        clouds = scenario.clouds.model_copy(update={"seed": scenario.clouds.seed + number})
         window = grid_keys(windows[places[number % len(places)]])
-        found.append(scenario.model_copy(update={"grid": window, "ground": ground, "sensor": sensor}))
+        update = {"grid": window, "ground": ground, "clouds": clouds, "sensor": sensor}
+        found.append(scenario.model_copy(update=update))
     return found
 
 

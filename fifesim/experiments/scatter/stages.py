@@ -10,6 +10,8 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.analysis.index_labels import red_and_nir
 from fifesim.analysis.scaling_labels import aggregate_blocks
+from fifesim.atmosphere.clouds.labels import COLUMNS, cast_clouds, cloud_tables
+from fifesim.atmosphere.clouds.layer import under_clouds
 from fifesim.base.footprints import regularize
 from fifesim.base.line_spread import Boxcar
 from fifesim.chain.driver import Driver, cell_block_means, shared_operators, varying_parts
@@ -166,6 +168,8 @@ STAGES = {
     "noise": "none",
     "topography": "level ground",
     "atmosphere": "reflectance at the ground",
+    "clouds": "no clouds toward the sensor; in the budget, those thinner than the mask",
+    "shadows": "no clouds toward the sun or overhead; in the budget, those thinner than the mask",
 } | IDEAL_PROPERTIES
 # Ground properties that affect leaf area or absorbed light, in order.
 _TRUE = ("cover", "clumping", "covariance")
@@ -210,6 +214,8 @@ def working_stages(scenario):
         "registration": own.interval in ("product", size) and not any(own.offset),
         "noise": not own.noise,
         "topography": scenario.terrain.dem == "flat",
+        "clouds": scenario.clouds.cloud_cover == 0,
+        "shadows": scenario.clouds.cloud_cover == 0,
     }
     ideal |= {name: name not in varying_ground(scenario) for name in IDEAL_PROPERTIES}
     return tuple(stage for stage in STAGES if not ideal.get(stage, False))
@@ -243,7 +249,7 @@ def switches_of(stages):
 
 
 def images_of_all(scenes, switches):
-    """Images of scenes that differ in the offset for all states of their stages, each (13 axes of stages, y, x)."""
+    """Images of scenes that differ in the offset for all states of their stages, each (15 axes of stages, y, x)."""
     lit, images = [name for name in STAGES if name not in _SENSED], [[] for _ in scenes]
     for states in product(*(switches[0][name] for name in lit)):
         at_work = {name for name, state in zip(lit, states, strict=True) if state}
@@ -305,6 +311,17 @@ class _Scene:
         dem = beside_altitude(self.setup.dem, self.driver.air.altitude)
         return light_on_slopes(dem, as_carried(self.grid), self.setup.geometry, self.setup.horizon)
 
+    @cached_property
+    def columns(self):
+        """Clouds toward the sensor, the sun and the zenith of each cell, and their tables without path reflectance."""
+        own = self.driver
+        cells = grids.place(xr.DataArray(np.zeros(self.grid.shape), dims=("y", "x")), self.grid)
+        cast = cast_clouds(
+            cells, self.setup.clouds, dem=self.setup.dem, altitude=own.air.altitude, geometry=own.setup.geometry
+        )
+        responses = [band.response for band in own.bands]
+        return [cast[name].values for name in COLUMNS], cloud_tables(own.air, responses, own.setup.geometry)
+
     def is_stand(self, ground):
         """Whether only leaf area varies, so that plain arrays do."""
         return set(ground.land.data_vars) == {"lai"} and not varying_parts(self.driver.setup)
@@ -323,7 +340,7 @@ def scene_of(scenario, retrieval=None):
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
     # In memory, because every set of stages with topography needs them.
     dem, horizon = in_memory(*elevation(scenario, grid)[:2])
-    driver = Driver(replace(setup, bands=tuple(band.name for band in bands)))
+    driver = Driver(replace(setup, bands=tuple(band.name for band in bands), clouds=None))
     return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), driver, grid, blocks, image, retrieval)
 
 
@@ -397,7 +414,20 @@ def _cells(scene, ground, at_work):
     seen = ground.known[key]
     if "atmosphere" in at_work:
         seen = _with_adjacency(scene, seen) if setup.adjacency else driver.toa(seen)
+    if at_work & {"clouds", "shadows"}:
+        seen = _under_clouds(scene, seen, at_work)
     return seen if scene.retrieval is not None else np.concatenate([seen, driver.ndvi(seen)[None]])
+
+
+def _under_clouds(scene, clear, at_work):
+    """Reflectance with clouds or shadows thinner than the mask, NaN where they are thicker, shape (band, y, x)."""
+    (seen, *lit), tables = scene.columns
+    if "atmosphere" not in at_work:
+        tables = tables._replace(path=np.zeros_like(tables.path))
+    seen = seen if "clouds" in at_work else np.zeros_like(seen)
+    lit = lit if "shadows" in at_work else [np.zeros_like(seen)] * 2
+    found = under_clouds(np.moveaxis(clear, 0, -1), seen, *lit, sky=tables)
+    return np.where(np.maximum(seen, lit[0]) < scene.scenario.clouds.mask, found, np.nan)
 
 
 def _with_adjacency(scene, reflectance):

@@ -21,6 +21,7 @@ from fifesim.experiments.scatter.stages import (
     pixels,
     scene_of,
     spread_out,
+    working_stages,
 )
 from fifesim.grids import grid as grids
 from fifesim.scenario.scenario import Scenario
@@ -45,9 +46,9 @@ def test_all_stages_at_work_are_the_simulation(rough, scenario, clumped):
     case = scenario(crown_cover=0.6) if clumped else rough
     seen, run = pixels(case), fifesim.simulate(case)
     assert set(STAGES) - set(seen.stages) == (
-        set(IDEAL_PROPERTIES) - {"clumping"} | {"registration", "noise", "topography"}
+        set(IDEAL_PROPERTIES) - {"clumping"} | {"registration", "noise", "topography", "clouds", "shadows"}
         if clumped
-        else set(IDEAL_PROPERTIES)
+        else {"clouds", "shadows", *IDEAL_PROPERTIES}
     )
     at_work = (1,) * len(seen.stages)
     rows, columns = (min(run[name].sizes[axis] for name in ("truth", "image")) for axis in ("y", "x"))
@@ -209,3 +210,19 @@ def test_the_middle_cell_stands_for_its_block(land):
     assert found[0, 0] == -1 and set(found[:3, :3].ravel()) == {-1, 8}
     np.testing.assert_array_equal(found[3:6, 3:6], 32)
     np.testing.assert_array_equal(found[6], land.values[6])
+
+
+def test_clouds_thinner_than_the_mask_are_stages():
+    """Without clouds the stages are ideal; a mask that lets clouds pass gives them a share, and leaves fewer pixels."""
+    sky = {"cloud_cover": 0.5, "thickness": 1.0, "length": 300.0, "base": 300.0, "top": 300.0}
+    base = {"grid": {"width": 600, "height": 600, "cell": 10}, "terrain": {"dem": "flat"}}
+    clear = Scenario(**base)
+    assert not {"clouds", "shadows"} & set(working_stages(clear))
+    tight, loose = (Scenario(**base, clouds=sky | {"mask": mask}) for mask in (0.05, 100.0))
+    assert {"clouds", "shadows"} <= set(working_stages(tight))
+    few, all_, none = (pixels(each) for each in (tight, loose, clear))
+    assert few.ndvi.shape[-1] < all_.ndvi.shape[-1] == none.ndvi.shape[-1]
+    active = {stage.replace(" ", "_"): 1 for stage in none.stages}
+    np.testing.assert_array_equal(of(all_, **active), of(none, **active))
+    assert (of(all_, **active, clouds=1, shadows=1) < of(all_, **active) - 0.05).any()
+    assert (of(all_, **active, shadows=1) != of(all_, **active)).any()
