@@ -148,6 +148,43 @@ def directional_coupling(streams, tss, tsd, too, tdo, spherical_albedo, path_ref
     return gas_transmittance * (path_reflectance + once + again)
 
 
+def scale_of_ground(
+    toa_reflectance, streams, tss, tsd, too, tdo, spherical_albedo, path_reflectance=0.0, gas_transmittance=1.0
+):
+    r"""
+    Factor of a ground of known shape, from its reflectance at the top of the atmosphere.
+
+    .. math:: \rho^* / T_g - \rho_a = s X + s^2 \, \frac{S F B}{1 - s \, r_{aa} S}
+
+    Parameters
+    ----------
+    toa_reflectance : array
+        [1]
+    streams : GroundStreams
+        Of the ground with the factor 1. [1]
+    tss, tsd, too, tdo, spherical_albedo, path_reflectance, gas_transmittance : array
+        As in `directional_coupling`. [1]
+
+    Returns
+    -------
+    scale : array, shape of the broadcast inputs
+        :math:`s`, the inverse of `directional_coupling` for ground that is :math:`s` times as bright. [1]
+
+    Examples
+    --------
+    >>> streams, air = GroundStreams(*[0.25] * 9), (0.5, 0.25, 0.5, 0.25, 0.2, 0.1)
+    >>> brighter = GroundStreams(*[0.5] * 9)
+    >>> float(round(scale_of_ground(directional_coupling(brighter, *air), streams, *air), 12))
+    2.0
+    """
+    r, y = streams, toa_reflectance / gas_transmittance - path_reflectance
+    once = tss * (r.sun_view * too + r.sun_sky * tdo) + tsd * (r.sky_view * too + r.sky_sky * tdo)
+    fallen, back = tss * r.sun_air + tsd * r.sky_air, r.air_view * too + r.air_sky * tdo
+    kept = r.air_air * spherical_albedo
+    square, linear = spherical_albedo * fallen * back - kept * once, once + y * kept
+    return 2 * y / (linear + np.sqrt(linear**2 + 4 * square * y))
+
+
 def ground_streams(reflectance, sun_sky, view_sky, sza, vza, raa):
     r"""
     Mean reflectance factors of a ground over the sky of the sun and over the sky of a sun at the sensor.

@@ -13,6 +13,7 @@ from fifesim.atmosphere.skylight import (
     directional_coupling,
     four_stream_coupling,
     ground_streams,
+    scale_of_ground,
     weighted_sky,
 )
 from fifesim.base.caches import cached
@@ -147,20 +148,36 @@ def reflectance_streams(land, bands, canopies, light, skies, level):
 
 def coupled(coupling, streams, terms):
     """Reflectance at the top of the atmosphere of streams (list of arrays) below BandTerms that broadcast. [1]"""
-    tss, too, path, albedo, gas = (
-        getattr(terms, name)
-        for name in (
-            "direct_transmittance_down",
-            "direct_transmittance_up",
-            "path_reflectance",
-            "spherical_albedo",
-            "gas_transmittance",
-        )
-    )
-    through = tss, terms.transmittance_down - tss, too, terms.transmittance_up - too, albedo, path, gas
+    through = _through(terms)
     if coupling == "four-stream":
         return four_stream_coupling(*streams, *through)
     return directional_coupling(GroundStreams(*streams), *through)
+
+
+def _through(terms):
+    """Direct and diffuse transmittances, spherical albedo, path reflectance and gas transmittance of BandTerms. [1]"""
+    t, tss, too = terms, terms.direct_transmittance_down, terms.direct_transmittance_up
+    fluxes = tss, t.transmittance_down - tss, too, t.transmittance_up - too
+    return *fluxes, t.spherical_albedo, t.path_reflectance, t.gas_transmittance
+
+
+def surface_like(toa, like, atmosphere, bands, geometry):
+    """Surface reflectance factor of ground with the shape of a RossLi or RPV, dims (band, y, x). [1]"""
+    terms = band_terms_of(atmosphere, bands, geometry)
+    streams = surface_streams(like, "directional", atmosphere, bands, geometry)
+    share = terms.diffuse_fraction
+    factor = (1 - share) * streams[0] + share * streams[1]
+    by_band = [xr.Variable("band", each) for each in (factor, *streams, *_through(terms))]
+
+    def kernel(seen, factor, *values):
+        return factor * scale_of_ground(seen, GroundStreams(*values[:9]), *values[9:])
+
+    plain = toa.transpose("band", "y", "x").drop_vars("band", errors="ignore")
+    out = chunking.pointwise(kernel, plain, *by_band)
+    names = {"band": toa.coords["band"]} if "band" in toa.coords else {}
+    out = directions.with_geometry(grids.place(out, grids.geobox(toa), names), geometry)
+    text = f"to_surface: {atmosphere.engine}, shape of {type(like).__name__}, {atmosphere.text}"
+    return cf.label(out, "surface_reflectance", source=toa, history=text, atmosphere=atmosphere.text)
 
 
 def toa_of_streams(streams, coupling, atmosphere, bands, geometry):

@@ -584,6 +584,7 @@ def to_surface(
     elevation: xr.DataArray | None = None,
     adjacency: bool = False,
     surroundings: Surroundings | None = None,
+    like: RossLi | RPV | None = None,
 ) -> xr.DataArray:
     """
     Surface reflectance from reflectance at the top of the atmosphere; the inverse of `to_toa`.
@@ -599,6 +600,9 @@ def to_surface(
         wrong aerosol load. The given atmosphere is saved with the result.
     geometry, time, instrument, elevation, adjacency, surroundings : optional
         As in `to_toa`.
+    like : RossLi or RPV, optional
+        Directional shape of the ground. The result is the reflectance factor, under sun and sky, of this surface times
+        the factor that the image requires. By default the ground is Lambertian.
 
     Returns
     -------
@@ -628,6 +632,10 @@ def to_surface(
     air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time, assume=assume)
     if not assume:
         check_same_sun(air[-1], reflectance)
+    if like is not None:
+        if elevation is not None or adjacency:
+            raise ValueError("like= needs one altitude and no adjacency: leave out elevation and adjacency")
+        return _of(instrument, coupled_ground.surface_like(directions.dated(reflectance, time), like, *air))
     surface = atmosphere_labels.surface_from_toa(
         directions.dated(reflectance, time), *air,
         elevation=elevation, adjacency=adjacency, surroundings=surroundings,

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from lazy import no_compute
+from odc.geo.xr import wrap_xr
 
 import fifesim
 from fifesim.atmosphere.coupling import apparent_reflectance
@@ -89,6 +90,27 @@ def test_lambertian_kernels_have_the_equation_of_the_atmosphere(surface):
     for coupling in ("directional", "four-stream", "lambert"):
         toa = fifesim.to_toa(surface, HAZE, instrument="TM", geometry=SLANT, coupling=coupling)
         np.testing.assert_allclose(toa, apparent_reflectance(rho, **terms.uniform), rtol=1e-12)
+
+
+def test_to_surface_inverts_with_the_shape_of_the_ground():
+    """Every cell is a multiple of one RPV surface; its reflectance factor under sun and sky comes back."""
+    shape, factor = fifesim.RPV(0.1, 0.75, -0.1, 0.2), np.array([[0.5, 1.0], [2.0, 3.0]])
+    grid = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=20, height=20, cell=10)
+    given = {"instrument": "TM", "geometry": SLANT}
+    values = [[fifesim.to_toa(fifesim.RPV(0.1 * f, 0.75, -0.1, 0.2), HAZE, **given) for f in row] for row in factor]
+    data = np.moveaxis(np.array([[each.values for each in row] for row in values]), -1, 0)
+    one = xr.concat([wrap_xr(each, grid) for each in data], values[0][0]["band"])
+    image = one.assign_coords(wavelength=values[0][0]["wavelength"])
+    found = image.fifesim.to_surface(HAZE, like=shape, **given)
+    ratio = found.values / found.values[:, :1, 1:]
+    np.testing.assert_allclose(ratio, np.broadcast_to(factor, found.shape), rtol=1e-9)
+    direct = float(shape.reflectance(SLANT.sza, SLANT.vza, SLANT.raa))
+    assert float(found[3, 0, 1]) == pytest.approx(direct, rel=0.1)
+    lambertian = fifesim.RPV(0.2, 1.0, 0.0, 1.0)
+    even = image.fifesim.to_surface(HAZE, like=lambertian, **given)
+    np.testing.assert_allclose(even, image.fifesim.to_surface(HAZE, **given), rtol=1e-9)
+    with pytest.raises(ValueError, match="no adjacency"):
+        image.fifesim.to_surface(HAZE, like=shape, adjacency=True, **given)
 
 
 def test_refusals():
