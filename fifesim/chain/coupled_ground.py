@@ -24,6 +24,7 @@ from fifesim.grids import grid as grids
 from fifesim.grids.classes import by_class
 from fifesim.ground.canopy import interpolation
 from fifesim.ground.canopy.labels import checked_scene, uniform_kernel
+from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.canopy.reflectance_table import cell_canopy, decay
 from fifesim.ground.canopy.sail_model import Surface, over_background
 
@@ -224,7 +225,7 @@ def toa_of_canopy(canopy, coupling, atmosphere, bands, geometry):
 
 
 def _seen(lai, *, background, scene, skies, terms):
-    return interpolation.interpolate(_seen_table(background, scene, skies, terms), lai)
+    return interpolation.interpolate(_seen_table(background, scene, skies, terms), check_map(lai))
 
 
 @cached(16, "reflectance of canopies below skies")

@@ -120,6 +120,8 @@ def test_refusals():
         ground().fifesim.to_toa(coupling="directional")
     with pytest.raises(ValueError, match="adjacency needs coupling"):
         ground(LAI.chunk(y=31)).fifesim.to_toa(coupling="directional", adjacency=True)
+    with pytest.raises(ValueError, match="leaf area"):
+        ground((LAI - 5).chunk(y=31)).fifesim.to_toa(coupling="four-stream").compute()
     with pytest.raises(ValueError, match="brown"):
         ground(streams=True, canopy=GRASS.replace(brown=(0.1 + 0 * LAI).rename("brown")))
     with pytest.raises(ValueError, match="no geometry"):
