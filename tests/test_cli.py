@@ -343,7 +343,7 @@ def test_a_message_is_not_longer_than_a_person_reads(invoke, tmp_path):
     assert result.exit_code == 2 and len(result.stderr) <= 520
 
 
-@pytest.mark.parametrize("command", ["reproduce", "budget", "verify", "simulate"])
+@pytest.mark.parametrize("command", ["reproduce", "budget", "endtoend", "verify", "simulate"])
 def test_ctrl_c_is_a_line_and_code_130(invoke, tmp_path, monkeypatch, command):
     def pressed(*arguments, **options):
         raise KeyboardInterrupt
@@ -351,6 +351,7 @@ def test_ctrl_c_is_a_line_and_code_130(invoke, tmp_path, monkeypatch, command):
     for name in (
         "friedl1995.report.reproduce_to_folder",
         "scatter.report.budget_to_folder",
+        "scatter.endtoend.endtoend_to_folder",
         "verification.areas.deviations",
     ):
         monkeypatch.setattr(f"fifesim.experiments.{name}", pressed)
