@@ -258,3 +258,13 @@ def test_impossible_casts_are_refused(site, reflectance):
         reflectance.fifesim.to_toa(clouds=cells)
     with pytest.raises(ValueError, match="base is missing"):
         reflectance.fifesim.to_toa(clouds=sky.drop_vars("base"))
+
+
+def test_an_even_overcast_is_a_layer_above_a_reflector_and_a_shadow_keeps_the_skylight():
+    """By hand, with path reflectance and skylight: clouds alike in all directions dim everything below them alike."""
+    clear, path, diffuse, reflected, through, up, albedo = 0.3, 0.06, 0.2, 0.35, 0.6, 0.7, 0.4
+    found = clouded_reflectance(clear, path, diffuse, reflected, through, through, through, up, albedo)
+    assert found == pytest.approx(reflected + up * through * clear / (1 - clear * albedo), rel=1e-12)
+    # The sun is hidden and half of the skylight too; the air in the line of sight stays lit.
+    found = clouded_reflectance(clear, path, diffuse, 0.0, 1.0, 0.1, 0.5, 1.0, 0.0)
+    assert found == pytest.approx(path + (clear - path) * (0.8 * 0.1 + 0.2 * 0.5), rel=1e-12)
