@@ -130,7 +130,7 @@ def missing(area):
         ({"quantity": "gpp", "retrieval": "net"}, "retrieval must be 'line' or a fifesim.Retrieval"),
         ({"retrieval": "net"}, "only with a quantity"),
     ],
-    ids=str,
+    ids=["negative", "shape", "missing", "arguments", "name", "retrieval", "no quantity"],
 )
 def test_invalid_quantities_are_refused_by_name(options, message):
     with pytest.raises(ValueError, match=message):
