@@ -44,5 +44,6 @@ def utc(time, name="time"):
     if stamp is pd.NaT:
         raise ValueError(f"{name} must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}")
     if not _YEARS[0] <= stamp.year < _YEARS[1]:
-        raise ValueError(f"{name} must be in the years {_YEARS[0]} to {_YEARS[1]}, got {described(time)}")
+        allowed = f"{_YEARS[0]} to {_YEARS[1]}"
+        raise ValueError(f"{name} must be a date and time of the years {allowed}, got {described(time)}")
     return pd.DatetimeIndex([stamp.tz_localize("UTC") if stamp.tzinfo is None else stamp.tz_convert("UTC")])
