@@ -32,8 +32,10 @@ def case(why):
 
 
 def test_panels_and_rows_have_each_stage_once(why):
-    assert Counter(stage for stages in why.CAUSES.values() for stage in stages) == Counter(list(STAGES))
-    assert Counter(stage for stages in why.ROWS.values() for stage in stages) == Counter([*STAGES, "curvature"])
+    # The scene has no clouds.
+    stages = [stage for stage in STAGES if stage not in ("clouds", "shadows")]
+    assert Counter(stage for stages in why.CAUSES.values() for stage in stages) == Counter(stages)
+    assert Counter(stage for stages in why.ROWS.values() for stage in stages) == Counter([*stages, "curvature"])
 
 
 def test_panels_are_the_budget_of_their_scene(why, case):

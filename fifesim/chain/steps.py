@@ -58,7 +58,8 @@ GROUND = Kind(
 )
 # Streams of a surface reflectance.
 Streams: TypeAlias = Annotated[
-    bool | str, Kind("True, False or 'directional'", lambda value: value in (True, False, "directional"))
+    bool | Literal["directional"],
+    Kind("True, False or 'directional'", lambda value: isinstance(value, bool) or str(value) == "directional"),
 ]
 
 _default_atmosphere = cached(1, "default atmosphere")(Atmosphere)

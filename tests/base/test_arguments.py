@@ -60,7 +60,8 @@ ACCEPTED = {
     # Descriptions without a grid check rasters and spectra when they are used: see the test of fields of a canopy.
     **{("Canopy", name): {"list", "str", "dataset", "numpy", "1-d", "crs"} for name in PROPERTIES},
     # Setup is a description without a raster, and the steps check names of bands, instruments and noise.
-    ("Setup", "instrument"): {"str"}, ("Setup", "dem"): {"crs"}, ("Setup", "surroundings"): ARRAYS - {"empty"},
+    ("Setup", "instrument"): {"str"}, ("Setup", "dem"): {"crs"},
+    ("Setup", "clouds"): {"dataset"}, ("Setup", "surroundings"): ARRAYS - {"empty"},
     **{("Setup", name): {"list", "str"} for name in ("bands", "noise", "interval", "offset")},
     **{("Weather", each.name): {"crs"} for each in fields(fifesim.Weather)},
     **{("RPV", name): ARRAYS for name in ("rho0", "k", "theta", "rhoc")},
