@@ -276,9 +276,11 @@ def check_surface(surface, largest_zenith=75.0):
     sun, view, azimuth = np.arange(0.0, largest_zenith + 1, 5.0), np.degrees(np.arccos(mu)), np.arange(5.0, 180, 10)
     seen = sun[:, None, None], np.append(sun, view)[:, None], azimuth
     values = np.stack([each.reflectance(*seen) for each in surfaces_by_band(surface)])
+    if not np.isfinite(values).all():
+        raise ValueError(f"{surface!r} has a reflectance that is not finite: check its parameters for NaN")
     within = values[:, :, : sun.size]
-    if not within.min() >= 0:
-        _, s, v, a = np.unravel_index(np.nanargmin(within), within.shape)
+    if within.min() < 0:
+        _, s, v, a = np.unravel_index(within.argmin(), within.shape)
         raise ValueError(
             f"{surface!r} reflects {within[:, s, v, a].min():.3g} at sza {sun[s]:g}, vza {sun[v]:g} and raa "
             f"{azimuth[a]:g}: reflectance must not be negative; check the order of the weights"
@@ -296,6 +298,8 @@ def surfaces_by_band(surface, bands=None):
     """Surfaces with a number for each parameter, one for each band, or one if all bands are alike."""
     names = [each.name for each in fields(surface)]
     values = {name: np.atleast_1d(np.asarray(getattr(surface, name), float)) for name in names}
+    if rasters := [name for name, each in values.items() if each.ndim > 1]:
+        raise ValueError(f"{', '.join(rasters)} is a raster, a number or one for each band is needed here")
     count = max(each.size for each in values.values()) if bands is None else bands
     for name, each in values.items():
         if each.shape not in ((1,), (count,)):

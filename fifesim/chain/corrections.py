@@ -170,6 +170,8 @@ def _corrected(image, method, slopes, sza, c, k):
 
 def _with_bands(image):
     """Image with dims (band, y, x)."""
+    if "stream" in image.dims:
+        raise ValueError("reflectance has a dimension stream: call surface_reflectance without streams=")
     if "band" not in image.dims:
         raise ValueError("reflectance has no dimension band: type .expand_dims('band')")
     return image.transpose("band", "y", "x")
@@ -178,10 +180,16 @@ def _with_bands(image):
 def _per_band(given, image, name):
     """Numbers of the bands of an image, shape (band,)."""
     names = image["band"].values.tolist() if "band" in image.coords else []
-    values = [given[each] for each in names] if isinstance(given, Mapping) else np.atleast_1d(np.asarray(given, float))
+    if isinstance(given, Mapping):
+        if missing := [each for each in names if each not in given]:
+            raise ValueError(f"{name} has no number for {', '.join(missing)}: give one for each band")
+        given = [given[each] for each in names]
+    values = np.atleast_1d(np.asarray(given, float))
+    if values.ndim > 1:
+        raise ValueError(f"{name} must be a number, or one for each band, got shape {values.shape}")
     if len(values) not in (1, image.sizes["band"]):
         raise ValueError(f"{name} must be a number, or one for each of {image.sizes['band']} bands, got {len(values)}")
-    return np.broadcast_to(np.asarray(values, float), image.sizes["band"])
+    return np.broadcast_to(values, image.sizes["band"])
 
 
 def _over_kt(image, light, upwelling):

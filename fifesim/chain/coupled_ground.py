@@ -22,6 +22,7 @@ from fifesim.grids import cf, directions
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.classes import by_class
+from fifesim.grids.inputs import check_reflectance
 from fifesim.ground.canopy import interpolation
 from fifesim.ground.canopy.labels import checked_scene, uniform_kernel
 from fifesim.ground.canopy.leaf_area import check_map
@@ -168,6 +169,8 @@ def surface_like(toa, like, atmosphere, bands, geometry):
     streams = surface_streams(like, "directional", atmosphere, bands, geometry)
     share = terms.diffuse_fraction
     factor = (1 - share) * streams[0] + share * streams[1]
+    if not (factor > 0).all():
+        raise ValueError(f"{like!r} reflects {factor.min():g} in a band, which has no shape: it must be above 0")
     by_band = [xr.Variable("band", each) for each in (factor, *streams, *_through(terms))]
 
     def kernel(seen, factor, *values):
@@ -201,7 +204,7 @@ def toa_of_streams(streams, coupling, atmosphere, bands, geometry):
     count = len(plain)
 
     def kernel(*values):
-        return coupled(coupling, values[:count], type(terms)(*values[count:]))
+        return coupled(coupling, [check_reflectance(each) for each in values[:count]], type(terms)(*values[count:]))
 
     out = chunking.pointwise(kernel, *plain, *by_band)
     names = {"band": streams.coords["band"]} if "band" in streams.coords else {}

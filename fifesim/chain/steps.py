@@ -26,7 +26,7 @@ from fifesim.grids.dates import by_date
 from fifesim.grids.directions import Directions
 from fifesim.grids.grid import north_up
 from fifesim.grids.inputs import Horizon, RasterOrDataset, incoming
-from fifesim.grids.sites import check_same_sun, is_fife
+from fifesim.grids.sites import check_same_angles, is_fife
 from fifesim.ground.canopy import labels as canopy_labels
 from fifesim.ground.canopy import optics_labels
 from fifesim.ground.canopy.description import TALLGRASS, Canopy
@@ -505,8 +505,8 @@ def to_toa(
     Raises
     ------
     ValueError
-        If the array was made for another atmosphere, units, bands or angles are invalid, the position of the sun is
-        unknown, or values are outside the range of reflectance.
+        If the array was made for another atmosphere, streams were made for other zenith angles, units, bands or
+        angles are invalid, the position of the sun is unknown, or values are outside the range of reflectance.
 
     Notes
     -----
@@ -535,23 +535,29 @@ def to_toa(
     >>> (toa - rho).mean(["y", "x"]).round(3).values
     array([ 0.01, -0.03])
     """
+    if coupling not in (None, "lambert", *coupled_ground.STREAMS_OF):
+        raise ValueError(f"coupling must be 'directional', 'four-stream' or 'lambert', got {coupling!r}")
+    given = {"elevation": elevation, "adjacency": adjacency or None, "surroundings": surroundings, "clouds": clouds}
     if isinstance(reflectance, RossLi | RPV):
+        if others := [name for name, each in (given | {"time": time}).items() if each is not None]:
+            raise ValueError(f"{', '.join(others)} needs a raster, got a {type(reflectance).__name__}: leave it out")
         return _toa_of_surface(reflectance, coupling or "directional", atmosphere, geometry, instrument)
     streams = isinstance(reflectance, xr.DataArray) and "stream" in reflectance.dims
-    if streams or coupling in ("directional", "four-stream"):
-        given = {"elevation": elevation, "adjacency": adjacency or None, "clouds": clouds}
-        if others := [name for name, each in given.items() if each is not None]:
-            raise ValueError(f"{', '.join(others)} needs coupling='lambert' and one reflectance factor: leave it out")
-    if streams:
-        air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
-        return _of(instrument, coupled_ground.toa_of_streams(reflectance, coupling, *air))
-    reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
+    by_direction = streams or coupling in coupled_ground.STREAMS_OF
+    if by_direction and (others := [name for name, each in given.items() if each is not None]):
+        raise ValueError(f"{', '.join(others)} needs coupling='lambert' and one reflectance factor: leave it out")
+    if not streams:
+        reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
     air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
+    if by_direction:
+        check_same_angles(air[-1], reflectance, "sza", "vza")
+    if streams:
+        return _of(instrument, coupled_ground.toa_of_streams(reflectance, coupling, *air))
     toa = atmosphere_labels.toa_from_surface(
         directions.dated(reflectance, time), *air, elevation=elevation, adjacency=adjacency, surroundings=surroundings,
         made=seen_through_air(reflectance, coupling or "lambert", *air),
     )  # fmt: skip
-    if coupling in ("directional", "four-stream"):
+    if by_direction:
         toa.attrs["history"] += f", {coupling} coupling"
     if clouds is not None:
         toa = with_clouds(toa, clouds, *air, elevation=elevation)
@@ -632,10 +638,12 @@ def to_surface(
     reflectance = as_bands_of(planetary_reflectance(reflectance), instrument, "toa_reflectance")
     air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time, assume=assume)
     if not assume:
-        check_same_sun(air[-1], reflectance)
+        check_same_angles(air[-1], reflectance, "sza")
     if like is not None:
-        if elevation is not None or adjacency:
-            raise ValueError("like= needs one altitude and no adjacency: leave out elevation and adjacency")
+        if elevation is not None or adjacency or surroundings is not None:
+            raise ValueError(
+                "like= needs one altitude and no adjacency: leave out elevation, adjacency and surroundings"
+            )
         return _of(instrument, coupled_ground.surface_like(directions.dated(reflectance, time), like, *air))
     surface = atmosphere_labels.surface_from_toa(
         directions.dated(reflectance, time), *air,

@@ -170,13 +170,16 @@ def one_or_several(time):
     return values
 
 
-def check_same_sun(geometry, array):
-    """Raise ValueError for a solar zenith angle that differs from the one with which fifesim made a raster."""
-    if geometry is None or "atmosphere" not in array.attrs or "sza" not in array.coords:
+def check_same_angles(geometry, array, *names):
+    """Raise ValueError for a zenith angle, sza or vza, that differs from the one with which fifesim made a raster."""
+    if geometry is None or "atmosphere" not in array.attrs:
         return
-    carried, given = array["sza"], geometry.sza
-    if carried.ndim == 0 and np.ndim(given) == 0 and abs(float(carried) - float(given)) > 0.01:
-        raise ValueError(
-            f"{array.name or 'the raster'} was made for sza={float(carried):.2f}, got geometry with "
-            f"sza={float(given):.2f}: leave geometry out, or drop the coordinate with .drop_vars('sza')"
-        )
+    for name in names:
+        if name not in array.coords:
+            continue
+        carried, given = array[name], getattr(geometry, name)
+        if carried.ndim == 0 and np.ndim(given) == 0 and abs(float(carried) - float(given)) > 0.01:
+            raise ValueError(
+                f"{array.name or 'the raster'} was made for {name}={float(carried):.2f}, got geometry with "
+                f"{name}={float(given):.2f}: leave geometry out, or drop the coordinate with .drop_vars('{name}')"
+            )

@@ -19,7 +19,7 @@ from fifesim.grids import grid as grids
 from fifesim.grids.dates import by_date, epoch
 from fifesim.grids.directions import Directions
 from fifesim.grids.inputs import HIGHEST, LOWEST, SAMPLED_ROWS, Image, RasterOrDataset, incoming
-from fifesim.grids.sites import check_same_sun
+from fifesim.grids.sites import check_same_angles
 from fifesim.grids.windows import held
 from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import noise_of
@@ -259,7 +259,7 @@ def sensed(
     # A radiance is recorded whatever the sun.
     needed = not is_radiance(toa) or scaling == "product"
     geometry = (directions.given_geometry if needed else directions.known_geometry)(geometry, toa, time)
-    check_same_sun(geometry, toa)
+    check_same_angles(geometry, toa, "sza")
     toa = directions.dated(toa, time)
     groups = bands_by_grid(description, bands, onto, interval)
 

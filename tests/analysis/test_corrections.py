@@ -118,6 +118,12 @@ def test_refusals_name_the_direction():
     check_surface(fifesim.RossLi([0.1, 0.3], 0.05, 0.01))
     with pytest.raises(ValueError, match="c must be a number"):
         scene(DEM).fifesim.topographic_correction(DEM, "c", c=[0.1, 0.2, 0.3])
+    with pytest.raises(ValueError, match=f"k has no number for {BANDS[1]}"):
+        scene(DEM).fifesim.topographic_correction(DEM, "minnaert", k={BANDS[0]: 0.5})
+    with pytest.raises(ValueError, match="iso must be a number, or one for each band"):
+        scene().fifesim.brdf_normalise(fifesim.RossLi(scene(), 0.0, 0.0))
+    with pytest.raises(ValueError, match="dimension stream"):
+        scene().expand_dims(stream=2).fifesim.brdf_normalise(fifesim.RossLi(0.3, 0.0, 0.0))
     with pytest.warns(UserWarning, match="75 degrees"):
         far = fifesim.Geometry(sza=40.0, saa=120.0, vza=80.0, vaa=300.0)
         scene().fifesim.brdf_normalise(fifesim.RossLi(0.3, 0.1, 0.01), geometry=far)

@@ -128,3 +128,43 @@ def test_refusals():
         fifesim.to_toa(fifesim.RPV(0.1, 0.8, -0.1, 0.1), HAZE, instrument="TM")
     with pytest.raises(ValueError, match="reflectance must not be negative"):
         fifesim.to_toa(fifesim.RossLi(0.05, 0.19, 0.06), HAZE, instrument="TM", geometry=SLANT)
+    with pytest.raises(ValueError, match="of the sunlight"):
+        fifesim.to_toa(fifesim.RossLi(20, 10, 3), HAZE, instrument="TM", geometry=SLANT)
+    with pytest.raises(ValueError, match="not finite"):
+        fifesim.to_toa(fifesim.RossLi([0.2, np.nan, 0.2, 0.2, 0.2, 0.2], 0, 0), HAZE, instrument="TM", geometry=SLANT)
+    with pytest.raises(ValueError, match="iso is a raster"):
+        fifesim.to_toa(fifesim.RossLi(0.1 + 0 * LAI, 0, 0), HAZE, instrument="TM", geometry=SLANT)
+    with pytest.raises(ValueError, match="no shape"):
+        ground().fifesim.to_toa().fifesim.to_surface(like=fifesim.RossLi(0, 0, 0))
+    with pytest.raises(ValueError, match="and surroundings"):
+        ground().fifesim.to_toa().fifesim.to_surface(like=fifesim.RossLi(0.2, 0, 0), surroundings=0.2)
+
+
+@pytest.mark.parametrize("make", [ground, lambda: ground(LAI.chunk(y=31)), lambda: fifesim.RossLi(0.2, 0.1, 0.03)])
+def test_a_wrong_coupling_is_refused(make):
+    with pytest.raises(ValueError, match="coupling must be 'directional', 'four-stream' or 'lambert'"):
+        fifesim.to_toa(make(), HAZE, instrument="TM", geometry=SLANT, coupling="directionl")
+
+
+@pytest.mark.parametrize(
+    "option", [{"elevation": LAI}, {"adjacency": True}, {"surroundings": 0.2}, {"time": "1987-07-01T17:00"}]
+)
+def test_a_surface_takes_no_options_of_rasters(option):
+    (name,) = option
+    with pytest.raises(ValueError, match=f"{name} needs a raster"):
+        fifesim.to_toa(fifesim.RossLi(0.2, 0.1, 0.03), HAZE, instrument="TM", geometry=SLANT, **option)
+
+
+def test_streams_of_other_directions_or_beyond_reflectance_are_refused():
+    streams = ground(streams=True)
+    lazy = ground(LAI.chunk(y=31))
+    for name in ("sza", "vza"):
+        other = fifesim.Geometry(**{"sza": 50.0, "saa": 120.0, "vza": 30.0, "vaa": 160.0, name: 10.0})
+        with pytest.raises(ValueError, match=f"made for {name}="):
+            streams.fifesim.to_toa(geometry=other)
+        with pytest.raises(ValueError, match=f"made for {name}="):
+            lazy.fifesim.to_toa(geometry=other, coupling="directional")
+    with pytest.raises(ValueError, match=r"-0\.5 to 5 is allowed"):
+        (streams - 1).assign_attrs(streams.attrs).fifesim.to_toa()
+    with pytest.raises(ValueError, match="surroundings needs coupling"):
+        streams.fifesim.to_toa(surroundings=0.2)
