@@ -19,6 +19,7 @@ from .grids.sites import sun_position as sun_position
 # Ground
 from .ground.landscape.lai_labels import lai_scene as lai_scene
 from .ground.landscape.lai_labels import open_lai as open_lai
+from .ground.landscape.lai_labels import phenology as phenology
 from .ground.landscape.field_labels import correlated_fields as correlated_fields
 from .ground.landscape.downscaling_labels import downscale as downscale  # method
 from .ground.landscape.distribution import lai_distribution as lai_distribution
@@ -26,7 +27,6 @@ from .ground.landscape.distribution import treatments as treatments
 from .ground.landscape.autoregression import correlation_length as correlation_length
 from .ground.landscape.autoregression import arp_for_length as arp_for_length
 from .ground.landscape.labels import landscape as landscape
-from .ground.landscape.season_labels import phenology as phenology
 from .ground.landscape.cover import Patches as Patches
 from .ground.landscape.classes import CoverClass as CoverClass
 from .ground.landscape.classes import fife_classes as fife_classes

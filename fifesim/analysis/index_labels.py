@@ -202,7 +202,7 @@ def _index(images):
 
 
 def _nearness(images):
-    """View zenith angle with a negative sign, NaN where a date has no data, dims (time, y, x). [degree]"""
+    """Absolute view zenith angle with a negative sign, NaN where a date has no data, dims (time, y, x). [degree]"""
     if "vza" not in images.coords or "time" not in images["vza"].dims:
         raise ValueError(
             "nadir-most needs the view of each date: assign a coordinate vza [degree] along time, such as "
@@ -210,7 +210,7 @@ def _nearness(images):
         )
     plain = images.drop_vars(list(images.coords))
     known = plain.notnull().any("band") if "band" in images.dims else plain.notnull()
-    return xr.DataArray(-images["vza"].variable.to_base_variable()).where(known).transpose("time", "y", "x")
+    return xr.DataArray(-abs(images["vza"].variable.to_base_variable())).where(known).transpose("time", "y", "x")
 
 
 def _checked(by, images, name="by"):

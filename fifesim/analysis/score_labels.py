@@ -51,8 +51,8 @@ def score(
         A map; or a Dataset with a variable named like the truth and any of: ``sd``, its standard deviation; ``low`` and
         ``high``, the ends of central intervals, with a dimension or coordinate ``level``. The name of the variable may
         come first, as in ``lai_sd``. An ensemble has a dimension ``member``. Mask pixels that must not count, for
-        instance with ``estimate.where(estimate.flag == 0)``. A raster of bool is a mask, such as of clouds; its truth
-        is a mask or the share of each pixel.
+        instance with ``estimate.where(estimate.flag == 0)``. A raster of bool is a mask, for instance of clouds; its
+        truth is the share of each pixel, 0 to 1.
     truth : xarray.DataArray, dims (y, x), or any that the estimate has
         In the unit of the estimate.
     by : xarray.DataArray or sequence of float, optional

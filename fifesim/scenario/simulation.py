@@ -9,7 +9,7 @@ import xarray as xr
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
-from fifesim.atmosphere.clouds.labels import cast_clouds, cloud_field
+from fifesim.atmosphere.clouds.labels import DEEPEST_GROUND, cast_clouds, cloud_field
 from fifesim.base.annotations import Chunks
 from fifesim.chain.comparison import shows_ndvi
 from fifesim.chain.landscapes import aggregate
@@ -75,9 +75,9 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
         reflectance = level
     else:
         kt, reflectance = kt_and_reflectance(level, dem, horizon, setup.upwelling)
-        dem, slope = cut(dem, grid), cut(terrain_labels.slope(dem), grid)
-        nodes["scene"]["dem"] = dem
-        nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt.isel(inside))}
+        own, slope = cut(dem, grid), cut(terrain_labels.slope(dem), grid)
+        nodes["scene"]["dem"] = own
+        nodes["terrain"] = {"dem": means(own), "slope": means(slope), "kt": means(kt.isel(inside))}
         nodes["level"] = {"dn": image_of(setup, level)}
     nodes["scene"]["surface_reflectance"] = reflectance.isel(inside)
     if setup.clouds is not None:
@@ -96,7 +96,8 @@ def clouds_of(scenario, grid, chunks="auto"):
     own, geometry = scenario.clouds, scenario.sun_and_view()
     if own.cloud_cover == 0:
         return None
-    reach = own.top * (np.tan(np.radians(geometry.sza)) + np.tan(np.radians(geometry.vza)))
+    deepest = 0.0 if scenario.terrain.dem == "flat" else DEEPEST_GROUND
+    reach = (own.top + deepest) * (np.tan(np.radians(geometry.sza)) + np.tan(np.radians(geometry.vza)))
     return cloud_field(
         grid,
         own.cloud_cover,

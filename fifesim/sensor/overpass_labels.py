@@ -52,7 +52,8 @@ def overpasses(
     Raises
     ------
     ValueError
-        If the orbit of the instrument is unknown, the end is before the start, or the place is invalid.
+        If the orbit of the instrument is unknown, the end is before the start, the place or the phase is invalid, or
+        there is no pass by day.
 
     Notes
     -----
@@ -94,21 +95,27 @@ def overpasses(
         row["inclination"],
         description.altitude,
     )
+    if not np.isfinite(phase):
+        raise ValueError(f"phase must be a finite number of days, got {phase:g}")
     # Phases count from 1970, so that parts of a period have the dates of the whole.
     origin = _EPOCH + pd.Timedelta(days=phase)
     since, until = ((each - origin).total_seconds() for each in (first, last))
     seconds, vza, vaa, ascending = passes(orbit, since, until, latitude, longitude, description.max_angle)
+    nothing = (
+        f"{description.name} has no pass by day over {latitude:g}, {longitude:g} in this period: choose a longer one"
+    )
     if not len(seconds):
-        raise ValueError(
-            f"{description.name} does not pass over {latitude:g}, {longitude:g} then: choose a longer period"
-        )
+        raise ValueError(nothing)
     times = (origin + pd.to_timedelta(seconds, unit="s")).round("s").tz_localize(None)
     sun = sun_position(list(times), latitude, longitude)
     view = {"vza": vza, "vaa": vaa}
     out = sun.assign({name: ("time", each, cf.attributes(name)) for name, each in view.items()})
     out = out.assign(ascending=("time", ascending, {"long_name": "whether the satellite flies north"}))
     out.attrs = {"instrument": description.name, "altitude": description.altitude}
-    return out.isel(time=np.flatnonzero(out["sza"].values < 85))
+    by_day = np.flatnonzero(out["sza"].values < 85)
+    if not by_day.size:
+        raise ValueError(nothing)
+    return out.isel(time=by_day)
 
 
 def to_gac(swath: Annotated[xr.DataArray, Kind("a swath of AVHRR, from sense_swath", dimensions=0)]) -> xr.DataArray:

@@ -265,5 +265,8 @@ def test_composites_select_by_median_view_or_clear_dates(lai, lazy):
     np.testing.assert_array_equal(
         nearest.vza.values[some], np.where(np.isnan(seen), 99, vza[:, None, None]).min(axis=0)[some]
     )
+    # Views from the other side of the track are as far from nadir.
+    signed = ndvi.assign_coords(vza=-ndvi.vza)
+    np.testing.assert_array_equal(signed.fifesim.composite("nadir-most", clear=clear).values, nearest.values)
     mean = ndvi.fifesim.composite("mean-of-clear", clear=clear)
     np.testing.assert_array_equal(mean.dates.values, np.isfinite(seen).sum(axis=0))

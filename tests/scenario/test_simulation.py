@@ -323,6 +323,14 @@ def test_clouds_of_a_scenario_are_those_of_its_key_and_the_truth_is_their_share(
         fifesim.Scenario(clouds={"cloud_cover": 0.1, "base": 2000, "top": 1000})
 
 
+def test_a_complete_image_over_relief_with_clouds_has_no_missing_edge():
+    """The elevation around the scene carries the clouds there."""
+    sky = {"cloud_cover": 0.5, "length": "800 m", "base": 900.0, "top": 900.0, "seed": 4}
+    run = fifesim.simulate(fifesim.Scenario(grid={"width": 900, "height": 900, "cell": 15}, clouds=sky), complete=True)
+    assert run["scene"]["dem"].shape == (60, 60)
+    assert run["image"]["ndvi"].notnull().all()
+
+
 def test_sensors_see_the_same_sky():
     """0.2 points of the cloud fraction: pixels of MSI, TM, OLI, MODIS and AVHRR, each aggregated to about 1 km."""
     grid = fifesim.fife_site(10, window=((0, 800), (0, 800)))

@@ -73,6 +73,10 @@ def test_impossible_overpasses_are_refused():
         days("TM", "1987-07-19", "1987-05-01")
     with pytest.raises(ValueError, match="place must be latitude, from -85 to 85"):
         days("TM", "1987-05-01", "1987-07-19", (-96.54, 39.06))
+    with pytest.raises(ValueError, match="phase must be a finite number of days, got nan"):
+        days("TM", "1987-05-01", "1987-07-19", phase=np.nan)
+    with pytest.raises(ValueError, match="MODIS has no pass by day over 80, 10 in this period"):
+        days("MODIS", "1987-12-01", "1987-12-20", (80.0, 10.0))
 
 
 def test_global_area_coverage_is_the_mean_of_four_of_five_samples_in_every_third_line():

@@ -116,7 +116,7 @@ def _quantiles(clouds):
     """Threshold of the field, and its quantiles within clouds with their normal scores."""
     place = (2 * np.arange(_SAMPLES) + 1) * (PERIOD // (2 * _SAMPLES))
     sample = np.sort(_normal_field(clouds, place, place), axis=None)
-    first = round((1 - clouds.cover) * sample.size)
+    first = min(round((1 - clouds.cover) * sample.size), sample.size - 1)
     rank = (np.arange(_RANKS) + 0.5) / _RANKS
     threshold = sample[first - 1] if first else -np.inf
     return threshold, np.quantile(sample[first:], rank), special.ndtri(rank)

@@ -11,7 +11,7 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere import coupling, engines
 from fifesim.atmosphere.clouds import layer
-from fifesim.atmosphere.clouds.field import LONGEST, SHORTEST, CloudCover, cloud_displacement, cloud_thickness
+from fifesim.atmosphere.clouds.field import LONGEST, PERIOD, SHORTEST, CloudCover, cloud_displacement, cloud_thickness
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.annotations import Chunks, Pair, Time, Times, WholeNumber
 from fifesim.base.arguments import Kind
@@ -29,7 +29,7 @@ from fifesim.grids.sites import one_or_several
 HIGHEST_CLOUD = 20_000.0  # of clouds [m]
 LOWEST_SUN = 85.0  # zenith angle beyond which shadows have no end [degree]
 LEAST = 0.1  # optical thickness from which a cell counts as cloud; sensors miss thinner clouds [1]
-_DEEPEST = 500.0  # ground below the altitude of the atmosphere that the margin of relief allows for [m]
+DEEPEST_GROUND = 500.0  # ground below the altitude of the atmosphere that the margin of relief allows for [m]
 _TILE = 1008
 
 COLUMNS = ("optical_thickness", "shadow_thickness", "overhead_thickness")
@@ -91,7 +91,7 @@ def cloud_field(
     Raises
     ------
     ValueError
-        If cover, thickness, length, height or seed is out of range, or the base is above the top.
+        If cover, thickness, length, height, drift, time or seed is out of range, or the base is above the top.
 
     References
     ----------
@@ -127,10 +127,12 @@ def cloud_field(
             f"thickness must be a mean from 0 to {layer.THICKEST:g} and a standard deviation above 0, got {thickness}"
         )
     day, seconds = _day_and_seconds(time)
+    if np.shape(drift) != (2,) or not np.all(np.isfinite(drift)):
+        raise ValueError(f"drift must be two speeds, eastward and northward, such as (5.0, 0.0), got {drift}")
     sky = CloudCover(float(cover), (mean, deviation), float(length), check_seed(seed), day)
     around = [int(np.ceil(margin / size - 1e-9)) for size in grids.cell_size(grid)]
     grid = grids.on_lattice(grid.pad(around[1], around[0]))
-    moved = [round(float(speed) * seconds * 1000) for speed in drift]
+    moved = [round(float(speed) * seconds * 1000) % PERIOD for speed in drift]
     northing, easting = (np.round(each * 1000).astype(np.int64) for each in grids.centres_of(grid))
     kernel = partial(_cells, sky, northing, easting, moved)
     cells = windows.tiles(kernel, grid, chunks, tile=_TILE)
@@ -150,7 +152,10 @@ def _cells(sky, northing, easting, moved, row, column, shape):
 def _day_and_seconds(time):
     """Number of the date and seconds from its midnight in UTC; seconds alone belong to day 0."""
     if time is None or isinstance(time, int | float | np.number):
-        return 0, float(time or 0)
+        seconds = float(time or 0)
+        if not np.isfinite(seconds):
+            raise ValueError(f"time must be a finite number of seconds, got {seconds:g}")
+        return 0, seconds
     stamp = utc(time)[0]
     return stamp.normalize().toordinal(), (stamp - stamp.normalize()).total_seconds()
 
@@ -192,8 +197,8 @@ def cast_clouds(
     scene : xarray.DataArray, dims (..., y, x)
         Raster on the cells of the ground, such as leaf area or reflectance.
     clouds : xarray.Dataset, dims (y, x)
-        ``optical_thickness`` [1] of clouds, without NaN beyond the known area, and the numbers ``base`` and ``top``
-        [m], from `cloud_field` or other sources. Its grid has the cells of the scene and may be larger.
+        ``optical_thickness`` [1] of clouds, 0 without clouds and NaN where unknown, and the numbers ``base`` and
+        ``top`` [m], from `cloud_field` or other sources. Its grid has the cells of the scene and may be larger.
     dem : xarray.DataArray, dims (y, x), optional
         Elevation, onto which images and shadows of the clouds fall; by default the ground is level. [m]
     altitude : float, optional
@@ -202,7 +207,7 @@ def cast_clouds(
     geometry, time : optional
         Directions of sun and sensor, as in `to_toa`; one direction for the scene.
     least : float, optional
-        Optical thickness from which a cell counts as cloud or shadow. [1]
+        Optical thickness from which a cell counts as cloud or shadow, above 0. [1]
 
     Returns
     -------
@@ -214,13 +219,14 @@ def cast_clouds(
     Raises
     ------
     ValueError
-        If the clouds have other cells, base and top are invalid, the sun is lower than 5 degrees, or directions vary
-        within the scene.
+        If the clouds have other cells, base and top are invalid, `least` is not positive, the sun is lower than 5
+        degrees, or directions vary within the scene.
 
     Warns
     -----
     UserWarning
-        If clouds beyond the end of the field could shade or hide cells, with the missing distance.
+        If clouds beyond the end of the field could shade or hide cells, with the missing distance. For a lazy `dem`,
+        the distance is of level ground.
 
     Notes
     -----
@@ -246,8 +252,12 @@ def cast_clouds(
         raise ValueError(
             f"the sun must be at least 5 degrees above the horizon, got {90 - geometry.sza:.1f}: choose another time"
         )
+    if not least > 0:
+        raise ValueError(f"least must be an optical thickness above 0, got {least:g}: the default is {LEAST:g}")
     if altitude is None:
         altitude = Atmosphere.parse(scene.attrs["atmosphere"]).altitude if "atmosphere" in scene.attrs else 0.4
+    if not np.isfinite(altitude):
+        raise ValueError(f"altitude must be a finite number [km], got {altitude:g}")
     grid = grids.geobox(scene)
     thickness, height = _checked(clouds, scene)
     ground = None if dem is None else with_crs_of(dem.transpose("y", "x"), scene)
@@ -257,7 +267,7 @@ def cast_clouds(
     down, across = grids.cell_size(grid)
     ways = {name: (south / down, -west / across) for name, south, west in zip(
         COLUMNS, (image_north, north, 0.0), (image_east, east, 0.0), strict=True)}  # fmt: skip
-    _warn_of_missing(thickness, grid, ways.values(), height)
+    _warn_of_missing(thickness, grid, ways.values(), _highest(height, grid, ground, 1000 * altitude))
     found = {
         name: _seen_along(way, thickness, grid, height, ground, 1000 * altitude, sizes) for name, way in ways.items()
     }
@@ -283,6 +293,8 @@ def _checked(clouds, scene):
         )
     if np.ndim(clouds["base"]) or np.ndim(clouds["top"]):
         raise ValueError("base and top of clouds must be one number each [m]: cast layers of different height in turn")
+    for name in ("base", "top"):
+        cf.check_units(clouds[name], f"cloud_{name}")
     base, top = _base_and_top((float(clouds["base"]), float(clouds["top"])))
     thickness = clouds["optical_thickness"]
     cf.check_units(thickness, "optical_thickness")
@@ -298,20 +310,30 @@ def _chunks_of(scene, *others):
     return windows.chunk_sizes(grids.geobox(scene), "auto", tile=_TILE)
 
 
+def _highest(height, grid, ground, reference):
+    """Largest height of the clouds above the ground of a grid; above level ground if the elevation is lazy. [m]"""
+    if ground is None or ground.chunks is not None:
+        return height
+    cells = zip(grids.lattice_offset(grids.geobox(ground), grid), grid.shape, strict=True)
+    known = ground.values[tuple(slice(max(first, 0), max(first + size, 0)) for first, size in cells)]
+    return max(height + reference - np.min(known[~np.isnan(known)], initial=height + reference), 0.0)
+
+
 def _warn_of_missing(thickness, grid, ways, height):
     """Warn if the field ends within reach of the images and shadows on a grid."""
     field = grids.geobox(thickness)
-    missing = [0.0]
+    missing, needed = [0.0], [0.0]
     for first, cells, known, size, shifts in zip(
         grids.lattice_offset(field, grid), grid.shape, field.shape, grids.cell_size(grid),
         zip(*ways, strict=True), strict=True,
     ):  # fmt: skip
-        ends = [first + np.rint(shift * height) for shift in shifts]
-        missing += [max(-min(ends), max(ends) + cells - known) * size]
+        reach = [np.rint(shift * height) for shift in shifts]
+        needed += [max(map(abs, reach)) * size]
+        missing += [max(-min(reach) - first, first + max(reach) + cells - known) * size]
     if max(missing) > 0:
         warn(
             f"the clouds end {max(missing):.0f} m too early: beyond, the sky is taken as clear; give "
-            f"cloud_field(..., margin={max(missing):.0f}) or more, or a larger raster"
+            f"cloud_field(..., margin={max(needed):.0f}) or more, or a larger raster"
         )
 
 
@@ -326,7 +348,7 @@ class _Way(NamedTuple):
 
     def ends(self, relief):
         """Smallest and largest offset of cells along rows and columns, from the scene into the field."""
-        heights = np.array([0.0, self.height + _DEEPEST] if relief else [self.height] * 2)
+        heights = np.array([0.0, self.height + DEEPEST_GROUND] if relief else [self.height] * 2)
         return [
             first + np.sort(np.rint(shift * heights)).astype(int)
             for first, shift in zip(self.first, self.shifts, strict=True)
@@ -357,7 +379,7 @@ def _along(way, rows, columns, cells, elevation=None):
         inside = (row >= 0) & (row < way.shape[0]) & (column >= 0) & (column < way.shape[1])
         return np.where(inside, cells, 0.0)
     above = way.height + way.reference - elevation
-    if (deep := np.nanmax(above, initial=0)) > way.height + _DEEPEST:
+    if (deep := np.nanmax(above, initial=0)) > way.height + DEEPEST_GROUND:
         raise ValueError(
             f"the ground lies {deep - way.height:.0f} m below {way.reference:g} m, from which the height of "
             "clouds is measured: give altitude= [km]"

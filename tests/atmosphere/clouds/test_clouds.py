@@ -1,5 +1,6 @@
 """Light of cloud layers, and the place of clouds, their images and their shadows."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -168,6 +169,30 @@ def test_shadow_on_relief_is_that_of_steps_along_the_sunbeam(site, reflectance):
     assert (~nearby).mean() > 0.6
 
 
+@pytest.mark.parametrize("relief", [False, True])
+def test_warning_of_a_small_field_names_the_margin_that_suffices(site, reflectance, relief):
+    """Ground 400 m below the altitude of the atmosphere, 0.4 km, has longer shadows."""
+    dem = (
+        xr.zeros_like(reflectance.isel(band=0, drop=True)).rename("elevation").assign_attrs(units="m")
+        if relief
+        else None
+    )
+    options = {"dem": dem, "geometry": fifesim.Geometry(50, 150, 20, 280)}
+    level = reflectance.drop_vars(["sza", "saa", "vza", "vaa"])
+    reach = (
+        (1400 if relief else 1000)
+        * np.tan(np.radians(50))
+        * np.cos(np.radians(150 - grids.projection.convergence(site)))
+    )
+    needed = 30 * round(-reach / 30)
+    sky = {"height": 1000, "length": 800, "seed": 3}
+    with pytest.warns(UserWarning, match=f"end {needed - 300} m too early.*margin={needed}"):
+        level.fifesim.cast_clouds(fifesim.cloud_field(site, **sky, margin=300), **options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        level.fifesim.cast_clouds(fifesim.cloud_field(site, **sky, margin=needed), **options)
+
+
 def test_cover_is_exact_over_100_km_and_thickness_is_lognormal():
     """0.5 points of the cover, anywhere; mean and standard deviation to 5 %, of a sample cut at 0.1 %."""
     place = np.arange(0, PERIOD, PERIOD // 1000) + 77_777_777
@@ -178,6 +203,11 @@ def test_cover_is_exact_over_100_km_and_thickness_is_lognormal():
         assert abs(inside.mean() / 8 - 1) < 0.05 and abs(inside.std() / 6 - 1) < 0.05
         logarithm = np.log(inside)
         assert abs(((logarithm - logarithm.mean()) ** 3).mean() / logarithm.std() ** 3) < 0.05
+
+
+def test_smallest_covers_have_at_most_one_cloud():
+    place = np.arange(0, PERIOD, PERIOD // 400)
+    assert 0 <= (cloud_thickness(CloudCover(1e-7, (8.0, 6.0), 2000.0, 5), place, place) > 0).mean() < 1e-4
 
 
 def test_correlation_falls_to_a_twentieth_at_the_length():
@@ -235,6 +265,9 @@ def test_dates_have_their_own_sun_and_sky(site):
         ({"height": 25_000}, "base must be from 0 to 20000 m above the ground, got 25000"),
         ({"length": 30_000}, "length must be from 100 to 20000 m, got 30000"),
         ({"thickness": 0}, "thickness must be a mean from 0 to 100"),
+        ({"drift": (np.nan, 0.0)}, "drift must be two speeds, eastward and northward"),
+        ({"drift": 5.0}, "drift must be two"),
+        ({"drift": (5.0, 0.0), "time": np.nan}, "time must be a finite number of seconds, got nan"),
     ],
 )
 def test_impossible_skies_are_refused(site, change, message):
@@ -256,6 +289,14 @@ def test_impossible_casts_are_refused(site, reflectance):
     )
     with pytest.raises(ValueError, match="clouds were cast with sza 30"):
         reflectance.fifesim.to_toa(clouds=cells)
+    for least in (0.0, np.nan):
+        with pytest.raises(ValueError, match="least must be an optical thickness above 0"):
+            reflectance.fifesim.cast_clouds(sky, least=least)
+    with pytest.raises(ValueError, match="altitude must be a finite number"):
+        reflectance.fifesim.cast_clouds(sky, altitude=np.nan)
+    in_km = sky.assign(base=xr.DataArray(1.5, attrs={"units": "km"}))
+    with pytest.raises(ValueError, match="base has units 'km'"):
+        reflectance.fifesim.cast_clouds(in_km)
     with pytest.raises(ValueError, match="base is missing"):
         reflectance.fifesim.to_toa(clouds=sky.drop_vars("base"))
 
