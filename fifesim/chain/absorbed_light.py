@@ -240,14 +240,13 @@ def sunlit_kernel(lai, stand, atmosphere, sza, part):
 
 
 def check_spectra(stands):
-    """Raise ValueError for optics by band, which have no spectrum from 0.4 to 0.7 um."""
+    """Raise ValueError for optics by band, which have no spectrum."""
     for stand in stands.values():
         for name in ("leaf_optics", "brown_leaf", "background"):
             given = getattr(stand, name)
             by_name = isinstance(given, Mapping) and not is_mixture(given)
             if by_name or (isinstance(given, xr.DataArray) and "band" in given.dims):
                 raise ValueError(
-                    f"{name} is given by band, absorbed light needs its spectrum from 0.4 to 0.7 um: give a number or "
-                    "pair for all wavelengths, a file or Dataset of the spectrum, fifesim.Leaf or fifesim.Background, "
-                    "or use method='beer'"
+                    f"{name} is given by band, a mean over wavelengths needs its spectrum: give a number or pair "
+                    "for all wavelengths, a file or Dataset of the spectrum, fifesim.Leaf or fifesim.Background"
                 )

@@ -30,11 +30,11 @@ from fifesim.ground.canopy.description import TALLGRASS, Canopy, is_raster
 from fifesim.ground.canopy.interpolation import interpolate, tabulate
 from fifesim.ground.canopy.labels import checked_scene
 from fifesim.ground.canopy.layers import extinction_coefficient, mixed
-from fifesim.ground.canopy.leaf_area import check_map
+from fifesim.ground.canopy.leaf_area import check_map, check_share
 from fifesim.models import evaporation, production
 from fifesim.models.production import CARBON
 from fifesim.models.radiation import two_stream
-from fifesim.models.weather import Weather, check_weather, fife_weather
+from fifesim.models.weather import Weather, check_order, check_weather, fife_weather
 
 # Cells at a time, so that intermediate results stay in the cache of the processor: 2 to 5 times as fast as whole
 # rasters.
@@ -163,9 +163,10 @@ def gpp(
         Light use efficiency of MOD17, photosynthesis of leaves integrated over the canopy, or the biochemistry of
         sunlit and shaded leaves.
     fpar : xarray.DataArray, dims (y, x), optional
-        For "light-use"; by default the light that green leaves absorb, ``fpar(lai, method="energy", leaves="green")``.
+        For "light-use" only; by default the light that green leaves absorb,
+        ``fpar(lai, method="energy", leaves="green")``.
     canopy, atmosphere : optional
-        For this FPAR. Dead leaves do not take part in photosynthesis.
+        For this FPAR. The other models use only the share of dead leaves, which do not produce.
     geometry, time : optional
         Position of the sun, as in `fpar`.
 
@@ -177,7 +178,7 @@ def gpp(
     Raises
     ------
     ValueError
-        If LAI or weather are out of range.
+        If LAI, FPAR or weather are out of range, or FPAR is given for a model that does not use it.
 
     Warns
     -----
@@ -230,7 +231,7 @@ def evapotranspiration(
     fpar : xarray.DataArray, dims (y, x), optional
         By default ``fpar(lai, method="energy", leaves="green")``.
     canopy, atmosphere, geometry, time : optional
-        For this FPAR, as in `fpar`.
+        For this FPAR, as in `fpar`. The leaf area of the models includes dead leaves.
 
     Returns
     -------
@@ -240,7 +241,7 @@ def evapotranspiration(
     Raises
     ------
     ValueError
-        If LAI or weather are out of range.
+        If LAI, FPAR or weather are out of range.
 
     Warns
     -----
@@ -275,6 +276,8 @@ def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time)
     area = checked_scene(north_up(land.lai))
     weather = fife_weather() if weather is None else weather
     geometry = directions.uniform_geometry(directions.given_geometry(geometry, area, time), quantity)
+    if model.of_green_leaves and fpar is not None:
+        raise ValueError(f"fpar has no effect with model={name!r}, which takes leaf area: leave it out")
     if model.of_green_leaves:
         # Dead leaves do not take part; their shade is neglected.
         area, share = _green(area, land, canopy or TALLGRASS), None
@@ -286,7 +289,9 @@ def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time)
         cf.check_units(fpar, "fpar")
         share = with_crs_of(north_up(fpar), area)
     given = {each: getattr(weather, each) for each in model.weather}
-    varying = {each: with_crs_of(north_up(value), area) for each, value in given.items() if is_raster(value)}
+    varying = {
+        each: with_crs_of(north_up(value.rename(each)), area) for each, value in given.items() if is_raster(value)
+    }
     rasters = [each.drop_vars(set(each.coords) - {"y", "x", "spatial_ref"}) for each in varying.values()]
     share = [] if share is None else [share.drop_vars(set(share.coords) - {"y", "x", "spatial_ref"})]
     kernel = partial(_kernel, model, given, tuple(varying), float(geometry.sza), bool(share))
@@ -300,8 +305,11 @@ def _kernel(model, given, varying, sza, has_share, lai, *blocks):
     share, blocks = (blocks[0], blocks[1:]) if has_share else (lai, blocks)
     for name, block in zip(varying, blocks, strict=True):
         check_weather(name, block)
-    weather = SimpleNamespace(**given | dict(zip(varying, blocks, strict=True)))
-    return evaluated(model, weather, sza, check_map(lai), share)
+    weather = given | dict(zip(varying, blocks, strict=True))
+    check_order(weather)
+    if has_share:
+        check_share("fpar", share)
+    return evaluated(model, SimpleNamespace(**weather), sza, check_map(lai), share)
 
 
 def _green(area, land, canopy):

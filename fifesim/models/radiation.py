@@ -16,7 +16,7 @@ class TwoStream(NamedTuple):
     beta: np.ndarray
     """Upward share of scattered diffuse light."""
     beta_beam: np.ndarray
-    """And of scattered direct light."""
+    """Upward share of scattered direct light."""
     albedo_beam: np.ndarray
     ground_beam: np.ndarray
     """Direct light on the ground."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,7 +35,7 @@ WEATHER_LIMITS = {
     "temperature_max": _KELVIN,
     "humidity": Limits("1", 0, 1, "it is a fraction: divide percent by 100", (0, 1)),
     # Highest and lowest places with vegetation.
-    "pressure": Limits("Pa", 1e4, 1.2e5, "hPa was given for Pa: multiply by 100", (5e4, 1.1e5)),
+    "pressure": Limits("Pa", 1e4, 1.2e5, "multiply hPa by 100, kPa by 1000", (5e4, 1.1e5)),
     # Above the solar constant only next to clouds.
     "shortwave": Limits("W m-2", 0, 2000, "it is the mean over the daylight hours", (0, 1361)),
     "net_radiation": Limits("W m-2", -500, 2000, "it is the mean over the daylight hours", (-200, 1100)),
@@ -73,7 +74,8 @@ class Weather:
     Raises
     ------
     ValueError
-        If a value is outside of the allowed range, or a raster has other units.
+        If a value is outside of the allowed range, a raster has other units, or the lowest temperature exceeds the
+        mean or the mean exceeds the highest.
 
     Warns
     -----
@@ -112,6 +114,7 @@ class Weather:
             units = str(value.attrs.get("units", limits.unit))
             if units != limits.unit:
                 raise ValueError(f"{each.name} has units {units!r}, needs {limits.unit!r}: convert it, then set units")
+        check_order({each.name: getattr(self, each.name) for each in fields(self)})
 
     def replace(self, **changes: Any) -> Weather:
         """
@@ -137,12 +140,24 @@ def check_weather(name, values):
     ends = float(np.nanmin(values)), float(np.nanmax(values))
     for end in ends:
         if not limits.lowest <= end <= limits.highest:
-            allowed = f"[{limits.lowest:g}, {limits.highest:g}] {limits.unit}"
+            allowed = f"[{limits.lowest:g}, {limits.highest:g}] {limits.unit}".removesuffix(" 1")
             raise ValueError(f"{name} must be in {allowed}, got {end:g}: {limits.remedy}")
         if not limits.valid[0] <= end <= limits.valid[1]:
             warn(
                 f"{name} is {end:g} {limits.unit}, formulas of the models hold from {limits.valid[0]:g} to "
                 f"{limits.valid[1]:g}: the result may be wrong"
+            )
+
+
+def check_order(weather):
+    """Raise ValueError if temperatures by name, as numbers or blocks of cells, are not lowest, mean, highest."""
+    names = [name for name in ("temperature_min", "temperature", "temperature_max") if name in weather]
+    for low, high in pairwise(name for name in names if not is_raster(weather[name])):
+        one, other = np.broadcast_arrays(weather[low], weather[high])
+        wrong = one > other
+        if wrong.any():
+            raise ValueError(
+                f"{low} must not exceed {high}, got {one[wrong][0]:g} and {other[wrong][0]:g} K: change one of them"
             )
 
 

@@ -70,7 +70,7 @@ def test_albedo_is_the_two_stream_model_of_each_band(lai):
     [
         ({"temperature": 25.0}, r"temperature must be in \[150, 350\] K, got 25: degC was given for K: add 273.15"),
         ({"humidity": 50.0}, "divide percent by 100"),
-        ({"pressure": 965.0}, "hPa was given for Pa"),
+        ({"pressure": 965.0}, "multiply hPa by 100, kPa by 1000"),
     ],
 )
 def test_other_units_are_refused(lai, change, message):
@@ -88,6 +88,32 @@ def test_units_of_rasters_and_ranges_of_formulas_are_checked(lai):
     with pytest.raises(ValueError, match="temperature has units 'degC', needs 'K'"):
         WEATHER.replace(temperature=celsius)
     with pytest.warns(UserWarning, match=r"temperature is 340 K.*hold from 228.15 to 333.15"):
-        WEATHER.replace(temperature=340.0)
+        WEATHER.replace(temperature=340.0, temperature_max=345.0)
     with pytest.raises((ValueError, TypeError), match="model"):
         lai.fifesim.gpp(model="mod16")
+
+
+def test_contradictions_of_the_weather_are_refused(lai):
+    for change in ({"temperature": 288.0}, {"temperature_max": 299.0}):
+        with pytest.raises(ValueError, match=r"must not exceed temperature.*, got (289|300) and (288|299) K"):
+            WEATHER.replace(**change)
+    cold = WEATHER.replace(temperature=field(lai, 280, 300))
+    with pytest.raises(ValueError, match="temperature_min must not exceed temperature, got 289 and 28"):
+        lai.fifesim.gpp(cold).compute()
+    shifted = WEATHER.replace(pressure=field(lai, 96000, 97000).assign_coords(x=lai.x + 30))
+    with pytest.raises(ValueError, match="'pressure' have different grids"):
+        lai.fifesim.evapotranspiration(shifted)
+    # Only light-use and Penman-Monteith need the lowest temperature.
+    assert np.isfinite(lai.fifesim.gpp(cold, model="farquhar")).all()
+
+
+def test_given_fpar_is_a_fraction_that_the_model_uses(lai):
+    absorbed = field(lai, 0, 1)
+    for wrong in (100 * absorbed, -absorbed):
+        with pytest.raises(ValueError, match=r"fpar must be in \[0, 1\], got"):
+            lai.fifesim.evapotranspiration(fpar=wrong).compute()
+    with pytest.raises(ValueError, match="fpar has no effect with model='farquhar'"):
+        lai.fifesim.gpp(fpar=absorbed, model="farquhar")
+    # FPAR of bare and of almost bare ground is a fraction too.
+    for area in (0 * lai, 0 * lai + 1e-9):
+        assert (area.fifesim.gpp() >= 0).all()

@@ -44,7 +44,7 @@ ERROR_STAGES = STAGES | {
 
 
 class Target(NamedTuple):
-    """QuantityOrFunction whose error is attributed: a model of `models.labels`, a function, or LAI or FPAR itself."""
+    """Quantity whose error is attributed: a model of `models.labels`, a function, or LAI or FPAR itself."""
 
     name: str
     quantity: str
@@ -73,7 +73,7 @@ def target_of(quantity, weather=None):
         if name in each and quantity in (kind, name):
             varying = [field for field in each[name].weather if is_raster(getattr(weather, field))]
             if varying:
-                raise ValueError(f"a budget needs weather of numbers, got a raster of {', '.join(varying)}")
+                raise ValueError(f"the quantity needs weather of numbers, got a raster of {', '.join(varying)}")
             return Target(name, kind, each[name], weather, not each[name].of_green_leaves)
     names = ["lai", "fpar", *models.LAND_MODELS, *(name for each in models.LAND_MODELS.values() for name in each)]
     raise ValueError(f"quantity must be a function of LAI, or one of {', '.join(names)}, got {quantity!r}")
@@ -208,7 +208,7 @@ def _truths(scene, target, switches):
 
 
 def of_cells(scene, target, ground):
-    """QuantityOrFunction of the cells of a ground, shape (y, x)."""
+    """Quantity in the cells of a ground, shape (y, x)."""
     setup = setup_over(scene, ground)
     canopy = spectral_canopy(scene.scenario, setup.canopy)
     light = {"canopy": canopy, "atmosphere": scene.driver.air, "geometry": setup.geometry}
@@ -223,7 +223,7 @@ def of_cells(scene, target, ground):
 
 
 def of_pixels(scene, target, canopy, lai):
-    """QuantityOrFunction of pixels with the mean canopy of the scene, shape of the leaf area."""
+    """Quantity in pixels with the mean canopy of the scene, shape of the leaf area."""
     fpar, flat = None, np.ascontiguousarray(lai).reshape(-1)
     if target.takes_fpar:
         fpar = scene.driver.absorbed(flat, canopy)

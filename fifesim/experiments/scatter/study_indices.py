@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fifesim.analysis.variance_indices import sobol_indices, sobol_points
+from fifesim.analysis.scaling import sobol_indices, sobol_points
 from fifesim.experiments.scatter.errors import QuantityOrFunction, of_cells, target_of
 from fifesim.experiments.scatter.stages import IDEAL_PROPERTIES, scene_of
 from fifesim.models.weather import Weather
@@ -63,7 +63,7 @@ def sensitivity(
 
     See Also
     --------
-    fifesim.analysis.variance_indices.sobol_indices
+    fifesim.analysis.scaling.sobol_indices
 
     Examples
     --------

@@ -141,3 +141,22 @@ def test_weather_by_cell_is_refused(lai):
     weather = fifesim.fife_weather().replace(shortwave=(500 + lai).drop_attrs())
     with pytest.raises(ValueError, match="weather of numbers, got a raster of shortwave"):
         fifesim.budget(fifesim.Scenario(**BURNED), quantity="gpp", weather=weather, realisations=1)
+
+
+CHIP = fifesim.Scenario(grid={"width": 120, "height": 120}, terrain={"dem": "flat"})
+
+
+def test_parameters_of_a_study_have_their_shares():
+    """Of a function of the scenario: twice the range has four times the variance."""
+    study = fifesim.Study(CHIP, {"brown": {"uniform": [0, 0.2]}, "moisture": {"uniform": [0, 0.4]}})
+    found = fifesim.sensitivity(study, lambda each: each.ground.brown + each.ground.moisture, n=256, each=iter)
+    assert found.parameter.values.tolist() == ["ground.brown", "ground.moisture"]
+    np.testing.assert_allclose(found["first"], [0.2, 0.8], atol=0.02)
+    np.testing.assert_allclose(found["total"], [0.2, 0.8], atol=0.02)
+    # Only green leaves produce, and soil hardly matters for the light that they absorb.
+    gpp = fifesim.sensitivity(study, "gpp", n=16, each=iter)
+    assert gpp["first"].sel(parameter="ground.brown") > 0.95
+    with pytest.raises(ValueError, match="must return a number for a scenario, it returns list"):
+        fifesim.sensitivity(study, lambda scenario: [1, 2], n=4, each=iter)
+    with pytest.raises(ValueError, match="n must be at least 2"):
+        fifesim.sensitivity(study, n=1)
