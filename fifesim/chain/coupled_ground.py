@@ -176,12 +176,18 @@ def surface_like(toa, like, atmosphere, bands, geometry):
     def kernel(seen, factor, *values):
         return factor * scale_of_ground(seen, GroundStreams(*values[:9]), *values[9:])
 
-    plain = toa.transpose("band", "y", "x").drop_vars("band", errors="ignore")
+    plain = _with_bands(toa).transpose("band", "y", "x").drop_vars("band", errors="ignore")
     out = chunking.pointwise(kernel, plain, *by_band)
     names = {"band": toa.coords["band"]} if "band" in toa.coords else {}
     out = directions.with_geometry(grids.place(out, grids.geobox(toa), names), geometry)
     text = f"to_surface: {atmosphere.engine}, shape of {type(like).__name__}, {atmosphere.text}"
     return cf.label(out, "surface_reflectance", source=toa, history=text, atmosphere=atmosphere.text)
+
+
+def _with_bands(raster):
+    if "band" not in raster.dims:
+        raise ValueError("reflectance has no dimension band: type .expand_dims('band')")
+    return raster
 
 
 def toa_of_streams(streams, coupling, atmosphere, bands, geometry):
@@ -196,7 +202,7 @@ def toa_of_streams(streams, coupling, atmosphere, bands, geometry):
             f"coupling={coupling!r} needs stream {', '.join(missing)}, the raster has "
             f"{', '.join(known) or 'no names'}: make it with surface_reflectance(..., streams={cure})"
         )
-    terms = band_terms_of(atmosphere, bands, geometry)
+    streams, terms = _with_bands(streams), band_terms_of(atmosphere, bands, geometry)
     order = [known.index(name) for name in STREAMS_OF[coupling]]
     arrays = [streams.isel(stream=number, drop=True).transpose("band", "y", "x") for number in order]
     plain = [each.drop_vars("band", errors="ignore") for each in arrays]

@@ -410,6 +410,8 @@ def surface_reflectance(
     >>> rho.mean(["y", "x"]).round(3).values
     array([0.089, 0.229])
     """
+    if slopes not in ("kt", "upright"):
+        raise ValueError(f"slopes must be 'kt' or 'upright', got {slopes!r}")
     if dem is None and (horizon is not None or slopes != "kt"):
         what = "a horizon" if horizon is not None else f"slopes={slopes!r}"
         raise ValueError(f"{what} needs an elevation: give dem= too")

@@ -168,3 +168,14 @@ def test_streams_of_other_directions_or_beyond_reflectance_are_refused():
         (streams - 1).assign_attrs(streams.attrs).fifesim.to_toa()
     with pytest.raises(ValueError, match="surroundings needs coupling"):
         streams.fifesim.to_toa(surroundings=0.2)
+    with pytest.raises(ValueError, match="no dimension band"):
+        streams.isel(band=0).fifesim.to_toa()
+    with pytest.raises(ValueError, match="no dimension band"):
+        ground().fifesim.to_toa().isel(band=0).fifesim.to_surface(like=fifesim.RossLi(0.2, 0, 0))
+    single = streams.isel(band=0).expand_dims("band").fifesim.to_toa()
+    np.testing.assert_allclose(single, streams.fifesim.to_toa().isel(band=[0]), rtol=1e-12)
+
+
+def test_discrete_ordinates_have_no_directional_streams():
+    with pytest.raises(ValueError, match="one direction of sun and view"):
+        ground(streams="directional", canopy=GRASS.replace(model="discrete-ordinates"))

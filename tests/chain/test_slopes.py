@@ -38,3 +38,11 @@ def test_one_pass_gives_what_both_steps_give(lai, upwelling):
     for one, other in zip(found, expected, strict=True):
         assert one.chunks is not None
         xr.testing.assert_identical(one.compute(), other.compute())
+
+
+def test_a_wrong_model_of_slopes_is_refused(lai):
+    with pytest.raises(ValueError, match="slopes must be 'kt' or 'upright', got 'uprigt'"):
+        lai.fifesim.surface_reflectance("TM", bands=["TM4"], slopes="uprigt")
+    dem = fifesim.flint_hills(grids.geobox(lai), seed=7)
+    with pytest.raises(ValueError, match="slopes must be 'kt' or 'upright'"):
+        lai.fifesim.surface_reflectance("TM", bands=["TM4"], dem=dem, slopes="Upright")

@@ -332,8 +332,11 @@ def leaves_of(lai, scene):
 
 def _exact_leaves(lai, leaf, scene, given):
     """Leaves by discrete ordinates; dead leaves are mixed with green ones."""
-    if any(np.size(given[name]) > 1 for name in ("sza", "vza", "raa")):
-        raise ValueError("model='discrete-ordinates' needs one direction of sun and view: use model='sail'")
+    if any(np.ndim(given[name]) for name in ("sza", "vza", "raa")):
+        raise ValueError(
+            "model='discrete-ordinates' needs one direction of sun and view, not angles by cell or the directions of "
+            "the sky: use model='sail'"
+        )
     if isinstance(scene.brown, np.ndarray) or (scene.brown != 0 and not _is(scene.dissociation, 0)):
         raise ValueError(
             "model='discrete-ordinates' needs one share of dead leaves without dissociation: use model='sail'"
