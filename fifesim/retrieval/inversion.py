@@ -137,6 +137,8 @@ class Solution(NamedTuple):
         return 0.5 * (np.linalg.slogdet(prior_covariance)[1] - np.linalg.slogdet(self.covariance)[1])
 
 
+# Relative rounding error of the cost, above which a step counts as worse.
+_ROUNDING = 1e-12
 # Factors on the damping after a step that lowers the cost, and after one that does not.
 _LESS_DAMPING, _MORE_DAMPING = 0.1, 10.0
 _FIRST_DAMPING = 1e-2
@@ -214,7 +216,7 @@ def optimal_estimation(
         values, slopes = forward(tried, active)
         found = cost_of(tried, values, active)
         length = np.sqrt(_square_each(moved, inverse) / size)
-        better = found <= cost[active]
+        better = found <= cost[active] * (1 + _ROUNDING)
         at = active[better]
         state[at], modelled[at], slope[at], cost[at] = tried[better], values[better], slopes[better], found[better]
         damping[active] = np.where(better, damping[active] * _LESS_DAMPING, damping[active] * _MORE_DAMPING)

@@ -11,13 +11,13 @@ HAZE = fifesim.Atmosphere(aerosol="urban", visibility=6)
 LOW = fifesim.Geometry(70, 120, 0, 0)
 
 
-def setup(atmosphere=HAZE, geometry=LOW, bands=("TM4", "TM3")):
+def setup_of(atmosphere=HAZE, geometry=LOW, bands=("TM4", "TM3")):
     return fifesim.Setup(atmosphere=atmosphere, geometry=geometry, bands=bands)
 
 
 @pytest.fixture(scope="module")
 def both():
-    return compare_engines(setup())
+    return compare_engines(setup_of())
 
 
 def test_terms_are_those_of_each_engine(both):
@@ -48,7 +48,7 @@ def test_quick_error_is_that_of_the_bands(both):
     """At one wavelength a band and without gases: .5 %."""
     toa = both["toa_reflectance"]
     expected = toa.sel(engine="5S") / toa.sel(engine="successive-orders") - 1
-    found = engine_error(setup())
+    found = engine_error(setup_of())
     assert list(found) == ["TM4", "TM3"]
     np.testing.assert_allclose(list(found.values()), expected, atol=5e-3)
 
@@ -63,14 +63,14 @@ def test_quick_error_names_the_bands_in_any_order():
 
 def test_quick_error_of_successive_orders_is_none():
     air = fifesim.Atmosphere(aerosol="urban", visibility=6, engine="successive-orders")
-    assert engine_error(setup(air)) == {"TM4": 0.0, "TM3": 0.0}
+    assert engine_error(setup_of(air)) == {"TM4": 0.0, "TM3": 0.0}
 
 
 def test_reflectance_of_ones_own():
-    found = compare_engines(setup(bands=("TM3",)), reflectance=0.25, engines="5S")
+    found = compare_engines(setup_of(bands=("TM3",)), reflectance=0.25, engines="5S")
     assert found["surface_reflectance"].values.tolist() == [0.25] and "ndvi" not in found
     for wrong in (1.2, [0.1, 0.2, 0.3], np.nan):
         with pytest.raises(ValueError, match="a number from 0 to 1, or 2 numbers, one per band"):
-            compare_engines(setup(), reflectance=wrong)
+            compare_engines(setup_of(), reflectance=wrong)
     with pytest.raises(TypeError, match=r"must be a fifesim\.Setup"):
         compare_engines(HAZE)

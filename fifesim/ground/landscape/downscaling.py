@@ -453,8 +453,9 @@ class Marginal:
         wrong = mean[(mean <= lowest) | (mean >= highest)]
         if wrong.size:
             raise ValueError(
-                f"the map has a pixel of mean LAI {wrong[0]:.4g}, which cells of a distribution from {lowest:.4g} to "
-                f"{highest:.4g} cannot have: give a distribution= that reaches beyond all of the map, or cv= instead"
+                f"the map has a pixel of mean LAI {wrong[0]:.4g}, which cells of a distribution from "
+                f"{round(lowest, 9):.4g} to {highest:.4g} cannot have: give a distribution= that reaches beyond all of "
+                "the map, or cv= instead"
             )
 
 
