@@ -161,7 +161,7 @@ def scale_of_ground(
     toa_reflectance : array
         [1]
     streams : GroundStreams
-        Of the ground with the factor 1. [1]
+        Reflectance streams of the ground with the factor 1. [1]
     tss, tsd, too, tdo, spherical_albedo, path_reflectance, gas_transmittance : array
         As in `directional_coupling`. [1]
 

@@ -33,7 +33,7 @@ _EDGES = tuple(round(0.4 + 0.02 * k, 2) for k in range(16))
 PAR_BANDS = tuple(Band(f"{low:.2f}-{high:.2f} um", (low, high), (1.0, 1.0)) for low, high in pairwise(_EDGES))
 """Bands of 0.02 um over photosynthetically active radiation; FPAR is within 4e-4 of the result of 120 bands."""
 
-# Variables of the light budget, with the quantity that each has.
+# Variables of the light budget, and their quantities.
 LIGHT_PARTS = {"green": "green_fpar", "dead": "dead_fpar", "ground": "ground_fpar", "reflected": "reflected_par"}
 
 
@@ -84,8 +84,8 @@ def fpar(
 
     Notes
     -----
-    With "beer", green and dead leaves absorb equally, as in Eq. 6. With "energy", each absorbs by its own optics, and
-    skylight and the reflection of the ground contribute.
+    With "beer", green and dead leaves absorb equally, as in Eq. 6. With "energy", each kind of leaf absorbs by its
+    optics, and skylight and the reflection of the ground contribute.
 
     References
     ----------

@@ -333,7 +333,7 @@ def interpolated(coefficients, axes, states, angles):
     Parameters
     ----------
     coefficients : array, shape (nodes of each axis, m)
-        Chebyshev coefficients. The first axes are the unknowns, the others are angles.
+        Chebyshev coefficients. The first axes are the unknowns, the last axes are angles.
     axes : array, shape (axes, 2)
         Lowest and highest value along each axis.
     states : array, shape (n, k)
@@ -347,7 +347,7 @@ def interpolated(coefficients, axes, states, angles):
 
     Notes
     -----
-    Derivatives are those of the polynomials. They are exact for the table.
+    Derivatives of the polynomials, which are exact for the table.
     """
     given = np.hstack([states, np.clip(angles, axes[states.shape[1] :, 0], axes[states.shape[1] :, 1])])
     spans = axes[:, 1] - axes[:, 0]
@@ -358,7 +358,7 @@ def interpolated(coefficients, axes, states, angles):
         basis = chebyshev.chebvander(place, nodes - 1)
         found = [_contracted(basis, part, nodes) for part in parts]
         if axis < unknowns:
-            # The derivative of a basis function is a sum of those of lower degree.
+            # The derivative of a basis function is a sum of basis functions of lower degree.
             lower = chebyshev.chebder(np.eye(nodes), axis=0)
             slope = basis[:, :-1] @ lower * (2 / spans[axis])
             found.append(_contracted(slope, parts[0], nodes))
