@@ -12,7 +12,7 @@ import numpy as np
 from chain import BANDS, CASE, CELL, SEEDS, chain_on, floor, grid_of
 
 import fifesim
-from fifesim.output.run.folder import simulate_to_folder
+from fifesim.output.run_folder import simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 

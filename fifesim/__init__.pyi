@@ -150,7 +150,7 @@ from .scenario.sweeps import sweep as sweep
 from .output.chips.folder import dataset as dataset
 from .experiments.scatter.shares import budget as budget
 from .experiments.scatter.study_indices import sensitivity as sensitivity
-from .experiments.explorer.page import explore as explore
+from .experiments.explorer import explore as explore
 from .scenario.scenario import Scenario as Scenario
 from .scenario.scenario import default_scenario as default_scenario
 from .scenario.scenario import read_scenario as read_scenario

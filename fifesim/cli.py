@@ -91,10 +91,10 @@ def simulate_command(
 
     with importing():
         from fifesim.output.folders import check_folder
+        from fifesim.output.identity import scenario_to_resume
         from fifesim.output.progress import since_start
-        from fifesim.output.run.folder import estimate, estimate_in_words, names_of, simulate_to_folder
-        from fifesim.output.run.identity import scenario_to_resume
-        from fifesim.output.run.workers import cluster
+        from fifesim.output.run_folder import estimate, estimate_in_words, names_of, simulate_to_folder
+        from fifesim.output.workers import cluster
         from fifesim.scenario.scenario import read_scenario
 
     finished = check_folder(output, overwrite, resume, names_of(scene))
@@ -127,7 +127,7 @@ def rerun_command(
 ):
     """Recompute a file of a run from its tags. The exit code is 1 if any value differs."""
     with importing():
-        from fifesim.output.run.again import outcome_in_words, rerun
+        from fifesim.output.reproduction import outcome_in_words, rerun
 
     found = rerun(file, output, overwrite=overwrite, threads=threads)
     print_lines(outcome_in_words(file, found))
@@ -159,7 +159,7 @@ def dataset_command(
     with importing():
         from fifesim.output.chips.folder import WHOLE, dataset_to_folder, study_to_resume
         from fifesim.output.folders import check_folder
-        from fifesim.output.run.workers import cluster, usable_cores
+        from fifesim.output.workers import cluster, usable_cores
         from fifesim.scenario.studies import read_study
 
     finished = check_folder(output, overwrite, resume, WHOLE)
@@ -319,7 +319,7 @@ def explore_command(
     _check_spelling(scenario)
 
     with importing():
-        from fifesim.experiments.explorer.page import explore
+        from fifesim.experiments.explorer import explore
         from fifesim.scenario.scenario import read_scenario
 
     found = None if scenario is None else read_scenario(scenario)

@@ -16,8 +16,8 @@ from fifesim.base import files
 from fifesim.base.messages import warn
 from fifesim.cli import app
 from fifesim.output import report
-from fifesim.output.run.again import Rerun
-from fifesim.output.run.folder import FILES
+from fifesim.output.reproduction import Rerun
+from fifesim.output.run_folder import FILES
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.toml import write_scenario
 
@@ -81,7 +81,7 @@ def test_rerun_makes_the_same_file_again(first, invoke, monkeypatch, tmp_path):
 
 
 def test_rerun_of_other_bits_ends_with_code_1(first, invoke, monkeypatch):
-    monkeypatch.setattr("fifesim.output.run.again.rerun", lambda *given, **options: Rerun(1200, 3, 1.0, {}))
+    monkeypatch.setattr("fifesim.output.reproduction.rerun", lambda *given, **options: Rerun(1200, 3, 1.0, {}))
     result = invoke("rerun", first[0] / "image.tif")
     assert result.exit_code == 1
     assert "3 of 1200 values differ, by 1 at most; the versions are the same" in result.stdout
@@ -96,7 +96,7 @@ def test_quiet_says_nothing_and_verbose_each_step(invoke, small, monkeypatch):
     assert "saved block (" not in told.stderr
     assert "saved block (" in invoke("simulate", small, "-o", "all", "-vv").stderr
     assert invoke("simulate", small, "-o", "quiet", "--quiet").exit_code == 2
-    monkeypatch.setattr("fifesim.experiments.explorer.page.explore", lambda scenario, page, overwrite: page)
+    monkeypatch.setattr("fifesim.experiments.explorer.explore", lambda scenario, page, overwrite: page)
     assert "open page.html in a browser" in invoke("explore", "-o", "page.html").stdout
     assert invoke("explore", "-o", "page.html", "--quiet").stdout == ""
 
@@ -355,7 +355,7 @@ def test_ctrl_c_is_a_line_and_code_130(invoke, tmp_path, monkeypatch, command):
         "verification.areas.deviations",
     ):
         monkeypatch.setattr(f"fifesim.experiments.{name}", pressed)
-    monkeypatch.setattr("fifesim.output.run.folder.simulate_to_folder", pressed)
+    monkeypatch.setattr("fifesim.output.run_folder.simulate_to_folder", pressed)
     result = invoke(command)
     assert result.exit_code == 130
     assert "interrupted; nothing was written" in result.stderr and "Traceback" not in result.stderr
@@ -368,7 +368,7 @@ def test_a_warning_is_a_line_of_its_own(invoke, small, monkeypatch):
         warn("the sun is taken for that of June\x1b[31m")
         return []
 
-    monkeypatch.setattr("fifesim.output.run.folder.simulate_to_folder", told)
+    monkeypatch.setattr("fifesim.output.run_folder.simulate_to_folder", told)
     result = invoke("simulate", small)
     assert result.exit_code == 0
     assert result.stderr == "fifesim: warning: the sun is taken for that of June\\x1b[31m\n"

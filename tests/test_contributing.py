@@ -48,7 +48,7 @@ def reflectance(**bands):
 @cache
 def run_folder():
     # A small run, whose files several checks read.
-    from fifesim.output.run.folder import simulate_to_folder
+    from fifesim.output.run_folder import simulate_to_folder
 
     scenario = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
     folder = Path(tempfile.mkdtemp()) / "run"

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from fifesim.cli import app
 from fifesim.output.folders import UNFINISHED
-from fifesim.output.run.folder import FILES
+from fifesim.output.run_folder import FILES
 
 COMMAND = [sys.executable, "-c", "from fifesim.cli import app; app()", "simulate"]
 # Whoever starts tests in the background of a script has them ignore SIGINT, which programs that they start inherit.
@@ -26,7 +26,7 @@ SIGNALLED = f"""
 {HEARS_CTRL_C}
 import os
 from fifesim.cli import app
-from fifesim.output.run import products
+from fifesim.output import products
 
 save = products.save_block
 

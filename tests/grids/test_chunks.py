@@ -315,6 +315,6 @@ def test_client_is_found_while_there_is_one():
 
 
 def test_writing_needs_no_cluster():
-    modules = "fifesim.grids.files, fifesim.output.run.folder"
+    modules = "fifesim.grids.files, fifesim.output.run_folder"
     code = f"import sys, {modules}; assert not {{'distributed', 'zarr'}} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -3,7 +3,7 @@
 import pytest
 
 from fifesim.output import report
-from fifesim.output.run.folder import simulate_to_folder
+from fifesim.output.run_folder import simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
 
 TRAVELLED = {

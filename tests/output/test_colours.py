@@ -12,7 +12,7 @@ from matplotlib.colors import to_hex
 
 import fifesim
 from fifesim.base.bands import colour_composite
-from fifesim.experiments.explorer.page import layer_words
+from fifesim.experiments.explorer import layer_words
 from fifesim.grids import cf
 from fifesim.output.chips.datasheet import contact_sheet
 from fifesim.output.colours import (

@@ -16,7 +16,7 @@ from fifesim.ground.landscape.distribution import treatments
 from fifesim.output import report
 from fifesim.output.folders import check_folder, results
 from fifesim.output.progress import steps
-from fifesim.output.run.workers import check_memory_of_cells
+from fifesim.output.workers import check_memory_of_cells
 
 # Smaller differences in rms R2 are not significant, given the variation between two realisations. [1]
 _ALIKE = 0.02

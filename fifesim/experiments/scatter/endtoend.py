@@ -20,7 +20,7 @@ from fifesim.output import report
 from fifesim.output.colours import percentile_limits
 from fifesim.output.folders import check_folder, results
 from fifesim.output.maps import image_map, stretch_of
-from fifesim.output.run.workers import check_memory_of_cells
+from fifesim.output.workers import check_memory_of_cells
 from fifesim.retrieval.description import Retrieval
 from fifesim.retrieval.labels import retrieve
 from fifesim.scenario.scenario import default_scenario

@@ -13,7 +13,7 @@ from fifesim.grids import grid as grids
 from fifesim.output import report
 from fifesim.output.folders import check_folder, results
 from fifesim.output.report import fixed, plus_minus, title
-from fifesim.output.run.workers import check_memory_of_cells
+from fifesim.output.workers import check_memory_of_cells
 from fifesim.scenario.toml import write_scenario
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.listing import blur_in_words, noise_in_words

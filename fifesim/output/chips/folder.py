@@ -15,12 +15,12 @@ from fifesim.base.arguments import Kind, described, is_a
 from fifesim.base.messages import warn
 from fifesim.grids.chunks import found_client
 from fifesim.ground.landscape.autoregression import FIELD_TILE
+from fifesim.output import identity
 from fifesim.output.chips import datasheet, store
 from fifesim.output.chips.makers import made_shards, processes, workers_of
 from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, errors_with_their_file, results
+from fifesim.output.products import has_blocks, save_block, saved_block
 from fifesim.output.progress import ChipProgress
-from fifesim.output.run import identity
-from fifesim.output.run.products import has_blocks, save_block, saved_block
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.studies import Study, StudyLike, read_study

@@ -16,8 +16,8 @@ from threadpoolctl import threadpool_limits
 
 from fifesim.base.caches import cached
 from fifesim.output.chips.store import chip_arrays, empty_arrays
-from fifesim.output.run.workers import RETRIES
 from fifesim.output.terminal import interrupts_blocked
+from fifesim.output.workers import RETRIES
 from fifesim.scenario.chips import chips_of
 
 # Not on Windows.

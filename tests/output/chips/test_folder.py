@@ -251,7 +251,7 @@ def test_processes_are_a_number_or_a_cluster(workers, client, said, study, tmp_p
 
 @pytest.mark.slow
 def test_workers_of_a_cluster_make_the_same_bits(study, whole, tmp_path):
-    from fifesim.output.run.workers import cluster
+    from fifesim.output.workers import cluster
 
     with cluster(workers=2) as client:
         dataset_to_folder(study, tmp_path / "chips.zarr", COUNT, client=client)

@@ -13,8 +13,8 @@ import rasterio
 from fifesim.base.files import in_a_line, shown
 from fifesim.grids.opening import ErrorsOfGdal, raster_file
 from fifesim.output.folders import versions
-from fifesim.output.run.folder import simulate_to_folder
-from fifesim.output.run.identity import PRODUCT, SCENARIO_TAG, VERSIONS
+from fifesim.output.identity import PRODUCT, SCENARIO_TAG, VERSIONS
+from fifesim.output.run_folder import simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.toml import named_files, with_folder
 

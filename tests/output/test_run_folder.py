@@ -19,10 +19,10 @@ import fifesim
 from fifesim.atmosphere import engines, six_s
 from fifesim.cli import app
 from fifesim.output import report
+from fifesim.output import run_folder as estimates
+from fifesim.output import run_folder as run_folder
 from fifesim.output.folders import UNFINISHED
-from fifesim.output.run import folder as estimates
-from fifesim.output.run import folder as run_folder
-from fifesim.output.run.folder import FILES, estimate, estimate_in_words, run_engine, simulate_to_folder
+from fifesim.output.run_folder import FILES, estimate, estimate_in_words, run_engine, simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario, read_scenario
 from fifesim.scenario.simulation import simulate
 

@@ -6,8 +6,8 @@ import pytest
 import xarray as xr
 import zarr
 
-from fifesim.output.run.identity import NotThisRun
-from fifesim.output.run.products import (
+from fifesim.output.identity import NotThisRun
+from fifesim.output.products import (
     chunk_checksum,
     has_blocks,
     make_scene_store,

@@ -14,8 +14,7 @@ import numpy as np
 from markupsafe import Markup
 
 from fifesim.base.annotations import FilePath
-from fifesim.experiments.explorer.outcomes import LINE_NUMBERS, outcomes_of
-from fifesim.experiments.explorer.settings import sweep_of
+from fifesim.experiments.explorer_settings import LINE_NUMBERS, outcomes_of, sweep_of
 from fifesim.experiments.scatter.shares import CURVATURE
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES
 from fifesim.grids import cf

@@ -17,9 +17,8 @@ from typer.testing import CliRunner
 import fifesim
 from fifesim.cli import app
 from fifesim.experiments import explorer
-from fifesim.experiments.explorer import page
-from fifesim.experiments.explorer.page import explorer_page, packed, page_data, stepped
-from fifesim.experiments.explorer.settings import sweep_of
+from fifesim.experiments.explorer import explorer_page, packed, page_data, stepped
+from fifesim.experiments.explorer_settings import sweep_of
 from fifesim.experiments.scatter.shares import CURVATURE
 from fifesim.experiments.scatter.stages import STAGES
 from fifesim.scenario.scenario import parse_scenario
@@ -237,7 +236,7 @@ def test_steps_are_half_a_step_wrong_at_most(kind, levels):
 
 
 def test_sliders_begin_at_the_scenario_and_say_its_values(sweep):
-    arp, haze, sza, instrument, registration = page.slider_words(sweep)
+    arp, haze, sza, instrument, registration = explorer.slider_words(sweep)
     assert arp["start"] == 0 and "leaf area is correlated up to 8 m, arp 0.15" in arp["texts"][0]
     assert haze["marks"] == ["45 km"] and haze["start"] == 0
     assert sza["texts"][0] == "28.5° from overhead"
@@ -250,11 +249,11 @@ def test_sliders_begin_at_the_scenario_and_say_its_values(sweep):
 
 
 def test_words_of_a_slider_follow_what_varies(sweep, small):
-    assert set(page.STAGE_WORDS) == {CURVATURE, *STAGES}
-    arp, haze, *_ = page.slider_words(replace(sweep, arps=(None,), hazes=(None,)))
+    assert set(explorer.STAGE_WORDS) == {CURVATURE, *STAGES}
+    arp, haze, *_ = explorer.slider_words(replace(sweep, arps=(None,), hazes=(None,)))
     assert arp["texts"] == ["as in the map"] and haze["texts"] == ["without haze"]
     values = small.model_dump(exclude_unset=True) | {"atmosphere": {"aot": 0.15}}
-    haze = page.slider_words(sweep_of(parse_scenario(values)))[1]
+    haze = explorer.slider_words(sweep_of(parse_scenario(values)))[1]
     assert haze["name"] == "Haze" and haze["texts"][haze["start"]] == "aerosol optical thickness 0.15"
 
 
@@ -262,7 +261,7 @@ def test_words_of_a_slider_follow_what_varies(sweep, small):
 def quick(sweep, monkeypatch):
     """Four settings in the place of all."""
     few = type(sweep)(**{**vars(sweep), "arps": sweep.arps[:1], "szas": sweep.szas[:1], "instruments": ("TM",)})
-    monkeypatch.setattr(page, "sweep_of", lambda scenario: few)
+    monkeypatch.setattr(explorer, "sweep_of", lambda scenario: few)
 
 
 def test_command_writes_one_page_and_replaces_none(quick, small, tmp_path, monkeypatch):

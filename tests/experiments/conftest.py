@@ -5,9 +5,8 @@ from dataclasses import replace
 import pytest
 
 import fifesim
-from fifesim.experiments.explorer.outcomes import outcomes_of
-from fifesim.experiments.explorer.page import explorer_page
-from fifesim.experiments.explorer.settings import sweep_of
+from fifesim.experiments.explorer import explorer_page
+from fifesim.experiments.explorer_settings import outcomes_of, sweep_of
 from fifesim.scenario.scenario import parse_scenario
 
 SMALL = {

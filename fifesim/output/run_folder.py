@@ -22,11 +22,10 @@ from fifesim.grids import grid as grids
 from fifesim.grids.chunks import found_client
 from fifesim.grids.files import to_geotiff
 from fifesim.grids.reductions import computed
-from fifesim.output import report, stac
+from fifesim.output import identity, products, report, stac, workers
 from fifesim.output.folders import check_folder, errors_with_their_file, results
 from fifesim.output.maps import write_style
 from fifesim.output.progress import CellProgress, doing, memory, steps
-from fifesim.output.run import identity, products, workers
 from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.simulation import simulate

@@ -19,7 +19,7 @@ from dask.base import tokenize
 
 from fifesim.grids import grid as grids
 from fifesim.grids.windows import array_from_windows
-from fifesim.output.run.identity import NotThisRun
+from fifesim.output.identity import NotThisRun
 
 # The report shows the cells below this many pixels across, in the middle: enough to see what a pixel averages. [pixel]
 _DETAIL = 16

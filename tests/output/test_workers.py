@@ -25,10 +25,9 @@ from fifesim.grids import grid as grids
 from fifesim.grids.chunks import neighbourhood
 from fifesim.grids.reductions import resample
 from fifesim.grids.windows import array_from_windows, tiles
-from fifesim.output import report
-from fifesim.output.run import workers
-from fifesim.output.run.folder import simulate_to_folder
-from fifesim.output.run.workers import (
+from fifesim.output import report, workers
+from fifesim.output.run_folder import simulate_to_folder
+from fifesim.output.workers import (
     check_memory_of_cells,
     check_size,
     cluster,

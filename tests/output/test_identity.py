@@ -11,9 +11,9 @@ import rasterio
 import rasterio.shutil
 
 from fifesim.base import files
+from fifesim.output import identity as run_identity
 from fifesim.output.folders import BEGUN, versions
-from fifesim.output.run import identity as run_identity
-from fifesim.output.run.identity import (
+from fifesim.output.identity import (
     PRODUCT,
     SCENARIO_TAG,
     VERSIONS,

@@ -9,9 +9,9 @@ import rasterio
 
 import fifesim
 from fifesim.output import report
-from fifesim.output.run.again import Rerun, outcome_in_words, read_origin, rerun
-from fifesim.output.run.folder import simulate_to_folder
-from fifesim.output.run.identity import VERSIONS
+from fifesim.output.identity import VERSIONS
+from fifesim.output.reproduction import Rerun, outcome_in_words, read_origin, rerun
+from fifesim.output.run_folder import simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
 
 

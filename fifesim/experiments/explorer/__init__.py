@@ -1,1 +1,0 @@
-"""A page with sliders over simulations of one scenario."""

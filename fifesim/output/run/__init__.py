@@ -1,1 +1,0 @@
-"""Simulation of a scenario into a folder, block by block."""
