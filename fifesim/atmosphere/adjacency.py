@@ -68,13 +68,6 @@ def environment_function(radius, vza=0.0):
     References
     ----------
     [Tanre1981]_ for nadir; [Vermote1997]_ for the view angle
-
-    Examples
-    --------
-    Shares of the light scattered into the view by molecules and aerosol that come from within 1 km:
-
-    >>> [round(float(share), 2) for share in environment_function(1000.0)]
-    [0.12, 0.63]
     """
     vza = np.asarray(vza, float)
     if not np.all((vza >= 0) & (vza < 90)):
@@ -107,11 +100,6 @@ def environment_weights(diffuse_up_molecules, diffuse_up_aerosol):
     References
     ----------
     [Vermote1997]_
-
-    Examples
-    --------
-    >>> [float(share) for share in environment_weights(0.25, 0.75)]
-    [0.25, 0.75]
     """
     total = np.add(diffuse_up_molecules, diffuse_up_aerosol, dtype=float)
     total = np.where(total > 0, total, 1.0)
@@ -138,19 +126,9 @@ def mixed_environment_function(radius, vza, diffuse_up_molecules, diffuse_up_aer
     share : array, shape of the broadcast inputs
         1 where nothing scatters. [1]
 
-    Raises
-    ------
-    ValueError
-        If vza is not from 0 to below 90 degrees.
-
     References
     ----------
     [Vermote1997]_
-
-    Examples
-    --------
-    >>> float(mixed_environment_function(0.0, 30.0, 0.25, 0.75))
-    0.0
     """
     weights = environment_weights(diffuse_up_molecules, diffuse_up_aerosol)
     # The rest of the light comes from the target itself.
@@ -189,20 +167,9 @@ def point_spread(shape, cell, vza, weight_molecules, weight_aerosol):
     weights : array, shape (rows, columns)
         Over the whole plane they sum to 1. [1]
 
-    Raises
-    ------
-    ValueError
-        If vza is not from 0 to below 90 degrees.
-
     References
     ----------
     [Tanre1981]_
-
-    Examples
-    --------
-    >>> weights = point_spread((2, 2), (60.0, 60.0), 0.0, 0.0, 1.0)
-    >>> bool(weights[0, 0] > weights[0, 1] > weights[1, 1]), bool(weights[0, 1] == weights[1, 0])
-    (True, True)
     """
     weights = Scatterers(weight_molecules, weight_aerosol)
     scattered = _flux_differences(shape, cell, vza, weights, _COARSE_NODES)

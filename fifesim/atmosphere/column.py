@@ -38,11 +38,6 @@ def rayleigh_expansion(count, depolarization=DEPOLARIZATION):
     References
     ----------
     [Siewert2000]_; depolarization of [Young1980]_
-
-    Examples
-    --------
-    >>> float(rayleigh_expansion(4)[0, 0])
-    1.0
     """
     expansion = np.zeros((count, 4))
     expansion[0, INTENSITY] = 1
@@ -89,12 +84,6 @@ def matrix_moments(phase, polarization, scattering_cosine, weights, count, diago
     References
     ----------
     [Hovenier2004]_, Chapter 2
-
-    Examples
-    --------
-    >>> cosine, weights = np.polynomial.legendre.leggauss(8)
-    >>> matrix_moments(np.ones(8), np.zeros(8), cosine, weights, 3)[0, 0].round(12).item()
-    1.0
     """
     amount = phase * weights / np.sum(phase * weights)
     linear = wigner(2, 2, scattering_cosine, count) @ amount
@@ -137,14 +126,6 @@ def truncated_expansion(moments, count):
     References
     ----------
     [Wiscombe1977]_
-
-    Examples
-    --------
-    A series short enough is kept as it is:
-
-    >>> expansion, peak = truncated_expansion(np.array([1.0, 0.5]), 4)
-    >>> [float(value) for value in expansion[:, 0]], float(peak)
-    ([1.0, 1.5, 0.0, 0.0], 0.0)
     """
     moments = np.asarray(moments, float)
     whole = np.zeros((max(count + 1, len(moments)), 4))
@@ -178,11 +159,6 @@ def wigner(order, spin, cosine, count):
     References
     ----------
     [Mishchenko2002]_, Eqs. B.22 to B.24
-
-    Examples
-    --------
-    >>> wigner(0, 0, np.array([0.5]), 3)[:, 0].tolist()
-    [1.0, 0.5, -0.125]
     """
     functions = np.zeros((count, cosine.size))
     if max(order, abs(spin)) < count:
@@ -243,11 +219,6 @@ def stokes_basis(order, cosine, count, components):
     References
     ----------
     [Siewert2000]_
-
-    Examples
-    --------
-    >>> stokes_basis(1, np.array([0.0, 0.5]), 5, 3).shape
-    (6, 12)
     """
     scalar = wigner(order, 0, cosine, count)[order:].T
     if components == 1:
@@ -347,12 +318,6 @@ def mixed_column(
     References
     ----------
     [Wiscombe1977]_, forward peak
-
-    Examples
-    --------
-    >>> column = mixed_column(0.2, 0.0, 1.0, [1.0], 4, 10)
-    >>> round(float(column.depth), 12), column.molecules.round(9).tolist() == [1.0] * 10
-    (0.02, True)
     """
     expansion, peak = truncated_expansion(moments, count)
     thinned = tau_aerosol * (1 - single_scattering_albedo * peak)

@@ -153,25 +153,9 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
     terms : BandTerms
         Read-only arrays of shape (band,). [1]
 
-    Raises
-    ------
-    ImportError
-        If the engine is 6S and not installed.
-    ValueError
-        If a zenith angle is out of range, or a band exceeds the gas table or the aerosol tables.
-
     References
     ----------
     [Tanre1990]_
-
-    Examples
-    --------
-    >>> from fifesim.atmosphere.models import Atmosphere
-    >>> from fifesim.base.bands import Band
-    >>> blue, red = Band("blue", (0.45, 0.5), (1, 1)), Band("red", (0.62, 0.67), (1, 1))
-    >>> terms = band_terms(Atmosphere(), (blue, red), 30.0, 0.0, 0.0)
-    >>> bool(terms.path_reflectance[0] > terms.path_reflectance[1])
-    True
     """
     if atmosphere.engine != "6S":
         return _band_terms(atmosphere, tuple(bands), float(sza), float(vza), float(raa))
@@ -201,25 +185,9 @@ def light_at_ground(atmosphere, bands, sza, photons=True):
     shares, diffuse_fraction : array, shape (band,)
         The shares sum to 1. [1]
 
-    Raises
-    ------
-    ValueError
-        As `band_terms`.
-
     Notes
     -----
     Light that the ground reflects and the atmosphere sends back is left out: it has nearly the same spectrum.
-
-    Examples
-    --------
-    Red sunlight has more photons per watt than blue:
-
-    >>> from fifesim.atmosphere.models import Atmosphere
-    >>> from fifesim.base.bands import Band
-    >>> bands = Band("blue", (0.45, 0.47), (1, 1)), Band("red", (0.65, 0.67), (1, 1))
-    >>> shares, _ = light_at_ground(Atmosphere(), bands, 30.0)
-    >>> bool(shares[1] > shares[0])
-    True
     """
     terms = band_terms(atmosphere, tuple(bands), sza, 0.0, 0.0)
     wavelength = table_wavelengths()

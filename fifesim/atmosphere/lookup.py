@@ -66,14 +66,6 @@ def once_reflectance(sza, vza, raa, once, band):
     References
     ----------
     [Tanre1990]_
-
-    Examples
-    --------
-    Without aerosol, the reflectance is 0:
-
-    >>> one = np.ones(1)
-    >>> once_reflectance(30.0, 10.0, 50.0, Once(albedo=one, depth=0 * one, overlying=one, phase=np.ones((1, 721))), 0)
-    0.0
     """
     mu_s, mu_v = np.cos(np.radians(sza)), np.cos(np.radians(vza))
     sines = np.sin(np.radians(sza)) * np.sin(np.radians(vza))
@@ -220,11 +212,6 @@ def varying_diffuse_fraction(sza, *, atmosphere, bands):
     -------
     diffuse_fraction : array, shape (band, ...)
         Cubic spline with nodes every 2.5 degrees; NaN if the angle is NaN. [1]
-
-    Raises
-    ------
-    ValueError
-        If an angle is out of the range of the model.
 
     References
     ----------

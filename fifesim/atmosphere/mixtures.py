@@ -177,13 +177,6 @@ def mixture(aerosol):
     TypeError
         If the aerosol is neither text nor mapping, or a fraction is not a number; or it is a file or a Dataset, which
         `fifesim.read_aerosol` takes.
-
-    Examples
-    --------
-    >>> mixture({"soot": 0.25, "dust": 0.75})
-    {'dust': 0.75, 'soot': 0.25}
-    >>> mixture("urban") == MODELS["urban"]
-    True
     """
     is_file = isinstance(aerosol, PurePath) or (isinstance(aerosol, str) and aerosol.endswith((".nc", ".csv")))
     # A Dataset is a mapping, too.

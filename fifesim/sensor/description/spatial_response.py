@@ -108,11 +108,6 @@ class GaussianResponse:
         Modulation transfer at the Nyquist frequency of the sampling interval. [1]
     eifov : float, optional
         Effective instantaneous field of view: half of the period that is passed by half. [rad]
-
-    Raises
-    ------
-    pydantic.ValidationError
-        Unless exactly one of the three is given.
     """
 
     kind: Literal["gaussian"]

@@ -151,13 +151,6 @@ def view_of_roll(roll, row):
     USGS, Landsat 8-9 Collection 2 Level-2 data format control book (LSDS-1328), ROLL_ANGLE: the description that Google
     Earth Engine repeats for the collection LANDSAT/LC08/C02/T1_L2. Scene LC08_L2SP_017036_20130419 agrees: at a roll of
     -11.7 degrees on the descending path 17, its centre lies 148 km west of the track, near path 18.
-
-    Examples
-    --------
-    A descending pass that looks to its right, the west, is seen from the east-southeast:
-
-    >>> [round(angle, 1) for angle in view_of_roll(-11.696, 36)]
-    [13.0, 102.2]
     """
     if not abs(roll) <= _LARGEST_ROLL:
         raise ValueError(

@@ -37,12 +37,6 @@ def gain_offset(full_scale_radiance, min_radiance, bits):
     References
     ----------
     [Chander2009]_, Eq. 1, with the calibrated counts 0 to :math:`2^b - 1`; [Friedl1995]_, Table 1
-
-    Examples
-    --------
-    >>> gain, offset = gain_offset(250.0, -5.0, 8)
-    >>> float(gain), float(offset)
-    (1.0, -5.0)
     """
     full, low = np.asarray(full_scale_radiance, float), np.asarray(min_radiance, float)
     if not np.all(full > low):
@@ -82,24 +76,9 @@ def radiance_to_dn(radiance, gain, offset, bits, compression=0):
     dn : array of uint8 up to 8 bits, else of uint16
         0 is no data, from NaN. [1]
 
-    Raises
-    ------
-    ValueError
-        If a gain is not positive, or the bits are out of range.
-
     References
     ----------
     [Chander2009]_, Eq. 1, solved for the counts
-
-    Examples
-    --------
-    >>> radiance_to_dn([-9.0, 100.2, 1e4, float("nan")], 1.0, -5.0, bits=8).tolist()
-    [1, 105, 255, 0]
-
-    A quarter of the range is half of the counts where they go with its square root:
-
-    >>> int(radiance_to_dn(15.75, 1.0, 0.0, bits=6)), int(radiance_to_dn(15.75, 1.0, 0.0, bits=6, compression=63))
-    (16, 32)
     """
     largest = _largest_dn(bits)
     _check_positive(gain, "gain", "from gain_offset")
@@ -137,13 +116,6 @@ def dn_to_radiance(dn, gain, offset, compression=0):
     References
     ----------
     [Chander2009]_, Eq. 1
-
-    Examples
-    --------
-    >>> dn_to_radiance([0, 105], 1.0, -5.0).tolist()
-    [nan, 100.0]
-    >>> dn_to_radiance([32], 1.0, 0.0, compression=63).round(3).tolist()
-    [16.258]
     """
     dn = np.asarray(dn)
     counts = dn
@@ -172,13 +144,6 @@ def digital_step(radiance, gain, offset, compression=0):
     -------
     step : array, shape of radiance
         NaN where the radiance is. [W m-2 sr-1 um-1]
-
-    Examples
-    --------
-    >>> digital_step([20.0, 100.0], 0.5, -1.0).tolist()
-    [0.5, 0.5]
-    >>> digital_step(15.75, 1.0, 0.0, compression=63).item()
-    1.0
     """
     radiance = np.asarray(radiance, float)
     if compression:
@@ -208,21 +173,9 @@ def reflectance_to_radiance(reflectance, solar_irradiance, mu_s, earth_sun_dista
     radiance : array
         [W m-2 sr-1 um-1]
 
-    Raises
-    ------
-    ValueError
-        If the irradiance, ``mu_s`` or the distance is not positive.
-
     References
     ----------
     [Chander2009]_, Eq. 2, solved for the radiance
-
-    Examples
-    --------
-    A white Lambertian surface below an overhead sun returns the irradiance:
-
-    >>> round(float(reflectance_to_radiance(1.0, 1536.0, 1.0)) * np.pi, 9)
-    1536.0
     """
     return np.asarray(reflectance) * _white_radiance(solar_irradiance, mu_s, earth_sun_distance)
 
@@ -249,20 +202,9 @@ def radiance_to_reflectance(radiance, solar_irradiance, mu_s, earth_sun_distance
     reflectance : array
         With the cosine of the solar zenith divided out. [1]
 
-    Raises
-    ------
-    ValueError
-        If the irradiance, ``mu_s`` or the distance is not positive.
-
     References
     ----------
     [Chander2009]_, Eq. 2
-
-    Examples
-    --------
-    >>> radiance = reflectance_to_radiance(0.25, 1536.0, 0.5, 1.0148)
-    >>> round(float(radiance_to_reflectance(radiance, 1536.0, 0.5, 1.0148)), 12)
-    0.25
     """
     return np.asarray(radiance) / _white_radiance(solar_irradiance, mu_s, earth_sun_distance)
 
@@ -314,21 +256,10 @@ def product_gain_offset(gain, offset, solar_irradiance, mu_s, earth_sun_distance
     gain, offset : array
         Radiance of one count and of digital number 0. [W m-2 sr-1 um-1]
 
-    Raises
-    ------
-    ValueError
-        If the irradiance, ``mu_s`` or the distance is not positive.
-
     References
     ----------
     USGS, Landsat 8-9 Collection 2 Level-1 data format control book (LSDS-1822); ESA, Sentinel-2 products specification
     document (S2-PDGS-TAS-DI-PSD); [Chander2009]_, Eq. 2
-
-    Examples
-    --------
-    >>> gain, offset = product_gain_offset(1e-4, -0.1, np.pi, 0.5)
-    >>> round(float(gain) * 3000 + float(offset), 12)
-    0.1
     """
     radiances = [reflectance_to_radiance(each, solar_irradiance, mu_s, earth_sun_distance) for each in (gain, offset)]
     return np.asarray(radiances[0]), np.asarray(radiances[1])
@@ -394,11 +325,6 @@ def product_reflectance(dn, gain, offset, largest, flag=0, flags=0, mu_s=1.0):
     ----------
     USGS, Landsat 8-9 Collection 2 Level-1 data format control book (LSDS-1822), and Using the USGS Landsat Level-1
     data product; ESA, Sentinel-2 products specification document (S2-PDGS-TAS-DI-PSD), radiometric offset
-
-    Examples
-    --------
-    >>> product_reflectance([0, 10000, 65535], 2e-5, -0.1, 65535, mu_s=0.5).astype(float).round(6).tolist()
-    [nan, 0.2, nan]
     """
     dn = np.asarray(dn)
     usable = (dn != 0) & (dn < largest) & (np.bitwise_and(flags, flag) == 0)

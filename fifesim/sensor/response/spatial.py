@@ -35,13 +35,6 @@ class CosineSpread(FiniteSpread):
     References
     ----------
     [Friedl1995]_, Table 1, note a
-
-    Examples
-    --------
-    Half of the response lies before the centre:
-
-    >>> float(CosineSpread(30.0).cumulative(0.0))
-    0.5
     """
 
     def _cumulative(self, x):
@@ -67,17 +60,6 @@ class GaussianSpread(LineSpread):
     ----------
     fwhm : float
         Full width W at half of the maximum. [m]
-
-    Raises
-    ------
-    ValueError
-        If the width is not positive.
-
-    Examples
-    --------
-    >>> spread = GaussianSpread(30.0)
-    >>> round(float(spread.cumulative(15.0) - spread.cumulative(-15.0)), 3)
-    0.761
     """
 
     fwhm: float
@@ -107,11 +89,6 @@ class GaussianSpread(LineSpread):
         ------
         ValueError
             If the transfer is not in (0, 1), or the interval not positive.
-
-        Examples
-        --------
-        >>> round(float(GaussianSpread.from_mtf(0.3, 30.0).mtf(1 / 60)), 12)
-        0.3
         """
         if not 0 < mtf_at_nyquist < 1:
             raise ValueError(f"mtf_at_nyquist must be in (0, 1), got {mtf_at_nyquist}: it is a share, not percent")
@@ -158,18 +135,6 @@ class TableSpread(LineSpread):
         Distances from the pixel's nominal centre, increasing. [m]
     values : sequence of float, shape (n,)
         Response, in any unit: it is scaled to an integral of 1. Lobes may be negative. [1]
-
-    Raises
-    ------
-    ValueError
-        If the positions do not increase, a value is not finite, or the integral is not positive.
-
-    Examples
-    --------
-    A triangle:
-
-    >>> float(TableSpread([-30, 0, 30], [0, 1, 0]).cumulative(-15.0))
-    0.125
     """
 
     positions: tuple = field(repr=False)
@@ -235,20 +200,6 @@ class AggregatedSpread(LineSpread):
         Number n of samples.
     interval : float
         Distance d between them. [m]
-
-    Raises
-    ------
-    ValueError
-        If the number or the interval is not positive.
-
-    Examples
-    --------
-    Detectors as wide as their interval see what one of three times the width sees:
-
-    >>> from fifesim.base.line_spread import Boxcar
-    >>> spread = AggregatedSpread(Boxcar(10.0), 3, 10.0)
-    >>> round(float(spread.mtf(1 / 60) / Boxcar(30.0).mtf(1 / 60)), 12)
-    1.0
     """
 
     sample: LineSpread
@@ -311,11 +262,6 @@ class Diffraction(CutoffTransfer):
     cutoff : float
         Frequency from which on nothing passes: aperture over the product of wavelength and altitude. [cycles m-1]
 
-    Raises
-    ------
-    ValueError
-        If the frequency is not positive.
-
     References
     ----------
     [Goodman2005]_, section 6.3
@@ -339,11 +285,6 @@ class LowPass(CutoffTransfer):
         Frequency at which the power is halved, on the ground. [cycles m-1]
     order : int, optional
         Number of poles.
-
-    Raises
-    ------
-    ValueError
-        If the frequency or the order is not positive.
     """
 
     order: int = 1
@@ -397,17 +338,6 @@ class Difference(Transfer):
         The instrument that recorded the image, M.
     floor : float
         Floor epsilon, in (0, 1). [1]
-
-    Raises
-    ------
-    ValueError
-        If the floor is not in (0, 1).
-
-    Examples
-    --------
-    >>> from fifesim.base.line_spread import Boxcar
-    >>> round(float(Difference(Boxcar(30.0), Boxcar(10.0), 0.01).mtf(1 / 60) * Boxcar(10.0).mtf(1 / 60)), 3)
-    0.637
     """
 
     target: Transfer
@@ -449,22 +379,9 @@ class SystemSpread(LineSpread):
     truncation : float, optional
         Largest share of the response that may be cut off. [1]
 
-    Raises
-    ------
-    ValueError
-        If there is no part, the truncation is not in (0, 0.1], the product has jumps, as a single boxcar has, or
-        decays too slowly to be cut there.
-
     References
     ----------
     [Schowengerdt2007]_, section 3.4
-
-    Examples
-    --------
-    >>> from fifesim.base.line_spread import Boxcar
-    >>> spread = SystemSpread((Diffraction(0.86), Boxcar(30.0), Boxcar(9.0), LowPass(0.05)))
-    >>> bool(spread.truncated_share < 1e-3), round(float(spread.cumulative(0.0)), 12)
-    (True, 0.5)
     """
 
     parts: tuple

@@ -39,13 +39,6 @@ def covered_steps(wavelength, fwhm=None):
     Returns
     -------
     covered : array of bool, shape (n - 1,)
-
-    Examples
-    --------
-    >>> covered_steps([0.50, 0.51, 0.52, 0.60, 0.61, 0.62]).tolist()
-    [True, True, False, True, True]
-    >>> covered_steps([0.50, 0.51, 0.53], fwhm=[0.01, 0.01, 0.01]).tolist()
-    [True, True]
     """
     wavelength = np.asarray(wavelength, float)
     steps = np.diff(wavelength)
@@ -83,13 +76,6 @@ def band_weights(band, wavelength, covered, *, sun=True):
     Returns
     -------
     weights : BandWeights
-
-    Examples
-    --------
-    >>> from fifesim.base.bands import Band
-    >>> found = band_weights(Band("a", (0.5, 0.6, 0.7), (0, 1, 0)), [0.4, 0.6, 0.8], [True, True], sun=False)
-    >>> found.weights.round(6).tolist(), found.coverage
-    ([0.083333, 0.833333, 0.083333], 1.0)
     """
     wavelength, covered = np.asarray(wavelength, float), np.asarray(covered, bool)
     low, high = band.limits
@@ -177,15 +163,6 @@ def best_linear(source, target, uncertainty):
     -----
     Without the spectra :math:`X` of a leaf, whose errors with all spectra are :math:`E`, they are
     :math:`(I - H)^{-1} E` with :math:`H = X \, (N (C_{ss} + u^2 I))^{-1} X^T` (Sherman, Morrison and Woodbury).
-
-    Examples
-    --------
-    The weights of a band that the source has too, which gives its uncertainty to the estimate:
-
-    >>> source = np.array([[[0.1, 0.4], [0.2, 0.3]], [[0.1, 0.5], [0.1, 0.1]]])
-    >>> found = best_linear(source, source[..., :1], 1e-6)
-    >>> found.weights.round(6).tolist(), found.error.round(9).tolist()
-    ([[1.0, 0.0]], [1e-06])
     """
     source, target = np.asarray(source, float), np.asarray(target, float)
     (leaves, count, _), number = source.shape, source.shape[0] * source.shape[1]
