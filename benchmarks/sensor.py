@@ -11,8 +11,7 @@ import argparse
 import numpy as np
 from timing import seconds
 
-from fifesim.base.footprints import axis_operator, regularize
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import Boxcar, axis_operator, regularize
 from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread
 
 CELL = 30 / 9

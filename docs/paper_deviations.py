@@ -8,8 +8,13 @@ import numpy as np
 import fifesim
 from fifesim.analysis.scaling_labels import aggregate_blocks
 from fifesim.atmosphere.labels import diffuse_fraction
-from fifesim.base import times
-from fifesim.base.geometry import sun_geometry
+from fifesim.base.geometry import (
+    SITE_ALTITUDE,
+    SITE_LATITUDE,
+    SITE_LONGITUDE,
+    SITE_SIZE,
+    sun_geometry,
+)
 from fifesim.chain.setup import image_of, reflectance_of
 from fifesim.chain.steps import ndvi
 from fifesim.experiments.friedl1995 import case as friedl1995
@@ -107,7 +112,7 @@ def deviations(seeds):
         "blur": blur(case, seeds),
         "sun": sun(),
         "edge": 1 / np.cos(np.radians(case.instrument.scan.max_angle)),
-        "site": (times.SIZE / 100) ** 2,
+        "site": (SITE_SIZE / 100) ** 2,
     }
 
 
@@ -182,7 +187,7 @@ def sun():
     for minute in (27, 35, 43):
         sza = float(
             sun_geometry(
-                f"1987-06-06T16:{minute}Z", times.LATITUDE, times.LONGITUDE, times.ALTITUDE
+                f"1987-06-06T16:{minute}Z", SITE_LATITUDE, SITE_LONGITUDE, SITE_ALTITUDE
             ).sza
         )
         found.append(

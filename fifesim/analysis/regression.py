@@ -9,8 +9,7 @@ from typing import ClassVar
 import numpy as np
 from scipy import stats
 
-from fifesim.base.annotations import Numbers
-from fifesim.base.arguments import Method
+from fifesim.base.arguments import Method, Numbers
 from fifesim.base.arrays import compiled
 
 

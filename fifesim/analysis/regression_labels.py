@@ -11,7 +11,7 @@ import xarray as xr
 
 from fifesim.analysis import regression
 from fifesim.analysis.regression import Regression
-from fifesim.base.annotations import Pairing
+from fifesim.base.arguments import Pairing
 from fifesim.grids import cf, chunks, swaths
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import with_crs_of

@@ -12,8 +12,8 @@ import xarray as xr
 from fifesim.analysis import scaling as kernels
 from fifesim.analysis.index_labels import red_and_nir
 from fifesim.analysis.regression_labels import check_same_quantity, origins, regress, sound_cells
-from fifesim.base.annotations import Metres
-from fifesim.base.line_spread import Boxcar, Spread
+from fifesim.base.arguments import Metres
+from fifesim.base.footprints import Boxcar, Spread
 from fifesim.grids import cf, chunks
 from fifesim.grids import grid as grids
 from fifesim.grids.dates import by_date

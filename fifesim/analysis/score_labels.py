@@ -12,8 +12,7 @@ import xarray as xr
 from fifesim.analysis import scores
 from fifesim.analysis.regression import totals
 from fifesim.analysis.regression_labels import check_same_quantity, matched, sound_cells
-from fifesim.base.annotations import Pairing
-from fifesim.base.arguments import Kind, described, is_a
+from fifesim.base.arguments import Kind, Pairing, described, is_a
 from fifesim.base.messages import warn
 from fifesim.grids.inputs import MASKS_TOO, AnyDimensions, RasterOrDataset
 from fifesim.grids.reductions import computed, sums_by_row

@@ -13,8 +13,7 @@ import numpy as np
 from scipy import fft
 
 from fifesim.base.arrays import compiled
-from fifesim.base.footprints import axis_operator, regularize
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import Boxcar, axis_operator, regularize
 
 # Nodes of the Gauss-Legendre rule along the edges of cells, and how many rows and columns of cells around the centre
 # have the finer one. The flux through an edge varies over a length of its distance from the centre.

@@ -10,7 +10,7 @@ import xarray as xr
 
 from fifesim.atmosphere import aerosols, mixtures
 from fifesim.atmosphere.aerosols import Aerosol, phase_of_moments
-from fifesim.base.annotations import AerosolMixture, FilePath
+from fifesim.base.arguments import AerosolMixture, FilePath
 from fifesim.base.files import read_csv
 
 # Other spellings of each name, by Eradiate, libRadtran and AERONET.

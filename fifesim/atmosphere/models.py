@@ -12,8 +12,7 @@ import numpy as np
 from fifesim.atmosphere import ENGINES, aerosols, five_s, gases, mixtures
 from fifesim.atmosphere.aerosols import Aerosol, known_aerosol
 from fifesim.atmosphere.gases import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, Levels, column, profile_above
-from fifesim.base.annotations import AerosolMixture, Numbers
-from fifesim.base.arguments import PLAIN, check_fields, described
+from fifesim.base.arguments import PLAIN, AerosolMixture, Numbers, check_fields, described
 from fifesim.base.messages import closest
 
 # Band limits of the Thematic Mapper, as its designers state them. [um]

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pvlib
 
-from fifesim.base.annotations import Numbers
-from fifesim.base.arguments import described
+from fifesim.base.arguments import Numbers, described
 from fifesim.base.caches import cached
 
 # Wavelengths of sunlight in micrometres are shorter than this, in nanometres longer. [um]

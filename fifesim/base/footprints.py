@@ -1,15 +1,20 @@
 """
 Means of ground cells over the footprints of pixels, for any ratio of sizes and any offset.
 
-A footprint is the product of one line spread function per axis. The weight of a cell from a to b is exactly
-``cumulative(b) - cumulative(a)``, whatever the shape.
+A footprint is the product of one line spread function per axis. A line spread function (lsf) is any object with
+``half_width`` [m], outside of which it is zero, and ``cumulative(x)``, its integral from there up to the distance x [m]
+from the pixel centre, 0 to 1. The weight of a cell from a to b is exactly ``cumulative(b) - cumulative(a)``.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 
+from fifesim.base.arguments import Kind, Numbers
 from fifesim.base.arrays import compiled, jitable
 
 # Rounding of positions leaves weights of about 1e-16 in cells that only touch the footprint: dropped, because
@@ -72,7 +77,7 @@ def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_s
     Parameters
     ----------
     lsf : line spread function
-        As `fifesim.base.line_spread` says.
+        Object with ``half_width`` and ``cumulative``.
     cell_origin, pixel_origin : float
         Outer edge of the first cell and of the first pixel. [m]
     cell_size, pixel_size : float
@@ -99,7 +104,7 @@ def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_s
     --------
     A pixel of two and a half cells:
 
-    >>> from fifesim.base.line_spread import Boxcar
+    >>> from fifesim.base.footprints import Boxcar
     >>> operator = axis_operator(Boxcar(5.0), cell_origin=0, cell_size=2, n_cells=5,
     ...                          pixel_origin=0, pixel_size=5, n_pixels=2)
     >>> operator.weights[0].round(3).tolist(), operator.start[0].item()
@@ -176,7 +181,7 @@ def regularize(values, rows, columns, *, min_valid=0.98):
     --------
     A constant scene stays constant, and a pixel that mostly lies outside is missing:
 
-    >>> from fifesim.base.line_spread import Boxcar
+    >>> from fifesim.base.footprints import Boxcar
     >>> axis = axis_operator(Boxcar(9.0), cell_origin=0, cell_size=3, n_cells=6,
     ...                      pixel_origin=0, pixel_size=9, n_pixels=3)
     >>> regularize(np.full((6, 6), 0.25), axis, axis).round(12)[0].tolist()
@@ -257,3 +262,90 @@ def _sum_valid(values, apart, y_weights, x_weights):
                 total += weight * value
                 share += weight
     return total, share
+
+
+class Transfer:
+    """Transfer function of a part of an instrument; subclasses give the formula, ``_mtf(frequency)``."""
+
+    _mtf: Callable
+
+    def mtf(self, frequency: Numbers) -> np.ndarray:
+        """Modulation transfer function at spatial frequencies [cycles m-1], negative where contrast is reversed. [1]"""
+        return self._mtf(np.asarray(frequency, float))
+
+
+class LineSpread(Transfer):
+    """Line spread function by the distance from the pixel centre."""
+
+    # Subclasses give `half_width`, beyond which it is zero [m], and the formulas `_cumulative(x)` and
+    # `_mtf(frequency)`.
+
+    half_width: float
+    _cumulative: Callable
+
+    def cumulative(self, x: Numbers) -> np.ndarray:
+        """Share of the response before a distance [m] from the pixel centre. [1]"""
+        return self._cumulative(np.asarray(x, float))
+
+    @staticmethod
+    def _check_width(width):
+        if not 0 < width < np.inf:
+            raise ValueError(f"the width of a line spread function must be positive metres, got {width}")
+
+
+# Any object with the two members of a line spread function.
+Spread: TypeAlias = Annotated[
+    LineSpread,
+    Kind(
+        "a line spread function, such as fifesim.instrument('TM').line_spread",
+        lambda value: hasattr(value, "half_width"),
+    ),
+]
+
+
+@dataclass(frozen=True)
+class FiniteSpread(LineSpread):
+    """
+    Line spread function that ends at half of its width on either side.
+
+    Parameters
+    ----------
+    width : float
+        Width W of the support. [m]
+
+    Raises
+    ------
+    ValueError
+        If the width is not positive.
+    """
+
+    width: float
+
+    def __post_init__(self):
+        self._check_width(self.width)
+
+    @property
+    def half_width(self):
+        """Half of the width. [m]"""
+        return self.width / 2
+
+
+@dataclass(frozen=True)
+class Boxcar(FiniteSpread):
+    r"""
+    Uniform line spread function of width W, whose footprint mean is the true areal mean.
+
+    .. math:: C(x) = \frac{1}{2} + \frac{x}{W}, \quad |x| \le \frac{W}{2}; \qquad
+        M(f) = \mathrm{sinc}(f W), \quad \mathrm{sinc}\,t = \frac{\sin \pi t}{\pi t}
+
+    Examples
+    --------
+    >>> float(Boxcar(30.0).cumulative(-7.5))
+    0.25
+    """
+
+    def _cumulative(self, x):
+        return np.clip(0.5 + x / self.width, 0.0, 1.0)
+
+    def _mtf(self, frequency):
+        return np.sinc(frequency * self.width)

@@ -7,8 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from fifesim.base.annotations import Numbers
-from fifesim.base.arguments import check_fields
+from fifesim.base.arguments import Numbers, check_fields
 
 
 def ross_thick(sza, vza, raa):

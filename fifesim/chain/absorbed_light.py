@@ -11,7 +11,7 @@ import xarray as xr
 
 from fifesim.atmosphere.engines import light_at_ground
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.annotations import Time
+from fifesim.base.arguments import Time
 from fifesim.base.bands import Band
 from fifesim.base.geometry import Geometry
 from fifesim.chain.landscapes import canopies_of, check_used, land_of, stands_of

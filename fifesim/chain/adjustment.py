@@ -12,9 +12,9 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base import files
-from fifesim.base.annotations import Names, NoiseKinds, Time, WholeNumber
+from fifesim.base.arguments import Names, NoiseKinds, Time, WholeNumber
 from fifesim.base.caches import cached
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import Boxcar
 from fifesim.base.messages import warn
 from fifesim.chain.steps import as_bands_of, to_toa
 from fifesim.grids import cf, directions

@@ -16,8 +16,7 @@ from fifesim.atmosphere import engines as schemes
 from fifesim.atmosphere.engines import whole_scattering
 from fifesim.atmosphere.labels import LONG_NAMES
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.annotations import Names, Numbers
-from fifesim.base.arguments import described
+from fifesim.base.arguments import Names, Numbers, described
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
 from fifesim.base.geometry import fife_geometry
 from fifesim.base.messages import warn

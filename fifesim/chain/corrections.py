@@ -12,7 +12,7 @@ import xarray as xr
 from fifesim.analysis import corrections
 from fifesim.atmosphere.engines import LARGEST_ZENITH
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.annotations import NumberByBand, Time
+from fifesim.base.arguments import NumberByBand, Time
 from fifesim.base.geometry import ANGLES, relative_azimuth
 from fifesim.base.messages import warn
 from fifesim.base.surface_kernels import RossLi, ross_li

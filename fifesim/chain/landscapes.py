@@ -13,9 +13,9 @@ import xarray as xr
 
 from fifesim.analysis import scaling_labels
 from fifesim.atmosphere.coupling import apparent_reflectance, apparent_reflectance_of_cell
-from fifesim.base.annotations import Metres
+from fifesim.base.arguments import Metres
 from fifesim.base.arrays import compiled
-from fifesim.base.line_spread import Spread
+from fifesim.base.footprints import Spread
 from fifesim.base.messages import warn
 from fifesim.chain import coupled_ground
 from fifesim.grids import cf

@@ -10,7 +10,7 @@ import xarray as xr
 
 from fifesim.analysis.index_labels import band_numbers
 from fifesim.analysis.indices import normalized_difference_std
-from fifesim.base.annotations import NoiseKinds
+from fifesim.base.arguments import NoiseKinds
 from fifesim.base.bands import NEAR_INFRARED, RED
 from fifesim.grids import cf, chunks, directions, swaths, windows
 from fifesim.grids.dates import by_date

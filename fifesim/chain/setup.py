@@ -9,8 +9,7 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.clouds.labels import cast_clouds
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.annotations import Interval, Names, NoiseKinds, Offset, Surroundings, WholeNumber
-from fifesim.base.arguments import check_fields
+from fifesim.base.arguments import Interval, Names, NoiseKinds, Offset, Surroundings, WholeNumber, check_fields
 from fifesim.base.files import in_a_line
 from fifesim.base.lattice import check_seed
 from fifesim.chain import steps

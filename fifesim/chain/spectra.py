@@ -7,7 +7,7 @@ import xarray as xr
 
 from fifesim.atmosphere.labels import diffuse_fraction
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.annotations import Names
+from fifesim.base.arguments import Names
 from fifesim.base.geometry import Geometry
 from fifesim.base.messages import closest
 from fifesim.ground.canopy import optics

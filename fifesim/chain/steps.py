@@ -13,8 +13,7 @@ from fifesim.atmosphere import engines
 from fifesim.atmosphere import labels as atmosphere_labels
 from fifesim.atmosphere.clouds.labels import with_clouds
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.annotations import Names, Surroundings, Time
-from fifesim.base.arguments import Kind, described
+from fifesim.base.arguments import Kind, Names, Surroundings, Time, described
 from fifesim.base.bands import Band
 from fifesim.base.caches import cached
 from fifesim.base.messages import warn

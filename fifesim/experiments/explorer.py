@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from fifesim.base.annotations import FilePath
+from fifesim.base.arguments import FilePath
 from fifesim.experiments.explorer_settings import LINE_NUMBERS, outcomes_of, sweep_of
 from fifesim.experiments.scatter.shares import CURVATURE
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES

@@ -21,7 +21,7 @@ from dask.utils import SerializableLock
 from rasterio.enums import ColorInterp
 from rasterio.windows import Window
 
-from fifesim.base.annotations import Chunks, FilePath
+from fifesim.base.arguments import Chunks, FilePath
 from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, nearest_band
 from fifesim.base.files import in_a_line
 from fifesim.base.geometry import ANGLES

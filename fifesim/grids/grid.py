@@ -15,8 +15,7 @@ from odc.geo.crs import MaybeCRS
 from odc.geo.geobox import GeoBox
 from odc.geo.xr import xr_coords
 
-from fifesim.base.annotations import Pair
-from fifesim.base.arguments import Kind
+from fifesim.base.arguments import Kind, Pair
 from fifesim.base.caches import cached
 from fifesim.base.lattice import centres, whole_cells
 from fifesim.grids import projection

@@ -7,8 +7,7 @@ import numpy as np
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 
-from fifesim.base.annotations import FilePath
-from fifesim.base.arguments import RASTER, Kind
+from fifesim.base.arguments import RASTER, FilePath, Kind
 from fifesim.base.bands import LONGEST
 from fifesim.base.messages import warn
 from fifesim.grids import cf, chunks

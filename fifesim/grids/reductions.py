@@ -11,8 +11,7 @@ from dask.graph_manipulation import bind
 from numba import vectorize
 from scipy.sparse.csgraph import connected_components
 
-from fifesim.base.footprints import AxisOperator, axis_operator, regularize
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import AxisOperator, Boxcar, axis_operator, regularize
 from fifesim.grids import chunks, windows
 from fifesim.grids import grid as grids
 from fifesim.grids.chunks import Reads, in_blocks

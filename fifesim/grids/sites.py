@@ -9,10 +9,10 @@ import xarray as xr
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
-from fifesim.base import geometry, times
-from fifesim.base.annotations import Numbers, Times
-from fifesim.base.arguments import UNCHECKED, described
+from fifesim.base import geometry
+from fifesim.base.arguments import UNCHECKED, Numbers, Times, described
 from fifesim.base.caches import cached
+from fifesim.base.geometry import SITE_CORNERS, SITE_LATITUDE, SITE_LONGITUDE, SITE_SIZE
 from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
 
@@ -57,12 +57,12 @@ def fife_site(
     >>> fife_site(30).shape
     Shape2d(x=500, y=500)
     """
-    if datum not in times.CORNERS:
-        raise ValueError(f"datum must be one of {', '.join(times.CORNERS)}, got {datum!r}")
-    if not 0 < cell <= times.SIZE:
-        raise ValueError(f"cell must be in (0, {times.SIZE:g}] m, got {cell:g}")
-    crs, west, north = times.CORNERS[datum]
-    size = int(times.SIZE / cell + 1e-6)
+    if datum not in SITE_CORNERS:
+        raise ValueError(f"datum must be one of {', '.join(SITE_CORNERS)}, got {datum!r}")
+    if not 0 < cell <= SITE_SIZE:
+        raise ValueError(f"cell must be in (0, {SITE_SIZE:g}] m, got {cell:g}")
+    crs, west, north = SITE_CORNERS[datum]
+    size = int(SITE_SIZE / cell + 1e-6)
     site = GeoBox((size, size), Affine(cell, 0.0, west, 0.0, -cell, north), crs)
     return site if window is None else _window(site, window)
 
@@ -83,7 +83,7 @@ def is_fife(array):
         return False
     # Attributes survive arithmetic, so the position is also checked.
     longitude, latitude = projection.middle(grids.geobox(array))
-    return max(abs(longitude - times.LONGITUDE), abs(latitude - times.LATITUDE)) < _FAR
+    return max(abs(longitude - SITE_LONGITUDE), abs(latitude - SITE_LATITUDE)) < _FAR
 
 
 def _window(site, window):
@@ -102,12 +102,12 @@ def _window(site, window):
 @cached(256, "places on the FIFE site")
 def _within(longitude, latitude):
     """Whether a place is on the site, cached because grids are checked often and a transformer takes milliseconds."""
-    if max(abs(longitude - times.LONGITUDE), abs(latitude - times.LATITUDE)) > 1:
+    if max(abs(longitude - SITE_LONGITUDE), abs(latitude - SITE_LATITUDE)) > 1:
         return False
-    crs, west, north = times.CORNERS["NAD83"]
+    crs, west, north = SITE_CORNERS["NAD83"]
     x, y = projection.transformer(4326, crs).transform(longitude, latitude)
     # The corner of one datum is 9 m from that of the other.
-    return max(abs(x - west - times.SIZE / 2), abs(y - north + times.SIZE / 2)) <= times.SIZE / 2 + 10
+    return max(abs(x - west - SITE_SIZE / 2), abs(y - north + SITE_SIZE / 2)) <= SITE_SIZE / 2 + 10
 
 
 def sun_position(

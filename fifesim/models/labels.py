@@ -13,7 +13,7 @@ import xarray as xr
 
 from fifesim.atmosphere.engines import light_at_ground
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.annotations import Time
+from fifesim.base.arguments import Time
 from fifesim.base.bands import Band
 from fifesim.chain.absorbed_light import check_spectra
 from fifesim.chain.absorbed_light import fpar as absorbed_fraction

@@ -16,8 +16,7 @@ from matplotlib.colors import LightSource, Normalize, to_rgb
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
-from fifesim.base.annotations import FilePath
-from fifesim.base.arguments import NAMES, Kind
+from fifesim.base.arguments import NAMES, FilePath, Kind
 from fifesim.base.bands import COMPOSITES, colour_composite
 from fifesim.base.files import in_a_line
 from fifesim.grids import cf, chunks, swaths

@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 
 from fifesim.analysis.regression import Regression
 from fifesim.analysis.regression_labels import matched
-from fifesim.base.annotations import Pairing
-from fifesim.base.arguments import Kind
+from fifesim.base.arguments import Kind, Pairing
 from fifesim.base.scan_pixels import corners
 from fifesim.chain.comparison import image_origins, recorded_images, shows_ndvi
 from fifesim.chain.steps import ndvi

@@ -11,7 +11,7 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import FilePath
+from fifesim.base.arguments import FilePath
 from fifesim.base.files import check_regular, in_a_line
 from fifesim.retrieval import methods
 

@@ -12,8 +12,7 @@ import xarray as xr
 
 from fifesim.analysis.score_labels import score
 from fifesim.atmosphere.aerosols import aerosol_optical_thickness
-from fifesim.base.annotations import FilePath, Names
-from fifesim.base.arguments import Kind, described
+from fifesim.base.arguments import FilePath, Kind, Names, described
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
 from fifesim.chain.driver import Driver
 from fifesim.output.chips.store import chip_arrays, layout_of

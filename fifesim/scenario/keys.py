@@ -9,8 +9,8 @@ from typing import Annotated, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
 
 from fifesim.atmosphere import ENGINES
-from fifesim.base import times
 from fifesim.base.files import check_regular, shown
+from fifesim.base.geometry import SITE_CORNERS, SITE_SIZE, utc
 from fifesim.base.messages import nearest
 from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
 
@@ -271,11 +271,11 @@ EXTENT = ("west", "north", "width", "height")
 class GridKeys(Section):
     """Ground cells. Without corner and size, a scene that reads a LAI file covers that file."""
 
-    crs: str = text(times.CORNERS["NAD83"][0], "projected coordinate reference system in metres")
-    west: float = number(times.CORNERS["NAD83"][1], "m", "easting of the upper left corner")
-    north: float = number(times.CORNERS["NAD83"][2], "m", "northing of the upper left corner")
-    width: float = number(times.SIZE, "m", "west to east", gt=0)
-    height: float = number(times.SIZE, "m", "north to south", gt=0)
+    crs: str = text(SITE_CORNERS["NAD83"][0], "projected coordinate reference system in metres")
+    west: float = number(SITE_CORNERS["NAD83"][1], "m", "easting of the upper left corner")
+    north: float = number(SITE_CORNERS["NAD83"][2], "m", "northing of the upper left corner")
+    width: float = number(SITE_SIZE, "m", "west to east", gt=0)
+    height: float = number(SITE_SIZE, "m", "north to south", gt=0)
     cell: float = number(30 / 9, "m", "size of a cell", ge=0.001)
 
 
@@ -331,7 +331,7 @@ class SunAndViewKeys(Section):
             return value
         # TOML has a date type.
         written = value.isoformat() if isinstance(value, date | time) else value
-        times.utc(written)  # ValueError for an unreadable time
+        utc(written)  # ValueError for an unreadable time
         return written
 
     @model_validator(mode="after")

@@ -11,11 +11,11 @@ from pydantic import Field, ValidationError, model_validator
 from fifesim.atmosphere import six_s
 from fifesim.atmosphere.engines import check_zenith
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base import files, geometry, times
-from fifesim.base.annotations import FilePath
+from fifesim.base import files, geometry
+from fifesim.base.arguments import FilePath
 from fifesim.base.files import shown
+from fifesim.base.geometry import SITE_CORNERS, SITE_LATITUDE, SITE_LONGITUDE, SITE_TIME, utc
 from fifesim.base.messages import nearest
-from fifesim.base.times import utc
 from fifesim.grids import grid as grids
 from fifesim.grids import projection
 from fifesim.grids.opening import covering_grid
@@ -145,7 +145,7 @@ def is_on_site(scenario):
 def _is_hypothetical(scenario):
     """Whether the time is the default on the FIFE site, at which no Landsat passed."""
     given = scenario.geometry
-    default = given.time is None or utc(given.time)[0] == utc(times.TIME)[0]
+    default = given.time is None or utc(given.time)[0] == utc(SITE_TIME)[0]
     return given.sza is None and default and is_on_site(scenario)
 
 
@@ -154,7 +154,7 @@ def _overpass(scenario):
     if given.sza is not None:
         return "Sun angles as given."
     if _is_hypothetical(scenario):
-        return f"Hypothetical overpass, {time_in_words(times.TIME)}."
+        return f"Hypothetical overpass, {time_in_words(SITE_TIME)}."
     return "" if given.time is None else f"Time as given, {time_in_words(given.time)}."
 
 
@@ -262,7 +262,7 @@ class Scenario(Keys):
             return covering_grid(self.ground.lai_file, grid.cell, self.sensor.size, crs)
         box = grids.grid_at(grid.crs, grid.west, grid.north, grid.width, grid.height, grid.cell)
         corner = [key for key in ("west", "north") if key in lacking]
-        if "crs" in own and corner and box.crs != times.CORNERS["NAD83"][0]:
+        if "crs" in own and corner and box.crs != SITE_CORNERS["NAD83"][0]:
             raise ValueError(
                 f"grid.crs = {shown(grid.crs)} is given without {' and '.join(corner)}: give the upper left corner in "
                 "the metres of this CRS"
@@ -281,13 +281,13 @@ class Scenario(Keys):
 
     def overpass_time(self) -> str | None:
         """Date and time as given; by default the FIFE overpass if the scene is on the site."""
-        return self.geometry.time or (times.TIME if on_fife_site(self.geobox()) else None)
+        return self.geometry.time or (SITE_TIME if on_fife_site(self.geobox()) else None)
 
     def sun_place(self) -> tuple[float, float]:
         """Latitude and longitude for the position of the sun; by default FIFE's on its site, else the grid centre."""
         longitude, latitude = projection.middle(self.geobox())
         if on_fife_site(self.geobox()):
-            longitude, latitude = times.LONGITUDE, times.LATITUDE
+            longitude, latitude = SITE_LONGITUDE, SITE_LATITUDE
         given = self.geometry
         latitude = latitude if given.latitude is None else given.latitude
         return latitude, longitude if given.longitude is None else given.longitude

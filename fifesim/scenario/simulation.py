@@ -10,7 +10,7 @@ from affine import Affine
 from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.clouds.labels import DEEPEST_GROUND, cast_clouds, cloud_field
-from fifesim.base.annotations import Chunks
+from fifesim.base.arguments import Chunks
 from fifesim.chain.comparison import shows_ndvi
 from fifesim.chain.landscapes import aggregate
 from fifesim.chain.setup import Setup, image_of, reflectance_of

@@ -11,8 +11,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeAlias
 
-from fifesim.base.annotations import FilePath
-from fifesim.base.arguments import Kind, check_fields
+from fifesim.base.arguments import FilePath, Kind, check_fields
 from fifesim.base.files import shown
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import nearest

@@ -12,8 +12,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.analysis.regression_labels import check_pair, regress
-from fifesim.base.annotations import Array, Pairing
-from fifesim.base.arguments import PLAIN, described
+from fifesim.base.arguments import PLAIN, Array, Pairing, described
 from fifesim.scenario.ensemble import realise
 from fifesim.scenario.scenario import Scenario, find_key, in_text
 from fifesim.scenario.simulation import simulate

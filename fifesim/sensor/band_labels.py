@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import Names
+from fifesim.base.arguments import Names
 from fifesim.base.bands import LONGEST
 from fifesim.grids import cf
 from fifesim.grids.inputs import PER_MICROMETRE, AnyDimensions, check_reflectance, unpacked

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from pydantic import TypeAdapter, ValidationError
 
-from fifesim.base.annotations import Names, NumberOrList, Numbers
+from fifesim.base.arguments import Names, NumberOrList, Numbers
 from fifesim.base.messages import warn
 from fifesim.grids import cf
 from fifesim.grids.sites import is_fife

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.annotations import Interval, NoiseKinds, Offset, Time, WholeNumber
+from fifesim.base.arguments import Interval, NoiseKinds, Offset, Time, WholeNumber
 from fifesim.base.bands import check_counts
 from fifesim.base.geometry import ANGLES
 from fifesim.base.lattice import check_seed

@@ -9,9 +9,8 @@ import pandas as pd
 import xarray as xr
 
 from fifesim.base import files
-from fifesim.base.annotations import Pair, Time
-from fifesim.base.arguments import Kind
-from fifesim.base.times import utc
+from fifesim.base.arguments import Kind, Pair, Time
+from fifesim.base.geometry import utc
 from fifesim.grids import cf
 from fifesim.grids.sites import sun_position
 from fifesim.sensor.description.instrument_file import InstrumentLike

@@ -14,7 +14,7 @@ import xarray as xr
 from odc.geo.geobox import GeoBox
 from scipy.interpolate import RectBivariateSpline
 
-from fifesim.base.annotations import Chunks, NoiseKinds, Time, WholeNumber
+from fifesim.base.arguments import Chunks, NoiseKinds, Time, WholeNumber
 from fifesim.base.caches import cached
 from fifesim.base.geometry import angle_between
 from fifesim.grids import cf, chunks, directions, projection, windows

@@ -24,8 +24,19 @@ import fifesim
 from fifesim.accessor import PUBLIC
 from fifesim.analysis.regression import Regression
 from fifesim.base import arguments as kinds
-from fifesim.base.annotations import Array, FilePath, FrozenDistribution, Metres, Names
-from fifesim.base.arguments import NUMBER, Kind, Method, check_fields, checked, kind_of
+from fifesim.base.arguments import (
+    NUMBER,
+    Array,
+    FilePath,
+    FrozenDistribution,
+    Kind,
+    Method,
+    Metres,
+    Names,
+    check_fields,
+    checked,
+    kind_of,
+)
 from fifesim.grids import grid as grids
 from fifesim.ground.canopy.description import LEAF
 from fifesim.ground.canopy.properties import PROPERTIES

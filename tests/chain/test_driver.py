@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import Boxcar
 from fifesim.chain.driver import Driver, cell_block_means, shared_operators, varying_parts
 from fifesim.chain.setup import image_of, reflectance_of
 from fifesim.grids import grid as grids

@@ -10,8 +10,7 @@ from lazy import ODD_CHUNKS, in_chunks, no_compute
 from odc.geo.geobox import GeoBox
 
 import fifesim
-from fifesim.base.footprints import regularize
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import Boxcar, regularize
 from fifesim.grids import grid as grids
 from fifesim.grids import reductions
 from fifesim.grids.reductions import (

@@ -19,8 +19,7 @@ from distributed import Client, KilledWorker, LocalCluster
 
 import fifesim
 from fifesim import fife_site
-from fifesim.base.footprints import axis_operator
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import Boxcar, axis_operator
 from fifesim.grids import grid as grids
 from fifesim.grids.chunks import neighbourhood
 from fifesim.grids.reductions import resample

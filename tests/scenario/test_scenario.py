@@ -14,8 +14,8 @@ from mistakes import check_message, lines, mistakes
 
 import fifesim
 from fifesim.atmosphere import six_s
-from fifesim.base import files, times
-from fifesim.base.geometry import earth_sun_distance, sun_geometry
+from fifesim.base import files
+from fifesim.base.geometry import SITE_TIME, earth_sun_distance, sun_geometry
 from fifesim.grids import grid as grids
 from fifesim.scenario.scenario import (
     Scenario,
@@ -126,7 +126,7 @@ def test_lengths_are_taken_in_any_of_their_units():
 
 def test_sun_may_be_given_instead_of_time_and_place():
     sun = parse_scenario({"geometry": {"sza": "40 degree", "saa": 100}}).sun_and_view()
-    assert (sun.sza, sun.saa, sun.earth_sun_distance) == (40.0, 100.0, earth_sun_distance(times.TIME))
+    assert (sun.sza, sun.saa, sun.earth_sun_distance) == (40.0, 100.0, earth_sun_distance(SITE_TIME))
     night = parse_scenario({"geometry": {"time": "1987-06-06T06:00:00Z"}})
     with pytest.raises(ValueError, match="the sun is below the horizon"):
         night.sun_and_view()

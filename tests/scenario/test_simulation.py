@@ -7,8 +7,8 @@ import xarray as xr
 from lazy import no_compute
 
 import fifesim
-from fifesim.base import files, times
-from fifesim.base.geometry import Geometry, earth_sun_distance
+from fifesim.base import files
+from fifesim.base.geometry import SITE_TIME, Geometry, earth_sun_distance
 from fifesim.grids import grid as grids
 from fifesim.scenario.ground import elevation
 from fifesim.scenario.scenario import parse_scenario
@@ -189,7 +189,7 @@ def test_every_key_of_a_scenario_reaches_its_stage():
         "sensor": {"bands": bands, "pixel": 50.0, "min_valid": 1.0, "response": "paper"},
     }
     tree = fifesim.simulate(fifesim.Scenario.model_validate(options))
-    sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(times.TIME))
+    sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(SITE_TIME))
     grid = grids.grid_at("EPSG:26914", *LEVEL["grid"].values(), 30 / 9)
     lai = fifesim.lai_scene(grid, "burned-ungrazed", arp=0.2, seed=11, method="periodic")
     rho = fifesim.surface_reflectance(

@@ -9,8 +9,8 @@ import xarray as xr
 from lazy import check_raster_function
 
 import fifesim
+from fifesim.base.footprints import Boxcar
 from fifesim.base.geometry import Geometry
-from fifesim.base.line_spread import Boxcar
 from fifesim.grids import directions
 from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument

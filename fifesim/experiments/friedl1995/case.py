@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from fifesim.base import files, times
+from fifesim.base import files
 from fifesim.base.arguments import is_path
 from fifesim.base.files import check_regular, in_a_line, shown
+from fifesim.base.geometry import SITE_CORNERS, SITE_SIZE
 from fifesim.grids.grid import as_carried
 from fifesim.ground.canopy import optics as canopy_optics
 from fifesim.ground.canopy.spectra import Background, spectrum_names
@@ -367,9 +368,9 @@ class Case:
         """Scenario of one of the nine scenes."""
         # All keys of the ground are explicit, so that the scenario does not depend on defaults. The response of the
         # reading, the number of bits and unnamed densities have no key.
-        crs, west, north = times.CORNERS["NAD83"]
+        crs, west, north = SITE_CORNERS["NAD83"]
         edge = self.cells * CELL
-        first = min(_CORNER * CELL, max(times.SIZE - edge, 0.0))
+        first = min(_CORNER * CELL, max(SITE_SIZE - edge, 0.0))
         west = west + first if self.west is None else self.west
         north = north - first if self.north is None else self.north
         grid = {"crs": crs, "west": west, "north": north, "width": edge, "height": edge, "cell": CELL}

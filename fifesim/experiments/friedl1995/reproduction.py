@@ -10,8 +10,7 @@ from typing import Annotated, Literal, TypeAlias
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import FilePath, FrozenDistribution, WholeNumber
-from fifesim.base.arguments import Kind, is_path
+from fifesim.base.arguments import FilePath, FrozenDistribution, Kind, WholeNumber, is_path
 from fifesim.base.lattice import check_seed
 from fifesim.chain.driver import Driver, cell_block_means
 from fifesim.experiments.friedl1995 import case as friedl1995

@@ -13,8 +13,7 @@ import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.analysis.scaling import by_itself, shapley, taken_away
-from fifesim.base.annotations import WholeNumber
-from fifesim.base.arguments import Kind
+from fifesim.base.arguments import Kind, WholeNumber
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import warn
 from fifesim.experiments.scatter.errors import (

@@ -12,8 +12,7 @@ from fifesim.analysis.index_labels import red_and_nir
 from fifesim.analysis.scaling_labels import aggregate_blocks
 from fifesim.atmosphere.clouds.labels import COLUMNS, cast_clouds, cloud_tables
 from fifesim.atmosphere.clouds.layer import under_clouds
-from fifesim.base.footprints import regularize
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import Boxcar, regularize
 from fifesim.chain.driver import Driver, cell_block_means, shared_operators, varying_parts
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.chain.steps import to_toa

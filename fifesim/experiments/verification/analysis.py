@@ -10,8 +10,7 @@ from scipy import stats
 from fifesim.analysis import regression, scaling, scores
 from fifesim.analysis.indices import normalized_difference
 from fifesim.analysis.regression import fit, row_sums
-from fifesim.base.footprints import axis_operator
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import Boxcar, axis_operator
 from fifesim.experiments.verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "analysis")

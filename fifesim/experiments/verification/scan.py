@@ -5,9 +5,8 @@ from functools import partial
 import numpy as np
 import pyproj
 
-from fifesim.base.footprints import axis_operator
+from fifesim.base.footprints import Boxcar, axis_operator
 from fifesim.base.geometry import fife_geometry
-from fifesim.base.line_spread import Boxcar
 from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.grids import grid as grids
 from fifesim.sensor.response import scan

@@ -10,8 +10,7 @@ from scipy.signal import butter, freqs
 from scipy.stats import norm
 
 from fifesim.base.bands import NEAR_INFRARED, RED, Band, nearest_band, solar_irradiance_steps, solar_spectrum
-from fifesim.base.footprints import axis_operator, regularize
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import Boxcar, axis_operator, regularize
 from fifesim.experiments.verification.deviations import Deviation, integral, largest
 from fifesim.grids import grid as grids
 from fifesim.grids.reductions import areas, regularized

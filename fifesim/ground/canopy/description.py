@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 import numpy as np
 
 from fifesim.base import arguments
-from fifesim.base.annotations import Array, FilePath, NumberOrArray
+from fifesim.base.arguments import Array, FilePath, NumberOrArray
 from fifesim.base.messages import PARTS
 from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes

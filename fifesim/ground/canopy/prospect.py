@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fifesim.base import files
-from fifesim.base.annotations import Array, NumberOrArray
-from fifesim.base.arguments import described
+from fifesim.base.arguments import Array, NumberOrArray, described
 from fifesim.base.arrays import as_rows, compiled, jitable, numbers
 from fifesim.base.caches import cached
 

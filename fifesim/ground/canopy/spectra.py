@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from fifesim.base import files
-from fifesim.base.annotations import NumberOrArray
-from fifesim.base.arguments import described
+from fifesim.base.arguments import NumberOrArray, described
 from fifesim.base.bands import solar_spectrum
 from fifesim.base.caches import cached
 from fifesim.base.files import read_csv

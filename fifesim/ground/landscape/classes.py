@@ -10,8 +10,7 @@ from numbers import Number, Real
 import numpy as np
 from scipy import stats
 
-from fifesim.base.annotations import FilePath, FrozenDistribution
-from fifesim.base.arguments import described
+from fifesim.base.arguments import FilePath, FrozenDistribution, described
 from fifesim.base.caches import cached
 from fifesim.ground.canopy.description import TALLGRASS, Canopy
 from fifesim.ground.canopy.leaf_area import check_map

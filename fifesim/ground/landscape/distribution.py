@@ -12,7 +12,7 @@ import pandas as pd
 from scipy import optimize, stats
 
 from fifesim.base import files
-from fifesim.base.annotations import FrozenDistribution, LaiDistribution
+from fifesim.base.arguments import FrozenDistribution, LaiDistribution
 from fifesim.base.arrays import compiled, jitable
 from fifesim.base.caches import cached
 from fifesim.base.files import in_a_line, read_csv

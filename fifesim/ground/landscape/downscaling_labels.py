@@ -12,8 +12,7 @@ import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.annotations import Chunks, LaiDistribution, WholeNumber
-from fifesim.base.arguments import Kind
+from fifesim.base.arguments import Chunks, Kind, LaiDistribution, WholeNumber
 from fifesim.base.caches import cached
 from fifesim.base.lattice import assemble, check_seed
 from fifesim.base.messages import warn

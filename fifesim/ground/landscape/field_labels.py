@@ -11,8 +11,7 @@ import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.annotations import Chunks, WholeNumber
-from fifesim.base.arguments import NUMBER, Kind, check
+from fifesim.base.arguments import NUMBER, Chunks, Kind, WholeNumber, check
 from fifesim.base.lattice import check_seed
 from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking

@@ -12,8 +12,7 @@ import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.annotations import Chunks, FilePath, WholeNumber
-from fifesim.base.arguments import ANYTHING, UNCHECKED, described, is_path
+from fifesim.base.arguments import ANYTHING, UNCHECKED, Chunks, FilePath, WholeNumber, described, is_path
 from fifesim.base.files import in_a_line
 from fifesim.base.lattice import check_seed
 from fifesim.grids import cf, windows

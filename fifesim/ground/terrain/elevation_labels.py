@@ -13,7 +13,7 @@ from affine import Affine
 from odc.geo.geobox import GeoBox
 from scipy import ndimage
 
-from fifesim.base.annotations import Chunks, WholeNumber
+from fifesim.base.arguments import Chunks, WholeNumber
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import warn
 from fifesim.grids import cf, projection, windows

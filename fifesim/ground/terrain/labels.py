@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from scipy import ndimage
 
-from fifesim.base.annotations import Time
+from fifesim.base.arguments import Time
 from fifesim.base.geometry import Geometry, fife_geometry
 from fifesim.grids import cf, directions, projection
 from fifesim.grids import chunks as chunking

@@ -10,8 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import FilePath, WholeNumber
-from fifesim.base.arguments import Kind, described, is_a
+from fifesim.base.arguments import FilePath, Kind, WholeNumber, described, is_a
 from fifesim.base.messages import warn
 from fifesim.grids.chunks import found_client
 from fifesim.ground.landscape.autoregression import FIELD_TILE

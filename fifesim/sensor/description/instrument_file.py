@@ -9,10 +9,9 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from fifesim.base.annotations import FilePath, Names
-from fifesim.base.arguments import NAMES, Kind
+from fifesim.base.arguments import NAMES, FilePath, Kind, Names
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band, solar_irradiance
-from fifesim.base.line_spread import LineSpread
+from fifesim.base.footprints import LineSpread
 from fifesim.sensor.description.fields import (
     CONFIG,
     AlongAcross,

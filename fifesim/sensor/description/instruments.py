@@ -13,8 +13,7 @@ from typing import Annotated, Literal
 from pydantic import TypeAdapter, ValidationError
 
 from fifesim.base import files
-from fifesim.base.annotations import FilePath
-from fifesim.base.arguments import Kind
+from fifesim.base.arguments import FilePath, Kind
 from fifesim.base.caches import cached
 from fifesim.base.files import in_a_line, read_toml
 from fifesim.sensor.description.fields import errors_in_words, key, lookup

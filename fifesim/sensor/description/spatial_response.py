@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import Boxcar
 from fifesim.sensor.description.fields import CONFIG, Count, Number, Positive, Share, TwoAxes, by_axes
 from fifesim.sensor.response import spatial
 

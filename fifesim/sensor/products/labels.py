@@ -10,8 +10,7 @@ from typing import Annotated, Literal, TypeAlias
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import NumberByBand, Time
-from fifesim.base.arguments import Kind
+from fifesim.base.arguments import Kind, NumberByBand, Time
 from fifesim.base.bands import counts
 from fifesim.base.files import in_a_line
 from fifesim.grids import cf, chunks, directions

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import Chunks, FilePath, Names
+from fifesim.base.arguments import Chunks, FilePath, Names
 from fifesim.base.geometry import ANGLES, Geometry
 from fifesim.grids import chunks as dask_chunks
 from fifesim.grids import directions

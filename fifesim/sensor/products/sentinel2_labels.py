@@ -9,7 +9,7 @@ import dask.array as da
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import Chunks, FilePath, Names
+from fifesim.base.arguments import Chunks, FilePath, Names
 from fifesim.base.geometry import Geometry
 from fifesim.grids import chunks as chunks_of
 from fifesim.grids import directions, windows

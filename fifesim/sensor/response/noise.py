@@ -8,8 +8,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 
-from fifesim.base.annotations import Names, Numbers
-from fifesim.base.arguments import MAPPING, Kind, check_fields
+from fifesim.base.arguments import MAPPING, Kind, Names, Numbers, check_fields
 from fifesim.base.lattice import generator
 
 # Kinds of noise that can be requested by name.

@@ -13,7 +13,7 @@ from scipy.fft import irfft
 from scipy.special import ndtr, spherical_jn
 
 from fifesim.base.caches import cached
-from fifesim.base.line_spread import FiniteSpread, LineSpread, Transfer
+from fifesim.base.footprints import FiniteSpread, LineSpread, Transfer
 
 # Standard deviations at which a Gaussian is cut: 2e-9 of it lie beyond.
 _GAUSSIAN_REACH = 6.0
@@ -375,7 +375,7 @@ class SystemSpread(LineSpread):
     ----------
     parts : sequence
         Objects with ``mtf(frequency)``: `Diffraction` or `GaussianSpread` for the optics, `LowPass` for the
-        electronics, `fifesim.base.line_spread.Boxcar` for the detector and for the smear of its motion.
+        electronics, `fifesim.base.footprints.Boxcar` for the detector and for the smear of its motion.
     truncation : float, optional
         Largest share of the response that may be cut off. [1]
 
@@ -465,7 +465,7 @@ def _density(parts, step, samples):
     product = _product(parts, frequency)
     if abs(product[-1]) > _JUMP:
         raise ValueError(
-            f"the response of {parts} has jumps, which no table holds: use fifesim.base.line_spread.Boxcar, or add the "
+            f"the response of {parts} has jumps, which no table holds: use fifesim.base.footprints.Boxcar, or add the "
             "optics, the smear or the electronics"
         )
     # Lines between the samples multiply the transform by sinc squared.

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.base.footprints import axis_operator
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import Boxcar, axis_operator
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response.scan import (
     EARTH_RADIUS,

@@ -8,8 +8,7 @@ from scipy.integrate import quad
 from scipy.signal import butter, freqs
 from scipy.special import k0
 
-from fifesim.base.footprints import axis_operator, regularize
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.footprints import Boxcar, axis_operator, regularize
 from fifesim.sensor.response.spatial import (
     CosineSpread,
     Difference,
