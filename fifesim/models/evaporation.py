@@ -1,10 +1,15 @@
-"""Evapotranspiration: conductance of a canopy, Penman-Monteith, PT-JPL, and the reference of FAO-56."""
+"""
+Evapotranspiration: conductance of a canopy, Penman-Monteith, PT-JPL, and the reference of FAO-56.
+
+Arguments outside their possible range raise ValueError; NaN passes.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from fifesim.models.production import TMIN_RAMP, VPD_RAMP, canopy_photosynthesis, ramp
+from fifesim.models.weather import in_range
 
 STEFAN_BOLTZMANN = 5.67e-8  # [W m-2 K-4]
 PRIESTLEY_TAYLOR = 1.26  # [1]
@@ -12,6 +17,7 @@ HEAT_CAPACITY = 1013.0  # of air at constant pressure [J kg-1 K-1], as MOD16 has
 WATER_PER_AIR = 0.622  # ratio of the molecular masses of water and dry air [1]
 
 
+@in_range
 def latent_heat(ta_k):
     """
     Latent heat of vaporization of water.
@@ -38,6 +44,7 @@ def latent_heat(ta_k):
     return 2.501e6 - 2361 * (np.asarray(ta_k, float) - 273.15)
 
 
+@in_range
 def saturation_pressure(ta_k):
     """
     Saturation vapour pressure over water, and its slope.
@@ -92,6 +99,7 @@ class PenmanMonteith(NamedTuple):
     """Transpiration of the dry part of the canopy. [W m-2]"""
 
 
+@in_range
 def penman_monteith(
     ta_k, rh_percent, pressure_pa, lai, fpar, rn, tmin_k, stomata=0.0055, cuticle=1e-5, boundary=0.02,
     tmin_ramp=TMIN_RAMP, vpd_ramp=VPD_RAMP,
@@ -191,6 +199,7 @@ class PtJpl(NamedTuple):
 _DRY, _VAPOUR = 287.0597, 461.525
 
 
+@in_range
 def pt_jpl(ta_k, rh_percent, pressure_pa, ndvi, fapar_max, lai, rn, g):
     r"""
     Evapotranspiration by the equation of Priestley and Taylor with the limits of PT-JPL, in its arid form.
@@ -257,6 +266,7 @@ def pt_jpl(ta_k, rh_percent, pressure_pa, ndvi, fapar_max, lai, rn, g):
                  le_canopy + le_soil + le_wet)  # fmt: skip
 
 
+@in_range
 def reference_evapotranspiration(tmin, tmax, ea_kpa, rs_mj, u2, elevation, latitude, day_of_year, wind_height=2.0):
     r"""
     Reference evapotranspiration of short grass in a day, after FAO-56 and ASCE.
@@ -333,6 +343,7 @@ def _extraterrestrial(latitude, day_of_year):
     return 24 / np.pi * 4.92 * (1 + 0.033 * np.cos(angle)) * height
 
 
+@in_range
 def canopy_conductance(
     lai, par, ta_k, vpd_pa, extinction=0.5, g_max=0.0055, half_light=150.0, optimum_k=298.15, range_k=25.0,
     half_deficit=1500.0, integral="leaves",

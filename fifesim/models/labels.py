@@ -178,7 +178,8 @@ def gpp(
     Raises
     ------
     ValueError
-        If LAI, FPAR or weather are out of range, or FPAR is given for a model that does not use it.
+        If LAI, FPAR or weather are out of range, if FPAR is given for a model that does not use it, or with a canopy
+        or atmosphere.
 
     Warns
     -----
@@ -241,7 +242,7 @@ def evapotranspiration(
     Raises
     ------
     ValueError
-        If LAI, FPAR or weather are out of range.
+        If LAI, FPAR or weather are out of range, or FPAR is given with a canopy or atmosphere.
 
     Warns
     -----
@@ -278,6 +279,9 @@ def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time)
     geometry = directions.uniform_geometry(directions.given_geometry(geometry, area, time), quantity)
     if model.of_green_leaves and fpar is not None:
         raise ValueError(f"fpar has no effect with model={name!r}, which takes leaf area: leave it out")
+    for what, given in (("canopy", canopy), ("atmosphere", atmosphere)):
+        if fpar is not None and given is not None:
+            raise ValueError(f"{what} has no effect with fpar, which it would determine: leave out one of them")
     if model.of_green_leaves:
         # Dead leaves do not take part; their shade is neglected.
         area, share = _green(area, land, canopy or TALLGRASS), None

@@ -1,8 +1,14 @@
-"""Gross primary production: light use efficiency, photosynthesis of a canopy, and the biochemistry of two leaves."""
+"""
+Gross primary production: light use efficiency, photosynthesis of a canopy, and the biochemistry of two leaves.
+
+Arguments outside their possible range raise ValueError; NaN passes.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
+
+from fifesim.models.weather import in_range
 
 # Grassland of MOD17, collection 5.1 [Running2004]: efficiency [kg MJ-1] and ends of the ramps [degC, Pa].
 LIGHT_USE = 0.001215
@@ -37,6 +43,7 @@ def ramp(values, low, high):
     return np.clip((np.asarray(values, float) - low) / (high - low), 0.0, 1.0)
 
 
+@in_range
 def light_use_gpp(tmin_c, vpd_pa, fpar, par_mj, lue_kg_mj=LIGHT_USE, tmin_ramp=TMIN_RAMP, vpd_ramp=VPD_RAMP):
     r"""
     Gross primary production of a day from absorbed light, after MOD17.
@@ -83,6 +90,7 @@ class Respiration(NamedTuple):
     root: np.ndarray
 
 
+@in_range
 def maintenance_respiration(lai, tmean_c, sla=38.0, root_per_leaf=2.6, leaf_rate=0.0098, root_rate=0.00819):
     r"""
     Maintenance respiration of leaves and fine roots, after MOD17.
@@ -124,6 +132,7 @@ def maintenance_respiration(lai, tmean_c, sla=38.0, root_per_leaf=2.6, leaf_rate
     return Respiration(leaf, carbon * root_per_leaf * root_rate * 2.0**warmth)
 
 
+@in_range
 def canopy_photosynthesis(lai, extinction, par, quantum_yield, p_max):
     r"""
     Photosynthesis of a canopy whose leaves respond to light by a rectangular hyperbola.
@@ -191,6 +200,7 @@ class TwoLeaves(NamedTuple):
     capacity_shade: np.ndarray
 
 
+@in_range
 def two_leaves(lai, par, diffuse_fraction, sza, vcmax25):
     r"""
     Light absorbed by sunlit and by shaded leaves, and their capacity of carboxylation.
@@ -234,6 +244,7 @@ def two_leaves(lai, par, diffuse_fraction, sza, vcmax25):
     return TwoLeaves(light_sun, total - light_sun, capacity_sun, capacity - capacity_sun)
 
 
+@in_range
 def farquhar_canopy(lai, par, diffuse_fraction, sza, ta_k, vcmax25=60.0, ci_pa=24.5):
     r"""
     Gross photosynthesis of a canopy of C3 leaves: the biochemistry of sunlit and of shaded leaves.

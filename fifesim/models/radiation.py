@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fifesim.ground.canopy.sail_model import LeafScattering, scattered_again
+from fifesim.models.weather import in_range
 
 
 class TwoStream(NamedTuple):
@@ -28,6 +29,7 @@ class TwoStream(NamedTuple):
     absorbed_diffuse: np.ndarray
 
 
+@in_range
 def two_stream(leaf_reflectance, leaf_transmittance, chi, sza, lai, ground):
     r"""
     Albedo and absorption of a canopy over Lambertian ground.
@@ -59,7 +61,7 @@ def two_stream(leaf_reflectance, leaf_transmittance, chi, sza, lai, ground):
     Raises
     ------
     ValueError
-        If chi is out of range.
+        If an argument is outside its possible range.
 
     Notes
     -----
@@ -78,10 +80,12 @@ def two_stream(leaf_reflectance, leaf_transmittance, chi, sza, lai, ground):
     1.0
     """
     chi, mu = np.asarray(chi, float), np.cos(np.radians(sza))
-    if not np.all((chi >= -0.4) & (chi <= 0.6) | np.isnan(chi)):
-        raise ValueError(f"chi must be in [-0.4, 0.6], got {np.nanmin(chi):g} to {np.nanmax(chi):g}: 0 is spherical")
     rho, tau = np.asarray(leaf_reflectance, float), np.asarray(leaf_transmittance, float)
     omega = rho + tau
+    if (omega > 1 + 1e-12).any():
+        raise ValueError(
+            f"leaf_reflectance + leaf_transmittance must be at most 1, got {np.nanmax(omega):g}: reduce one"
+        )
     phi1 = 0.5 - 0.633 * chi - 0.33 * chi**2
     phi2 = 0.877 * (1 - 2 * phi1)
     g = phi1 + phi2 * mu

@@ -1,8 +1,10 @@
-"""Weather of a day for the models, with the range of each quantity."""
+"""Weather of a day for the models, and the range of each quantity and argument of a formula."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import wraps
+from inspect import signature
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -11,6 +13,7 @@ import numpy as np
 from fifesim.base.arguments import check_fields
 from fifesim.base.messages import warn
 from fifesim.ground.canopy.description import NumberByCell, is_raster
+from fifesim.ground.canopy.leaf_area import LARGEST_LAI
 
 
 class Limits(NamedTuple):
@@ -20,7 +23,7 @@ class Limits(NamedTuple):
     lowest: float
     highest: float
     remedy: str
-    valid: tuple[float, float]
+    valid: tuple[float, float] = (-np.inf, np.inf)
 
 
 _KELVIN = Limits(
@@ -43,6 +46,34 @@ WEATHER_LIMITS = {
     "day_length": Limits("h", 0, 24, "it is the time between sunrise and sunset in hours", (0, 24)),
     "diffuse_fraction": Limits("1", 0, 1, "it is a fraction: divide percent by 100", (0, 1)),
 }
+
+_FRACTION = Limits("1", 0, 1, "it is a fraction: divide percent by 100")
+_CELSIUS = Limits("degC", -123, 70, "K was given for degC: subtract 273.15")
+_DAILY = Limits("MJ m-2 d-1", 0, 50, "a mean over the day in W m-2 is multiplied by 0.0864")
+_AT_LEAST_0 = Limits("", 0, np.inf, "it is not negative")
+FORMULA_LIMITS = {
+    **dict.fromkeys(("ta_k", "tmin_k"), _KELVIN),
+    **dict.fromkeys(("tmin_c", "tmean_c", "tmin", "tmax"), _CELSIUS),
+    "rh_percent": Limits("%", 0, 100, "air that holds more water is fog"),
+    "pressure_pa": WEATHER_LIMITS["pressure"],
+    "vpd_pa": Limits("Pa", 0, 5e4, "it is not negative, and less than the saturation pressure"),
+    "ea_kpa": Limits("kPa", 0, 50, "divide Pa by 1000"),
+    **dict.fromkeys(("par_mj", "rs_mj"), _DAILY),
+    "rn": WEATHER_LIMITS["net_radiation"],
+    "g": WEATHER_LIMITS["ground_heat"],
+    "ndvi": Limits("1", -1, 1, "it is a normalized difference: divide scaled integers by their scale"),
+    "lai": Limits("m2 m-2", 0, LARGEST_LAI, "multiply scaled integers by their scale, set missing values to NaN"),
+    **dict.fromkeys(("fpar", "fapar_max", "diffuse_fraction"), _FRACTION),
+    **dict.fromkeys(("leaf_reflectance", "leaf_transmittance", "ground"), _FRACTION),
+    "chi": Limits("1", -0.4, 0.6, "0 is spherical"),
+    "sza": Limits("degree", 0, 90, "the sun is above the horizon"),
+    "latitude": Limits("degree", -90, 90, "it is positive in the north"),
+    "day_of_year": Limits("1", 1, 366, "it is 1 on the first of January"),
+    "elevation": Limits("m", -500, 9000, "multiply km by 1000"),
+    "wind_height": Limits("m", 0.1, 1000, "the profile holds above the grass"),
+    **dict.fromkeys(("u2", "par", "quantum_yield", "p_max", "vcmax25", "ci_pa", "extinction", "g_max"), _AT_LEAST_0),
+}
+"""Allowed range of the arguments of formulas, whose names state their unit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,19 +165,38 @@ class Weather:
 
 def check_weather(name, values):
     """Raise ValueError for impossible values of a quantity, and warn of values outside the range of formulas."""
-    limits, values = WEATHER_LIMITS[name], np.asarray(values, float)
-    if not values.size or np.isnan(values).all():
-        return
-    ends = float(np.nanmin(values)), float(np.nanmax(values))
-    for end in ends:
-        if not limits.lowest <= end <= limits.highest:
-            allowed = f"[{limits.lowest:g}, {limits.highest:g}] {limits.unit}".removesuffix(" 1")
-            raise ValueError(f"{name} must be in {allowed}, got {end:g}: {limits.remedy}")
-        if not limits.valid[0] <= end <= limits.valid[1]:
+    limits = WEATHER_LIMITS[name]
+    for end in _checked_ends(name, values, limits):
+        if end < limits.valid[0] or end > limits.valid[1]:
             warn(
                 f"{name} is {end:g} {limits.unit}, formulas of the models hold from {limits.valid[0]:g} to "
                 f"{limits.valid[1]:g}: the result may be wrong"
             )
+
+
+def _checked_ends(name, values, limits):
+    """Smallest and largest value, NaN where all are missing; ValueError if one is impossible."""
+    values = np.atleast_1d(np.asarray(values, float))
+    ends = [float(each.reduce(values, axis=None)) for each in (np.fmin, np.fmax)] if values.size else []
+    for end in ends:
+        if end < limits.lowest or end > limits.highest:
+            allowed = f"[{limits.lowest:g}, {limits.highest:g}] {limits.unit}".removesuffix(" 1").rstrip()
+            raise ValueError(f"{name} must be in {allowed}, got {end:g}: {limits.remedy}")
+    return ends
+
+
+def in_range(formula):
+    """Wrap a formula so that it raises ValueError for arguments outside `FORMULA_LIMITS`; NaN passes."""
+    arguments = signature(formula)
+
+    @wraps(formula)
+    def checking(*args, **options):
+        for name, values in arguments.bind(*args, **options).arguments.items():
+            if name in FORMULA_LIMITS:
+                _checked_ends(name, values, FORMULA_LIMITS[name])
+        return formula(*args, **options)
+
+    return checking
 
 
 def check_order(weather):

@@ -148,8 +148,6 @@ def test_two_stream_holds_where_printed_solutions_divide_by_zero():
         np.testing.assert_allclose(field[1], (field[0] + field[2]) / 2, rtol=1e-9)
     energy = around.albedo_diffuse + around.absorbed_diffuse + 0.9 * around.ground_diffuse
     np.testing.assert_allclose(energy, 1, rtol=1e-12)
-    with pytest.raises(ValueError, match="chi must be in"):
-        two_stream(0.1, 0.1, 0.7, 30.0, 1.0, 0.1)
 
 
 def test_missing_cells_stay_missing_and_bare_ground_is_quiet():
@@ -163,3 +161,41 @@ def test_missing_cells_stay_missing_and_bare_ground_is_quiet():
     ]
     for result in results:
         assert np.isnan(result[0]) and abs(result[1]) < 1e-12 and result[2] > 0
+
+
+@pytest.mark.parametrize(
+    "call, message",
+    [
+        (
+            lambda: evaporation.latent_heat(-3.0),
+            r"ta_k must be in \[150, 350\] K, got -3: degC was given for K: add 27",
+        ),
+        (lambda: evaporation.saturation_pressure([290.0, np.nan, 25.0]), "ta_k must be in .* got 25"),
+        (
+            lambda: evaporation.penman_monteith(290.0, 120.0, 95e3, 2.0, 0.7, 600.0, 280.0),
+            r"rh_percent must be in \[0, 100\] %, got 120: air that holds more water is fog",
+        ),
+        (lambda: evaporation.penman_monteith(290.0, 50.0, 950.0, 2.0, 0.7, 600.0, 280.0), "pressure_pa .* got 950"),
+        (lambda: evaporation.pt_jpl(290.0, 50.0, 95e3, 8500.0, 0.9, 1.2, 500.0, 50.0), "ndvi .* got 8500: .*scaled"),
+        (
+            lambda: evaporation.reference_evapotranspiration(285.0, 295.0, 1.4, 22.0, 2.0, 100.0, 50.0, 187),
+            "tmin must be in .* degC, got 285: K was given for degC",
+        ),
+        (lambda: evaporation.canopy_conductance(2.0, 900.0, 290.0, -1.0), "vpd_pa must be in .* got -1"),
+        (
+            lambda: production.light_use_gpp(15.0, 650.0, 50.0, 10.0),
+            r"fpar must be in \[0, 1\], got 50: .*percent by 100",
+        ),
+        (lambda: production.maintenance_respiration(-1.0, 20.0), r"lai must be in \[0, 100\] m2 m-2, got -1"),
+        (
+            lambda: canopy_photosynthesis(3.0, 0.5, -1.0, 0.05, 20.0),
+            r"par must be in \[0, inf\], got -1: it is not neg",
+        ),
+        (lambda: farquhar_canopy(3.0, 900.0, 0.2, 95.0, 290.0), r"sza must be in \[0, 90\] degree, got 95"),
+        (lambda: two_stream(0.1, 0.1, 0.7, 30.0, 1.0, 0.1), r"chi must be in \[-0.4, 0.6\], got 0.7: 0 is spherical"),
+        (lambda: two_stream(0.6, 0.5, 0.0, 30.0, 1.0, 0.1), r"leaf_transmittance must be at most 1, got 1.1"),
+    ],
+)
+def test_impossible_arguments_are_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

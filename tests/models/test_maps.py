@@ -114,6 +114,10 @@ def test_given_fpar_is_a_fraction_that_the_model_uses(lai):
             lai.fifesim.evapotranspiration(fpar=wrong).compute()
     with pytest.raises(ValueError, match="fpar has no effect with model='farquhar'"):
         lai.fifesim.gpp(fpar=absorbed, model="farquhar")
+    for what, given in (("canopy", fifesim.Canopy(brown=0.5)), ("atmosphere", fifesim.Atmosphere(visibility=20.0))):
+        for verb in (fifesim.gpp, fifesim.evapotranspiration):
+            with pytest.raises(ValueError, match=f"{what} has no effect with fpar, .*leave out one of them"):
+                verb(lai, fpar=absorbed, **{what: given})
     # FPAR of bare and of almost bare ground is a fraction too.
     for area in (0 * lai, 0 * lai + 1e-9):
         assert (area.fifesim.gpp() >= 0).all()

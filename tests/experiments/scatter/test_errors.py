@@ -160,3 +160,5 @@ def test_parameters_of_a_study_have_their_shares():
         fifesim.sensitivity(study, lambda scenario: [1, 2], n=4, each=iter)
     with pytest.raises(ValueError, match="n must be at least 2"):
         fifesim.sensitivity(study, n=1)
+    with pytest.raises(TypeError, match=r"n must be a whole number, got 3\.5"):
+        fifesim.sensitivity(study, n=3.5)
