@@ -117,7 +117,7 @@ def _is_size(value):
 
 
 NUMBER = Kind("a number", _is_number)
-WHOLE = Kind("a whole number", _is_whole)
+WHOLE_NUMBER = Kind("a whole number", _is_whole)
 NUMBERS = Kind("a number, or an array of them", _are_numbers)
 PAIR = Kind("a number, or two: down and across", _is_pair)
 LIST = Kind("a number, or a list of them", lambda value: _are_numbers(value) and np.ndim(value) < 2)
@@ -166,7 +166,7 @@ class Method:
 # Kinds of types. Classes of slow libraries are found by name; `Annotated` states any other kind.
 _KINDS = {
     bool: FLAG,
-    int: WHOLE,
+    int: WHOLE_NUMBER,
     float: NUMBER,
     str: TEXT,
     tuple[float, float]: TWO,
@@ -323,7 +323,7 @@ def _cure(value, kind):
         return ": take one of its arrays, such as tree['10m/dn']"
     if takes_raster and isinstance(value, str):
         return ": open it with fifesim.open_image, rioxarray.open_rasterio, or onto a grid with fine_dem or open_lai"
-    if kind in (NUMBER, WHOLE) and is_a(value, "DataArray", "ndarray"):
+    if kind in (NUMBER, WHOLE_NUMBER) and is_a(value, "DataArray", "ndarray"):
         return ", where one is for all cells"
     if kind is GRID and is_a(value, "DataArray"):
         return ": type raster.odc.geobox"
