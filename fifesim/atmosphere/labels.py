@@ -90,7 +90,7 @@ def spectrum(atmosphere: Atmosphere | None = None, geometry: Directions | None =
     return directions.with_geometry(xr.Dataset(found, coords, {"atmosphere": atmosphere.text}), geometry)
 
 
-_REFERENCE = "Tanre et al. (1990), doi:10.1080/01431169008955048"
+EQUATION_SOURCE = "Tanre et al. (1990), doi:10.1080/01431169008955048"
 
 
 def toa_from_surface(
@@ -141,7 +141,7 @@ def _carry(name, verb, reflectance, atmosphere, bands, geometry, elevation, adja
     names = {"band": reflectance.coords["band"]} if "band" in reflectance.coords else {}
     out = directions.with_geometry(swaths.placed_as(out, reflectance, names), geometry)
     text = f"{verb}: {atmosphere.engine}{' with adjacency' if adjacency else ''}, {atmosphere.text}"
-    return cf.label(out, name, source=reflectance, history=text, atmosphere=atmosphere.text, references=_REFERENCE)
+    return cf.label(out, name, source=reflectance, history=text, atmosphere=atmosphere.text, references=EQUATION_SOURCE)
 
 
 def _check_cells(reflectance, geometry, elevation, adjacency):

@@ -96,12 +96,13 @@ def four_stream_coupling(
     >>> float(four_stream_coupling(0.2, 0.3, 0.3, 0.4, 1.0, 0.0, 1.0, 0.0, 0.0))
     0.2
     """
-    upward = (tss * rsd + tsd * rdd) / (1 - rdd * spherical_albedo)
-    downward = tsd + spherical_albedo * upward
-    return gas_transmittance * (path_reflectance + (tss * rso + downward * rdo) * too + upward * tdo)
+    streams = GroundStreams(rso, rdo, rdo, rsd, rdd, rdd, rsd, rdd, rdd)
+    return directional_coupling(streams, tss, tsd, too, tdo, spherical_albedo, path_reflectance, gas_transmittance)
 
 
-def directional_coupling(streams, tss, tsd, too, tdo, spherical_albedo, path_reflectance=0.0, gas_transmittance=1.0):
+def directional_coupling(
+    streams, tss, tsd, too, tdo, spherical_albedo, path_reflectance=0.0, gas_transmittance=1.0, around=None
+):
     r"""
     Reflectance at the top of the atmosphere over ground with any reflectance, under the actual sky.
 
@@ -119,6 +120,9 @@ def directional_coupling(streams, tss, tsd, too, tdo, spherical_albedo, path_ref
         [1]
     tss, tsd, too, tdo, spherical_albedo, path_reflectance, gas_transmittance : array
         As in `four_stream_coupling`. [1]
+    around : GroundStreams, optional
+        Mean streams of the surroundings, which exchange light with the atmosphere; by default those of the ground. The
+        three streams to the view are of the ground alone. [1]
 
     Returns
     -------
@@ -141,10 +145,10 @@ def directional_coupling(streams, tss, tsd, too, tdo, spherical_albedo, path_ref
     >>> float(directional_coupling(streams, 0.5, 0.25, 0.5, 0.25, 0.0))
     0.140625
     """
-    r = streams
-    once = tss * (r.sun_view * too + r.sun_sky * tdo) + tsd * (r.sky_view * too + r.sky_sky * tdo)
-    fallen, back = tss * r.sun_air + tsd * r.sky_air, r.air_view * too + r.air_sky * tdo
-    again = spherical_albedo * fallen * back / (1 - r.air_air * spherical_albedo)
+    r, a = streams, streams if around is None else around
+    once = tss * (r.sun_view * too + a.sun_sky * tdo) + tsd * (r.sky_view * too + a.sky_sky * tdo)
+    fallen, back = tss * a.sun_air + tsd * a.sky_air, r.air_view * too + a.air_sky * tdo
+    again = spherical_albedo * fallen * back / (1 - a.air_air * spherical_albedo)
     return gas_transmittance * (path_reflectance + once + again)
 
 

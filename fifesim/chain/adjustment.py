@@ -15,6 +15,7 @@ from fifesim.base import files
 from fifesim.base.arguments import Names, NoiseKinds, Time, WholeNumber
 from fifesim.base.caches import cached
 from fifesim.base.footprints import Boxcar
+from fifesim.base.geometry import ANGLES
 from fifesim.base.messages import warn
 from fifesim.chain.steps import as_bands_of, to_toa
 from fifesim.grids import cf, directions
@@ -201,7 +202,9 @@ def as_seen_by(
     geometry = _geometry(reflectance, time, geometry)
     reflectance = directions.dated(reflectance, time)
     surface = adjust_bands(reflectance, description, bands=bands, source=source, uncertainty=uncertainty)
-    toa = to_toa(surface, atmosphere, geometry=geometry, instrument=description)
+    # Under a new sun the reflectance factor stays.
+    factor = surface if geometry is None else surface.drop_vars(ANGLES, errors="ignore")
+    toa = to_toa(factor, atmosphere, geometry=geometry, instrument=description)
     along_band, line_spreads, recorder = [surface["adjustment_error"]], None, _source(reflectance, source)
     if _is_recorded(recorded, by, recorder):
         differences = _differences(reflectance, recorder, description, description.select(bands), uncertainty)

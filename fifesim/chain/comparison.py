@@ -99,7 +99,7 @@ def compare(
         given = bands.get(description.name)
         selected = description.red_and_near_infrared() if given is None else description.select(given)
         own = replace(setup, instrument=description, bands=tuple(band.name for band in selected))
-        image = image_of(own, reflectance_of(own, lai))
+        image = image_of(own, reflectance_of(own, lai), lai)
         nodes[f"/{description.name}"] = image if isinstance(image, xr.DataTree) else image.to_dataset()
         compared.append((description, own.bands))
     if message := mixed_origins(compared, ("blur", "noise") if setup.noise and not setup.noise_models else ("blur",)):

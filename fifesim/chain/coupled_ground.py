@@ -5,13 +5,14 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from fifesim.atmosphere import engines
+from fifesim.atmosphere import adjacency_labels, engines
+from fifesim.atmosphere.adjacency import environment_weights
 from fifesim.atmosphere.coupling import apparent_reflectance
+from fifesim.atmosphere.labels import EQUATION_SOURCE
 from fifesim.atmosphere.skylight import (
     GroundStreams,
     atmospheric_sky,
     directional_coupling,
-    four_stream_coupling,
     ground_streams,
     scale_of_ground,
     weighted_sky,
@@ -23,8 +24,9 @@ from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.classes import by_class
 from fifesim.grids.inputs import check_reflectance
+from fifesim.grids.windows import origin_of
 from fifesim.ground.canopy import interpolation
-from fifesim.ground.canopy.labels import checked_scene, uniform_kernel
+from fifesim.ground.canopy.labels import EvenCanopy, checked_scene, uniform_kernel
 from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.canopy.reflectance_table import cell_canopy, decay
 from fifesim.ground.canopy.sail_model import Surface, over_background
@@ -148,12 +150,31 @@ def reflectance_streams(land, bands, canopies, light, skies, level):
     return cf.label(made, "surface_reflectance", source=level, history=f"streams: {coupling}")
 
 
-def coupled(coupling, streams, terms):
-    """Reflectance at the top of the atmosphere of streams (list of arrays) below BandTerms that broadcast. [1]"""
-    through = _through(terms)
-    if coupling == "four-stream":
-        return four_stream_coupling(*streams, *through)
-    return directional_coupling(GroundStreams(*streams), *through)
+def is_one_pass(reflectance):
+    """Whether a lazy reflectance can be coupled in one pass, because its cells differ in leaf area only."""
+    return isinstance(origin_of(reflectance), EvenCanopy)
+
+
+def scaled_to_slopes(streams, level, reflectance):
+    """Streams scaled from the reflectance of level ground to the reflectance of slopes, dims (stream, band, y, x)."""
+    ratio = xr.where(level == 0, 1 + 0 * reflectance, reflectance / level)
+    made = (streams * ratio).transpose(*streams.dims)
+    lines = [line for line in reflectance.attrs["history"].split("\n") if line.startswith("terrain")]
+    return cf.label(made, "surface_reflectance", source=streams, history=lines[-1])
+
+
+def coupled(coupling, streams, terms, around=()):
+    """Reflectance at the top of the atmosphere of streams (arrays) below BandTerms, with those of surroundings. [1]"""
+    ground = _ground(coupling, *streams)
+    around = _ground(coupling, *streams[: -len(around)], *around) if around else None
+    return directional_coupling(ground, *_through(terms), around=around)
+
+
+def _ground(coupling, *streams):
+    if coupling == "directional":
+        return GroundStreams(*streams)
+    so, do, sd, dd = streams
+    return GroundStreams(so, do, do, sd, dd, dd, sd, dd, dd)
 
 
 def _through(terms):
@@ -190,7 +211,7 @@ def _with_bands(raster):
     return raster
 
 
-def toa_of_streams(streams, coupling, atmosphere, bands, geometry):
+def toa_of_streams(streams, coupling, atmosphere, bands, geometry, adjacency=False, surroundings=None):
     """Apparent reflectance of a raster of streams, dims (band, y, x). [1]"""
     known = [str(name) for name in streams["stream"].values] if "stream" in streams.coords else []
     coupling = coupling or ("directional" if ">>" in known else "four-stream")
@@ -202,21 +223,43 @@ def toa_of_streams(streams, coupling, atmosphere, bands, geometry):
             f"coupling={coupling!r} needs stream {', '.join(missing)}, the raster has "
             f"{', '.join(known) or 'no names'}: make it with surface_reflectance(..., streams={cure})"
         )
-    streams, terms = _with_bands(streams), band_terms_of(atmosphere, bands, geometry)
-    order = [known.index(name) for name in STREAMS_OF[coupling]]
-    arrays = [streams.isel(stream=number, drop=True).transpose("band", "y", "x") for number in order]
-    plain = [each.drop_vars("band", errors="ignore") for each in arrays]
-    by_band = type(terms)(*(xr.Variable("band", each) for each in terms))
-    count = len(plain)
+    terms, names = band_terms_of(atmosphere, bands, geometry), STREAMS_OF[coupling]
+    streams = _with_bands(streams).isel(stream=[known.index(name) for name in names])
+    around = _means_around(_layers(streams), names, terms, geometry.vza, surroundings) if adjacency else []
+    arrays = _layers(chunking.second_pass(streams, around[0].data) if around else streams)
+    by_band = [xr.Variable("band", each) for each in terms]
 
     def kernel(*values):
-        return coupled(coupling, [check_reflectance(each) for each in values[:count]], type(terms)(*values[count:]))
+        ground, values = [check_reflectance(each) for each in values[: len(names)]], values[len(names) :]
+        return coupled(coupling, ground, type(terms)(*values[len(around) :]), values[: len(around)])
 
-    out = chunking.pointwise(kernel, *plain, *by_band)
-    names = {"band": streams.coords["band"]} if "band" in streams.coords else {}
-    out = directions.with_geometry(grids.place(out, grids.geobox(arrays[0]), names), geometry)
-    text = f"to_toa: {atmosphere.engine}, {coupling} coupling, {atmosphere.text}"
-    return cf.label(out, "toa_reflectance", source=streams, history=text, atmosphere=atmosphere.text)
+    out = chunking.pointwise(kernel, *arrays, *around, *by_band)
+    bands_of = {"band": streams.coords["band"]} if "band" in streams.coords else {}
+    out = directions.with_geometry(grids.place(out, grids.geobox(streams), bands_of), geometry)
+    how = f"{atmosphere.engine}{' with adjacency' if adjacency else ''}, {atmosphere.text}, {coupling} coupling"
+    attrs = {"atmosphere": atmosphere.text, "references": EQUATION_SOURCE}
+    return cf.label(out, "toa_reflectance", source=streams, history=f"to_toa: {how}", **attrs)
+
+
+def _layers(streams):
+    """Streams of a raster, dims (band, y, x), without names of bands."""
+    count = streams.sizes["stream"]
+    plain = streams.drop_vars("band", errors="ignore").transpose("stream", "band", "y", "x")
+    return [plain.isel(stream=number, drop=True) for number in range(count)]
+
+
+def _means_around(layers, names, terms, vza, surroundings):
+    """Means around each cell, as blurred by the atmosphere, of streams that do not lead to the view."""
+    outward = [each for each, name in zip(layers, names, strict=True) if not name.endswith("o")]
+    count, bands = len(outward), outward[0].sizes["band"]
+    if isinstance(surroundings, xr.DataArray) and "band" in surroundings.dims:
+        surroundings = xr.concat([surroundings.drop_vars("band", errors="ignore")] * count, "band")
+    elif np.ndim(surroundings) == 1:
+        surroundings = np.tile(surroundings, count)
+    weights = environment_weights(terms.diffuse_up_molecules, terms.diffuse_up_aerosol)
+    weights = (np.tile(np.broadcast_to(each, bands), count) for each in weights)
+    means = adjacency_labels.environment(xr.concat(outward, "band"), *weights, vza, surroundings=surroundings)
+    return [means.isel(band=slice(first, first + bands)) for first in range(0, count * bands, bands)]
 
 
 def band_terms_of(atmosphere, bands, geometry):

@@ -196,6 +196,8 @@ def varying_parts(setup):
     """Names of the parts of a setup that plain arrays do not support: they vary by cell or couple cells."""
     found = {
         "relief": setup.dem is not None,
+        "upright plants": setup.slopes != "kt",
+        f"{setup.coupling} coupling": setup.coupling != "lambert",
         "adjacency": setup.adjacency,
         "clouds": setup.clouds is not None,
         "angles by cell": not isinstance(setup.geometry, Geometry),

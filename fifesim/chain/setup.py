@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Literal
 
 import xarray as xr
 from odc.geo.geobox import GeoBox
@@ -12,7 +13,7 @@ from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import Interval, Names, NoiseKinds, Offset, Surroundings, WholeNumber, check_fields
 from fifesim.base.files import in_a_line
 from fifesim.base.lattice import check_seed
-from fifesim.chain import steps
+from fifesim.chain import coupled_ground, steps
 from fifesim.grids.directions import Directions
 from fifesim.grids.inputs import Horizon
 from fifesim.ground.canopy.description import TALLGRASS, Canopy
@@ -21,7 +22,7 @@ from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.response.noise import NoiseModels
 
 # Fields that are also arguments of `surface_reflectance` and `sense`.
-_GROUND = ("canopy", "bands", "dem", "horizon", "upwelling", "atmosphere")
+_GROUND = ("canopy", "bands", "dem", "horizon", "upwelling", "slopes", "atmosphere")
 _SENSOR = ("onto", "interval", "offset", "noise", "seed", "noise_models", "quantise", "min_valid")
 
 
@@ -41,8 +42,10 @@ class Setup:
         Directions of sun and sensor; by default from the leaf area raster, else as in the paper.
     canopy : Canopy, optional
         As in `fifesim.surface_reflectance`.
-    dem, horizon, upwelling : optional
+    dem, horizon, upwelling, slopes : optional
         As in `fifesim.surface_reflectance`; without a dem the ground is level.
+    coupling : {"lambert", "four-stream", "directional"}, optional
+        As in `fifesim.to_toa`, for any ground; by default "lambert".
     adjacency, surroundings : optional
         As in `fifesim.to_toa`.
     clouds : xarray.Dataset, optional
@@ -71,6 +74,8 @@ class Setup:
     dem: xr.DataArray | None = None
     horizon: Horizon | None = None
     upwelling: bool = True
+    slopes: Literal["kt", "upright"] = "kt"
+    coupling: Literal["lambert", "four-stream", "directional"] = "lambert"
     adjacency: bool = False
     surroundings: Surroundings | None = None
     clouds: xr.Dataset | None = None
@@ -110,17 +115,25 @@ def _brief(value):
     return in_a_line(repr(value), 160)
 
 
-def reflectance_of(setup, lai):
-    """Surface reflectance of leaf area in the bands of a setup, dims (band, y, x), lazy if an input is. [1]"""
-    return steps.surface_reflectance(lai, setup.instrument, geometry=setup.geometry, **_of(setup, _GROUND))
+def reflectance_of(setup, lai, coupling="lambert"):
+    """Surface reflectance of leaf area in the bands of a setup, or its streams for a coupling, lazy if an input is."""
+    given = _of(setup, _GROUND) | ({"slopes": "kt"} if setup.dem is None else {})
+    given["streams"] = {"lambert": False, "four-stream": True}.get(coupling, coupling)
+    return steps.surface_reflectance(lai, setup.instrument, geometry=setup.geometry, **given)
 
 
-def image_of(setup, reflectance):
-    """Image of a surface reflectance by the instrument of a setup, dims (band, y, x), lazy if an input is."""
+def toa_of(setup, reflectance, lai):
+    """Reflectance at the top of the atmosphere, from a surface reflectance and the leaf area or landscape below."""
     clouds = None if setup.clouds is None else cast_clouds(reflectance, setup.clouds, dem=setup.dem)
-    own = {"clouds": clouds, **_of(setup, ("adjacency", "surroundings"))}
-    toa = steps.to_toa(reflectance, instrument=setup.instrument, **own)
-    return sensor.sense(toa, setup.instrument, **_of(setup, _SENSOR))
+    own = {"clouds": clouds, **_of(setup, ("adjacency", "surroundings", "coupling"))}
+    if setup.coupling != "lambert" and (setup.adjacency or not coupled_ground.is_one_pass(reflectance)):
+        reflectance = reflectance_of(setup, lai, setup.coupling)
+    return steps.to_toa(reflectance, instrument=setup.instrument, **own)
+
+
+def image_of(setup, reflectance, lai=None):
+    """Image of a surface reflectance by the instrument of a setup, with the ground below for a coupling."""
+    return sensor.sense(toa_of(setup, reflectance, lai), setup.instrument, **_of(setup, _SENSOR))
 
 
 def _of(setup, names):

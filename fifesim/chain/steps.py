@@ -368,10 +368,10 @@ def surface_reflectance(
     exact : bool, optional
         Evaluate leaf optics and SAIL at every cell, instead of interpolating a table that is accurate to 1e-6.
     streams : bool or "directional", optional
-        Return separate reflectances for `to_toa`, of level ground: True from the sun s and an isotropic sky d to the
+        Return separate reflectances for `to_toa`: True from the sun s and an isotropic sky d to the
         observer o and into all directions d (``so``, ``do``, ``sd``, ``dd``); "directional" for the sky of this
         atmosphere, >, and for the light that it returns, a (``so``, ``>o``, ``ao``, ``s>``, ``>>``, ``a>``, ``sa``,
-        ``>a``, ``aa``).
+        ``>a``, ``aa``). On slopes, all are scaled as the reflectance factor.
 
     Returns
     -------
@@ -434,18 +434,20 @@ def surface_reflectance(
         level = canopy_labels.level_reflectance(lai, selected, canopies[None], light, exact, provenance)
     else:
         level = canopy_labels.reflectance_of_classes(lai, land.cover, selected, canopies, light, exact, provenance)
-    if streams:
-        if dem is not None:
-            raise ValueError("streams are of level ground: leave dem out, or take streams=False")
-        directions.uniform_geometry(geometry, "streams")
-        skies = coupled_ground.skies_of(atmosphere, responses, geometry) if streams == "directional" else None
-        return coupled_ground.reflectance_streams(land, selected, canopies, light, skies, level)
-    if dem is None:
-        return level
-    sun = sunlight(dem, horizon, atmosphere, responses, geometry, "surface_reflectance on slopes")
-    if slopes == "upright":
-        return landscapes.upright_plants(level, None if land.cover is not None else canopies[None], light, lai, sun)
-    return terrain_labels.terrain_reflectance(level, sun, upwelling)
+    reflectance = level
+    if dem is not None:
+        sun = sunlight(dem, horizon, atmosphere, responses, geometry, "surface_reflectance on slopes")
+        if slopes == "upright":
+            stand = None if land.cover is not None else canopies[None]
+            reflectance = landscapes.upright_plants(level, stand, light, lai, sun)
+        else:
+            reflectance = terrain_labels.terrain_reflectance(level, sun, upwelling)
+    if not streams:
+        return reflectance
+    directions.uniform_geometry(geometry, "streams")
+    skies = coupled_ground.skies_of(atmosphere, responses, geometry) if streams == "directional" else None
+    found = coupled_ground.reflectance_streams(land, selected, canopies, light, skies, level)
+    return found if dem is None else coupled_ground.scaled_to_slopes(found, level, reflectance)
 
 
 @by_date
@@ -496,7 +498,8 @@ def to_toa(
         Light between ground and atmosphere: with the directions of the sky ("directional"), with an isotropic sky,
         which is often worse than one reflectance factor ("four-stream"), or with one reflectance factor ("lambert").
         The default is "lambert" for a reflectance, and "directional" for streams of this coupling, RossLi and RPV.
-        Without streams, "directional" needs a lazy reflectance of a scene whose cells differ in leaf area only.
+        Without streams, "directional" needs a lazy reflectance of a level scene whose cells differ in leaf area only,
+        and no `adjacency`. Surroundings exchange light with the atmosphere by their mean streams.
 
     Returns
     -------
@@ -538,28 +541,38 @@ def to_toa(
     """
     if coupling not in (None, "lambert", *coupled_ground.STREAMS_OF):
         raise ValueError(f"coupling must be 'directional', 'four-stream' or 'lambert', got {coupling!r}")
-    given = {"elevation": elevation, "adjacency": adjacency or None, "surroundings": surroundings, "clouds": clouds}
     if isinstance(reflectance, RossLi | RPV):
+        given = {"elevation": elevation, "adjacency": adjacency or None, "surroundings": surroundings, "clouds": clouds}
         if others := [name for name, each in (given | {"time": time}).items() if each is not None]:
             raise ValueError(f"{', '.join(others)} needs a raster, got a {type(reflectance).__name__}: leave it out")
         return _toa_of_surface(reflectance, coupling or "directional", atmosphere, geometry, instrument)
     streams = isinstance(reflectance, xr.DataArray) and "stream" in reflectance.dims
     by_direction = streams or coupling in coupled_ground.STREAMS_OF
-    if by_direction and (others := [name for name, each in given.items() if each is not None]):
-        raise ValueError(f"{', '.join(others)} needs coupling='lambert' and one reflectance factor: leave it out")
+    if by_direction and elevation is not None:
+        raise ValueError("elevation needs coupling='lambert' and one reflectance factor: leave it out")
+    if not streams and by_direction and adjacency:
+        raise ValueError(
+            f"adjacency with coupling={coupling!r} needs streams: give surface_reflectance(..., streams='directional')"
+        )
+    if not streams and "stream" in reflectance.coords:
+        raise ValueError(
+            f"the raster is the stream {reflectance['stream'].item()!r} of a reflectance: give all streams, or take it "
+            "as the factor of Lambertian ground with .drop_vars('stream')"
+        )
     if not streams:
         reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
     air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
-    if by_direction:
-        check_same_angles(air[-1], reflectance, "sza", "vza")
+    check_same_angles(air[-1], reflectance, "sza", "vza")
+    around = {"adjacency": adjacency, "surroundings": surroundings}
     if streams:
-        return _of(instrument, coupled_ground.toa_of_streams(reflectance, coupling, *air))
-    toa = atmosphere_labels.toa_from_surface(
-        directions.dated(reflectance, time), *air, elevation=elevation, adjacency=adjacency, surroundings=surroundings,
-        made=seen_through_air(reflectance, coupling or "lambert", *air),
-    )  # fmt: skip
-    if by_direction:
-        toa.attrs["history"] += f", {coupling} coupling"
+        toa = coupled_ground.toa_of_streams(reflectance, coupling, *air, **around)
+    else:
+        made = seen_through_air(reflectance, coupling or "lambert", *air)
+        toa = atmosphere_labels.toa_from_surface(
+            directions.dated(reflectance, time), *air, elevation=elevation, **around, made=made
+        )
+        if by_direction:
+            toa.attrs["history"] += f", {coupling} coupling"
     if clouds is not None:
         toa = with_clouds(toa, clouds, *air, elevation=elevation)
     return _of(instrument, toa)

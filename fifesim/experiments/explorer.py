@@ -70,6 +70,7 @@ STAGE_WORDS = {
     "noise": "random errors of the detectors",
     "topography": "slopes face the sun or turn away from it",
     "atmosphere": "haze and gases reduce the contrast",
+    "coupling": "the ground reflects skylight by direction",
     "clouds": "thin clouds pass the mask",
     "shadows": "shadows of thin clouds pass the mask",
     "soil": "soil brightness varies",

@@ -314,7 +314,7 @@ def with_surface_reflectance(dataset, seed):
         true = setup.atmosphere.aot
         error = random.normal(0, _AOT_ERROR[0] + _AOT_ERROR[1] * true) if true else 0.0
         air = replace(setup.atmosphere, visibility=None, aot=min(max(true + error, 0.0), 2.0))
-        light[at] = Driver(replace(setup, atmosphere=air)).corrected(light.values[at].astype(float))
+        light[at] = Driver(replace(setup, atmosphere=air, coupling="lambert")).corrected(light.values[at].astype(float))
     return dataset.assign(surface_reflectance=light)
 
 

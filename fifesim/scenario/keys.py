@@ -132,7 +132,7 @@ class Section(BaseModel):
 
 COVERS = ("none", "pastures", "voronoi", "levels")
 VARYING = tuple(DRAWN)
-KEYS = {name: known for name, known in PROPERTIES.items() if known.default is not None and name != "model"}
+KEYS = {name: known for name, known in PROPERTIES.items() if known.default is not None}
 """Canopy properties that are single keys of a scenario."""
 COVARIATES = ("elevation", "wetness", "illumination")
 FIELD_LIMITS = {"deviations": (0, 1), "arps": (0, 0.2498), "covary": (-1, 1)}
@@ -295,12 +295,17 @@ class TerrainKeys(Section):
     vertical_units: str | None = text(None, "units of the elevation file if they are not metres, such as ft")
     horizon_reach: float = number(5000.0, "m", "maximum distance of terrain that blocks the sky", ge=30, le=50_000)
     upwelling: bool = text(True, "apply the cosine of the view angle on slopes (Eq. 5)")
+    slopes: Literal["kt", "upright"] = text(
+        "kt", "reflectance of slopes: kt (Eq. 4), or upright (SAIL, upright plants)"
+    )
 
     @model_validator(mode="after")
     def _options_of_a_file(self):
         for key in ("fill", "vertical_units"):
             if getattr(self, key) is not None and self.dem in LAND_FORMS:
                 raise ValueError(f"{key} needs an elevation file, dem is {self.dem!r}: name a file or remove {key}")
+        if self.slopes != "kt" and self.dem == "flat":
+            raise ValueError(f"slopes = {self.slopes!r} needs an elevation, dem is 'flat': name hills or remove slopes")
         return self
 
     @field_validator("dem")
@@ -357,6 +362,10 @@ class AirKeys(Section):
     h2o: float | None = number(None, "g cm-2", "column water vapour; by default from the profile", ge=0, le=10)
     o3: float | None = number(None, "cm-atm", "column ozone; by default from the profile", ge=0, le=1)
     engine: str = text("5S", f"radiative transfer model: {', '.join(ENGINES)}")
+    coupling: Literal["lambert", "four-stream", "directional"] = text(
+        "lambert",
+        "reflectance of the ground toward the sky: lambert (one factor), four-stream (isotropic sky) or directional",
+    )
     adjacency: bool = text(False, "adjacency effect: light from the surroundings is scattered into the line of sight")
 
     @model_validator(mode="before")

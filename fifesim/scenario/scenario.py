@@ -229,6 +229,9 @@ class Scenario(Keys):
             raise ValueError(f"landscape.covary: {', '.join(needing)} needs an elevation, but terrain.dem is flat")
         if self.landscape.covary and self.ground.lai_file:
             raise ValueError("landscape.covary cannot be used with a lai_file: remove covary")
+        stands = [self.ground, *self.classes.values()]
+        if self.atmosphere.coupling == "directional" and any(stand.model != "sail" for stand in stands):
+            raise ValueError('atmosphere.coupling = "directional" needs model = "sail": the other has one direction')
         shares = [stand.share for stand in self.classes.values()]
         if any(shares) and not all(shares):
             lacking = ", ".join(name for name, stand in self.classes.items() if stand.share is None)

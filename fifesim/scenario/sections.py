@@ -167,7 +167,7 @@ class Air(AirKeys):
 
     def model(self):
         """Atmosphere described by the keys."""
-        keys = self.model_dump(exclude={"adjacency"})
+        keys = self.model_dump(exclude={"adjacency", "coupling"})
         if "aerosol" in self.files:
             keys["aerosol"] = read_aerosol(self.aerosol)
         return models.Atmosphere(**keys)

@@ -14,7 +14,7 @@ from fifesim.base.arguments import Chunks
 from fifesim.chain.comparison import shows_ndvi
 from fifesim.chain.landscapes import aggregate
 from fifesim.chain.setup import Setup, image_of, reflectance_of
-from fifesim.chain.steps import kt_and_reflectance, ndvi
+from fifesim.chain.steps import kt, kt_and_reflectance, ndvi
 from fifesim.grids import grid as grids
 from fifesim.ground.terrain import labels as terrain_labels
 from fifesim.scenario.ground import canopy_of, cut, elevation, ground_scene, truth_of
@@ -74,21 +74,28 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
     if dem is None:
         reflectance = level
     else:
-        kt, reflectance = kt_and_reflectance(level, dem, horizon, setup.upwelling)
+        reflectance, kt = _on_slopes(replace(setup, dem=dem, horizon=horizon), level, land)
         own, slope = cut(dem, grid), cut(terrain_labels.slope(dem), grid)
         nodes["scene"]["dem"] = own
         nodes["terrain"] = {"dem": means(own), "slope": means(slope), "kt": means(kt.isel(inside))}
-        nodes["level"] = {"dn": image_of(setup, level)}
+        nodes["level"] = {"dn": image_of(setup, level, land)}
     nodes["scene"]["surface_reflectance"] = reflectance.isel(inside)
     if setup.clouds is not None:
         hidden = cast_clouds(reflectance, setup.clouds, dem=dem)[["cloud", "shadow", "optical_thickness"]]
         nodes["truth"] |= means(hidden.isel(inside)).data_vars
-    image = image_of(replace(setup, dem=dem), reflectance)
+    image = image_of(replace(setup, dem=dem, horizon=horizon), reflectance, land)
     nodes["image"] = {"dn": image} | ({"ndvi": ndvi(image)} if shows_ndvi(image) else {})
     tree = xr.DataTree.from_dict({name: xr.Dataset(arrays) for name, arrays in nodes.items()})
     if reach:
         tree["terrain"].attrs = {f"reach_{side}": distance for side, distance in reach.items()}
     return tree
+
+
+def _on_slopes(setup, level, land):
+    """Reflectance on slopes and Kt of a setup with elevation, from the reflectance of level ground."""
+    if setup.slopes == "kt":
+        return kt_and_reflectance(level, setup.dem, setup.horizon, setup.upwelling)[::-1]
+    return reflectance_of(setup, land), kt(level, setup.dem, horizon=setup.horizon)
 
 
 def clouds_of(scenario, grid, chunks="auto"):
@@ -122,6 +129,8 @@ def setup_of(scenario):
         geometry=scenario.sun_and_view(),
         canopy=canopy_of(scenario),
         upwelling=scenario.terrain.upwelling,
+        slopes=scenario.terrain.slopes,
+        coupling=scenario.atmosphere.coupling,
         adjacency=scenario.atmosphere.adjacency,
         clouds=clouds_of(scenario, scenario.geobox()),
         onto=grids.aligned_grid(scenario.geobox(), own.size) if aligned else None,

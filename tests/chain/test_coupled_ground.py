@@ -9,7 +9,7 @@ from odc.geo.xr import wrap_xr
 import fifesim
 from fifesim.atmosphere.coupling import apparent_reflectance
 from fifesim.atmosphere.engines import band_terms
-from fifesim.atmosphere.skylight import atmospheric_sky, directional_coupling, ground_streams
+from fifesim.atmosphere.skylight import GroundStreams, atmospheric_sky, directional_coupling, ground_streams
 from fifesim.chain.coupled_ground import STREAMS_OF
 from fifesim.ground.canopy.sail_model import sail, with_background
 
@@ -20,6 +20,10 @@ SLANT = fifesim.Geometry(sza=50.0, saa=120.0, vza=30.0, vaa=160.0)
 LEAF, SOIL = {"TM3": (0.07, 0.04), "TM4": (0.45, 0.42)}, {"TM3": 0.15, "TM4": 0.19}
 GRASS = fifesim.Canopy(leaf_optics=LEAF, background=SOIL, hotspot=0.05)
 LAI = fifesim.lai_scene(GRID, seed=7)
+CLASSES = [
+    fifesim.CoverClass("grass", lai="burned-grazed"),
+    fifesim.CoverClass("dry", lai=1.0, canopy=fifesim.Canopy(brown=0.4)),
+]
 
 
 def ground(lai=LAI, streams=False, canopy=GRASS, geometry=SLANT):
@@ -118,7 +122,7 @@ def test_refusals():
         ground(streams=True).fifesim.to_toa(coupling="directional")
     with pytest.raises(ValueError, match="holds one reflectance factor"):
         ground().fifesim.to_toa(coupling="directional")
-    with pytest.raises(ValueError, match="adjacency needs coupling"):
+    with pytest.raises(ValueError, match="needs streams"):
         ground(LAI.chunk(y=31)).fifesim.to_toa(coupling="directional", adjacency=True)
     with pytest.raises(ValueError, match="leaf area"):
         ground((LAI - 5).chunk(y=31)).fifesim.to_toa(coupling="four-stream").compute()
@@ -166,8 +170,12 @@ def test_streams_of_other_directions_or_beyond_reflectance_are_refused():
             lazy.fifesim.to_toa(geometry=other, coupling="directional")
     with pytest.raises(ValueError, match=r"-0\.5 to 5 is allowed"):
         (streams - 1).assign_attrs(streams.attrs).fifesim.to_toa()
-    with pytest.raises(ValueError, match="surroundings needs coupling"):
-        streams.fifesim.to_toa(surroundings=0.2)
+    with pytest.raises(ValueError, match="elevation needs coupling"):
+        streams.fifesim.to_toa(elevation=400 + 0 * LAI)
+    with pytest.raises(ValueError, match="is the stream 'so'"):
+        streams.isel(stream=0).fifesim.to_toa()
+    with pytest.raises(ValueError, match="made for sza="):
+        ground().fifesim.to_toa(geometry=fifesim.Geometry(10.0, 120.0, 30.0, 160.0))
     with pytest.raises(ValueError, match="no dimension band"):
         streams.isel(band=0).fifesim.to_toa()
     with pytest.raises(ValueError, match="no dimension band"):
@@ -179,3 +187,66 @@ def test_streams_of_other_directions_or_beyond_reflectance_are_refused():
 def test_discrete_ordinates_have_no_directional_streams():
     with pytest.raises(ValueError, match="one direction of sun and view"):
         ground(streams="directional", canopy=GRASS.replace(model="discrete-ordinates"))
+
+
+def test_adjacency_of_equal_streams_is_lambertian_and_of_even_ground_nothing():
+    """With the streams of one factor, also in a bright environment; of an even scene, in itself."""
+    level = ground()
+    for given in ({}, {"surroundings": [0.05, 0.3]}):
+        expected = level.fifesim.to_toa(adjacency=True, **given)
+        for coupling in ("directional", "four-stream"):
+            even = level.expand_dims(stream=list(STREAMS_OF[coupling]))
+            found = even.fifesim.to_toa(adjacency=True, **given)
+            np.testing.assert_allclose(found, expected, rtol=1e-9)
+    one = ground(1.5 + 0 * LAI, streams="directional")
+    np.testing.assert_allclose(one.fifesim.to_toa(adjacency=True), one.fifesim.to_toa(), rtol=1e-12)
+    streams = ground(LAI.chunk(y=31, x=29), streams="directional")
+    with no_compute():
+        lazy = streams.fifesim.to_toa(adjacency=True)
+    np.testing.assert_allclose(lazy.compute(), ground(streams="directional").fifesim.to_toa(adjacency=True), rtol=1e-12)
+
+
+def test_surroundings_enter_by_the_streams_that_do_not_lead_to_the_view():
+    """A dark cell in an even bright scene: its own streams to the view, and those of the scene for the sky."""
+    streams = ground(1.5 + 0 * LAI, streams="directional").load()
+    bright = streams.isel(y=0, x=0).values
+    dark = streams.copy()
+    dark[..., 30, 36] *= 0.5
+    found = dark.fifesim.to_toa(adjacency=True).values[:, 30, 36]
+    terms = band_terms(HAZE, [b.response for b in fifesim.instrument("TM").select(BANDS)], 50.0, 30.0, SLANT.raa)
+    down, up = terms.direct_transmittance_down, terms.direct_transmittance_up
+    through = down, terms.transmittance_down - down, up, terms.transmittance_up - up, terms.spherical_albedo
+    mixed = GroundStreams(*(0.5 * bright[:3]), *bright[3:])
+    expected = directional_coupling(mixed, *through, terms.path_reflectance, terms.gas_transmittance)
+    np.testing.assert_allclose(found, expected, rtol=2e-3)
+    alone = directional_coupling(
+        GroundStreams(*(0.5 * bright)), *through, terms.path_reflectance, terms.gas_transmittance
+    )
+    assert abs(found / alone - 1).min() > 0.01
+
+
+def test_streams_of_slopes_are_scaled_as_the_factor():
+    dem = fifesim.flint_hills(GRID, seed=7)
+    given = {"canopy": GRASS, "atmosphere": HAZE, "geometry": SLANT, "bands": BANDS}
+    for slopes in ("kt", "upright"):
+        on_slopes = LAI.fifesim.surface_reflectance("TM", dem=dem, slopes=slopes, streams="directional", **given)
+        ratio = LAI.fifesim.surface_reflectance("TM", dem=dem, slopes=slopes, **given) / ground()
+        np.testing.assert_allclose(on_slopes, ground(streams="directional") * ratio, rtol=1e-12)
+        assert "terrain" in on_slopes.history and on_slopes.dims == ("stream", "band", "y", "x")
+
+
+@pytest.mark.parametrize("coupling", ["directional", "four-stream"])
+def test_a_setup_is_its_steps(coupling):
+    """Hills, classes, adjacency and clouds together, and the flat scene that is coupled in one pass."""
+    land = fifesim.landscape(GRID, cover=fifesim.Patches("voronoi", 60), classes=CLASSES, seed=3)
+    sky = fifesim.cloud_field(GRID, 0.5, seed=1, margin=3000)
+    own = {"atmosphere": HAZE, "geometry": SLANT, "bands": BANDS, "dem": fifesim.flint_hills(GRID, seed=7)}
+    setup = fifesim.Setup(coupling=coupling, slopes="kt", adjacency=True, clouds=sky, **own)
+    image = land.fifesim.compare(["TM"], setup, bands={"TM": BANDS})["TM"]["dn"]
+    streams = land.fifesim.surface_reflectance("TM", streams=True if coupling == "four-stream" else coupling, **own)
+    cast = fifesim.cast_clouds(streams.isel(stream=0, drop=True), sky, dem=own["dem"])
+    expected = streams.fifesim.to_toa(adjacency=True, clouds=cast).fifesim.sense("TM")
+    np.testing.assert_array_equal(image, expected)
+    plain = fifesim.Setup(coupling=coupling, bands=BANDS, atmosphere=HAZE, geometry=SLANT)
+    lazy = LAI.chunk(y=31).fifesim.compare(["TM"], plain, bands={"TM": BANDS})["TM"]["dn"]
+    assert int(abs(lazy.astype(int) - LAI.fifesim.compare(["TM"], plain, bands={"TM": BANDS})["TM"]["dn"]).max()) <= 1

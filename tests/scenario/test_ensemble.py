@@ -31,6 +31,10 @@ CASES = {
     "classes": {"landscape": {"cover": "pastures"}},
     "varying": {"landscape": {"deviations": {"soil": 0.03, "brown": 0.05}}, "ground": {"brown": 0.2}},
     "adjacency": {"atmosphere": {"adjacency": True}},
+    "coupled on hills": {
+        "atmosphere": {"coupling": "four-stream"},
+        "terrain": {"dem": "flint-hills", "horizon_reach": 300},
+    },
 }
 
 

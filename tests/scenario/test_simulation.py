@@ -16,6 +16,8 @@ from fifesim.sensor.description.instruments import instrument
 
 GRID = {"west": 704970.0 + 600, "north": 4334220.0 - 300, "width": 600.0, "height": 450.0}
 
+EXACT = {"ground.model": "discrete-ordinates"}
+
 
 def scenario(**terrain):
     return parse_scenario({"grid": GRID, "ground": {"seed": 7}, "terrain": {"horizon_reach": 900} | terrain})
@@ -205,6 +207,36 @@ def test_every_key_of_a_scenario_reaches_its_stage():
     np.testing.assert_array_equal(tree["image"]["dn"], image)
     np.testing.assert_array_equal(tree["truth"]["lai"], fifesim.aggregate(lai, 50.0, min_valid=1.0))
     np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fpar, 50.0, min_valid=1.0))
+
+
+def test_coupling_slopes_and_model_of_a_scenario_are_arguments_of_the_chain():
+    keys = {"coupling": "directional", "visibility": 10}
+    case = parse_scenario({"grid": GRID, "terrain": {"horizon_reach": 300}, "atmosphere": keys})
+    dem, horizon, _ = elevation(case, case.geobox())
+    run, plain, upright, exact = (
+        fifesim.simulate(case.replace(**changes))
+        for changes in ({}, {"coupling": "lambert"}, {"slopes": "upright"}, {"coupling": "four-stream", **EXACT})
+    )
+
+    def reflectance(slopes="kt", streams="directional"):
+        air, sun = case.model_atmosphere(), case.sun_and_view()
+        own = {"dem": dem, "horizon": horizon, "slopes": slopes} if slopes else {}
+        given = {"bands": ["TM3", "TM4"], "atmosphere": air, "geometry": sun, "streams": streams}
+        return fifesim.surface_reflectance(run["scene"]["lai"], "TM", **given, **own)
+
+    for found, streams in ((run["image"], reflectance()), (run["level"], reflectance(slopes=None))):
+        np.testing.assert_array_equal(found["dn"], fifesim.sense(fifesim.to_toa(streams), "TM"))
+    assert (run["image"]["dn"] != plain["image"]["dn"]).mean() > 0.05
+    np.testing.assert_array_equal(run["scene"]["surface_reflectance"], plain["scene"]["surface_reflectance"])
+    np.testing.assert_array_equal(upright["scene"]["surface_reflectance"], reflectance("upright", False))
+    np.testing.assert_array_equal(upright["terrain"]["kt"], plain["terrain"]["kt"])
+    assert "discrete ordinates" in exact["scene"]["surface_reflectance"].history
+
+
+def test_couplings_and_slopes_that_do_not_fit_are_refused():
+    for wrong, message in (({"coupling": "directional", **EXACT}, "needs model"), ({"slopes": "upright"}, "elevation")):
+        with pytest.raises(ValueError, match=message):
+            fifesim.Scenario(terrain={"dem": "flat"}).replace(**wrong)
 
 
 def test_instrument_and_its_tables_lie_beside_the_scenario(tmp_path, monkeypatch):

@@ -31,7 +31,7 @@ MECHANISMS = {
     "iii. Regularization by the sensor": ("point spread",),
     "Registration of the pixels (not discussed in the paper)": ("registration",),
     "Digital numbers and noise": ("quantisation", "noise"),
-    "Terrain and atmosphere": ("topography", "atmosphere", "clouds", "shadows"),
+    "Terrain and atmosphere": ("topography", "atmosphere", "coupling", "clouds", "shadows"),
     "Variation of ground properties other than leaf area": tuple(IDEAL_PROPERTIES),
 }
 
@@ -77,7 +77,9 @@ def bar_chart(table):
 def _shown(table):
     """Stages with their ideal states; stages of the ground only if it has them."""
     shares = table.groupby("stage")["share"].apply(lambda values: values.fillna(0).any())
-    return {stage: ideal for stage, ideal in STAGES.items() if stage not in IDEAL_PROPERTIES or shares[stage]}
+    return {
+        stage: ideal for stage, ideal in STAGES.items() if stage not in ("coupling", *IDEAL_PROPERTIES) or shares[stage]
+    }
 
 
 def mechanisms(budget):

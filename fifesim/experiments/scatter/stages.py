@@ -13,6 +13,7 @@ from fifesim.analysis.scaling_labels import aggregate_blocks
 from fifesim.atmosphere.clouds.labels import COLUMNS, cast_clouds, cloud_tables
 from fifesim.atmosphere.clouds.layer import under_clouds
 from fifesim.base.footprints import Boxcar, regularize
+from fifesim.chain import coupled_ground
 from fifesim.chain.driver import Driver, cell_block_means, shared_operators, varying_parts
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.chain.steps import to_toa
@@ -167,6 +168,7 @@ STAGES = {
     "noise": "none",
     "topography": "level ground",
     "atmosphere": "reflectance at the ground",
+    "coupling": "light between ground and atmosphere by one reflectance factor",
     "clouds": "no clouds toward the sensor; in the budget, those thinner than the mask",
     "shadows": "no clouds toward the sun or overhead; in the budget, those thinner than the mask",
 } | IDEAL_PROPERTIES
@@ -213,6 +215,7 @@ def working_stages(scenario):
         "registration": own.interval in ("product", size) and not any(own.offset),
         "noise": not own.noise,
         "topography": scenario.terrain.dem == "flat",
+        "coupling": scenario.atmosphere.coupling == "lambert",
         "clouds": scenario.clouds.cloud_cover == 0,
         "shadows": scenario.clouds.cloud_cover == 0,
     }
@@ -248,7 +251,7 @@ def switches_of(stages):
 
 
 def images_of_all(scenes, switches):
-    """Images of scenes that differ in the offset for all states of their stages, each (15 axes of stages, y, x)."""
+    """Images of scenes that differ in the offset for all states of their stages, each (16 axes of stages, y, x)."""
     lit, images = [name for name in STAGES if name not in _SENSED], [[] for _ in scenes]
     for states in product(*(switches[0][name] for name in lit)):
         at_work = {name for name, state in zip(lit, states, strict=True) if state}
@@ -323,7 +326,8 @@ class _Scene:
 
     def is_stand(self, ground):
         """Whether only leaf area varies, so that plain arrays do."""
-        return set(ground.land.data_vars) == {"lai"} and not varying_parts(self.driver.setup)
+        plain = self.setup.slopes == "kt" and not varying_parts(self.driver.setup)
+        return plain and set(ground.land.data_vars) == {"lai"}
 
     def spread_out(self, cells):
         """Means over the pixels of the truth, spread over the cells."""
@@ -339,7 +343,8 @@ def scene_of(scenario, retrieval=None):
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
     # In memory, because every set of stages with topography needs them.
     dem, horizon = in_memory(*elevation(scenario, grid)[:2])
-    driver = Driver(replace(setup, bands=tuple(band.name for band in bands), clouds=None))
+    level = replace(setup, bands=tuple(band.name for band in bands), clouds=None, slopes="kt", coupling="lambert")
+    driver = Driver(level)
     return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), driver, grid, blocks, image, retrieval)
 
 
@@ -399,20 +404,21 @@ def _cells(scene, ground, at_work):
     driver, bands = scene.driver, list(scene.driver.setup.bands)
     setup = setup_over(scene, ground)
     setup = setup if "topography" in at_work else replace(setup, dem=None, horizon=None)
+    coupling = setup.coupling if {"atmosphere", "coupling"} <= at_work else "lambert"
 
     def reflectance(area):
-        if not scene.is_stand(ground):
-            return reflectance_of(setup, _with_lai(ground, area)).sel(band=bands).values
+        if coupling != "lambert" or not scene.is_stand(ground):
+            return reflectance_of(setup, _with_lai(ground, area), coupling).sel(band=bands).values
         level = driver.reflectance(area)
         return level if setup.dem is None else driver.on_slopes(level, scene.slopes)
 
     # The atmosphere affects only the steps above.
-    key, lai = ("non-linearity" in at_work, setup.dem is None), ground.land["lai"].values
+    key, lai = ("non-linearity" in at_work, setup.dem is None, coupling), ground.land["lai"].values
     if key not in ground.known:
         ground.known[key] = reflectance(lai) if key[0] else along_tangent(reflectance, lai, ground.middle)
     seen = ground.known[key]
     if "atmosphere" in at_work:
-        seen = _with_adjacency(scene, seen) if setup.adjacency else driver.toa(seen)
+        seen = _seen(scene, seen, coupling) if setup.adjacency or coupling != "lambert" else driver.toa(seen)
     if at_work & {"clouds", "shadows"}:
         seen = _under_clouds(scene, seen, at_work)
     return seen if scene.retrieval is not None else np.concatenate([seen, driver.ndvi(seen)[None]])
@@ -429,13 +435,13 @@ def _under_clouds(scene, clear, at_work):
     return np.where(np.maximum(seen, lit[0]) < scene.scenario.clouds.mask, found, np.nan)
 
 
-def _with_adjacency(scene, reflectance):
-    """Apparent reflectance where light from the surroundings is scattered into the view, shape (band, y, x)."""
-    own = scene.driver.setup
-    array = grids.place(
-        xr.DataArray(reflectance, dims=("band", "y", "x"), coords={"band": list(own.bands)}), scene.grid
-    )
-    return to_toa(array, scene.driver.air, geometry=own.geometry, instrument=own.instrument, adjacency=True).values
+def _seen(scene, reflectance, coupling):
+    """Apparent reflectance, shape (band, y, x), of a reflectance or its streams by a coupling, or with adjacency."""
+    own, streams = scene.driver.setup, coupled_ground.STREAMS_OF.get(coupling)
+    coords = {"band": list(own.bands)} | ({"stream": list(streams)} if streams else {})
+    array = xr.DataArray(reflectance, dims=("stream", "band", "y", "x")[-reflectance.ndim :], coords=coords)
+    given = {"geometry": own.geometry, "instrument": own.instrument, "adjacency": own.adjacency, "coupling": coupling}
+    return to_toa(grids.place(array, scene.grid), scene.driver.air, **given).values
 
 
 def along_tangent(function, lai, middle):

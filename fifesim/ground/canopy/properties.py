@@ -21,7 +21,7 @@ class Property(NamedTuple):
 PROPERTIES = {
     "leaf_optics": Property(None, "optics of green leaves"),
     "leaf_angles": Property("spherical", "leaf angle distribution"),
-    "model": Property("sail", "radiative transfer model of the leaves"),
+    "model": Property("sail", "radiative transfer in the leaves: sail or discrete-ordinates"),
     "hotspot": Property(0.0, "leaf size over canopy height", "1", 0, 10),
     "brown": Property(0.0, "share of dead leaf area", "1", by_cell=True, effect="dead leaves"),
     "dissociation": Property(0.0, "position of dead leaves: 0 among the green ones, 1 below them", "1", by_cell=True),

@@ -14,7 +14,7 @@ from fifesim.scenario.scenario import parse_scenario
 
 def test_shares_and_curvature_add_up_to_the_scatter(rough):
     found = fifesim.budget(rough, realisations=2)
-    assert (found["share"].drop_sel(stage=["clouds", "shadows", *IDEAL_PROPERTIES]) != 0).all()
+    assert (found["share"].drop_sel(stage=["coupling", "clouds", "shadows", *IDEAL_PROPERTIES]) != 0).all()
     np.testing.assert_allclose(found["share"].sum("stage") + found["curvature"], found["total"], rtol=1e-12)
     table = scatter.budget_table(found)
     for _, rows in table.set_index("stage").groupby("variable"):
@@ -24,7 +24,7 @@ def test_shares_and_curvature_add_up_to_the_scatter(rough):
 
 def test_stage_that_is_ideal_already_has_exactly_nothing(scenario):
     case = scenario()
-    nothing = ["registration", "noise", "topography", "clouds", "shadows", *IDEAL_PROPERTIES]
+    nothing = ["registration", "noise", "topography", "coupling", "clouds", "shadows", *IDEAL_PROPERTIES]
     assert set(STAGES) - set(working_stages(case)) == set(nothing)
     found = fifesim.budget(case, realisations=2)
     for name in ("share", "alone", "first"):

@@ -46,9 +46,9 @@ def test_all_stages_at_work_are_the_simulation(rough, scenario, clumped):
     case = scenario(crown_cover=0.6) if clumped else rough
     seen, run = pixels(case), fifesim.simulate(case)
     assert set(STAGES) - set(seen.stages) == (
-        set(IDEAL_PROPERTIES) - {"clumping"} | {"registration", "noise", "topography", "clouds", "shadows"}
+        set(IDEAL_PROPERTIES) - {"clumping"} | {"registration", "noise", "topography", "coupling", "clouds", "shadows"}
         if clumped
-        else {"clouds", "shadows", *IDEAL_PROPERTIES}
+        else {"coupling", "clouds", "shadows", *IDEAL_PROPERTIES}
     )
     at_work = (1,) * len(seen.stages)
     rows, columns = (min(run[name].sizes[axis] for name in ("truth", "image")) for axis in ("y", "x"))
@@ -125,6 +125,25 @@ def test_adjacency_is_that_of_the_labelled_chain(scenario):
     found = of(pixels(hazy), atmosphere=1, **{"non-linearity": 1})
     np.testing.assert_allclose(found, expected, rtol=1e-12)
     assert np.abs(found - without).max() > 1e-3
+
+
+@pytest.mark.parametrize("dem", ["flat", "flint-hills"])
+def test_the_stage_of_coupling_is_the_change_of_the_simulation(scenario, dem):
+    case = scenario(dem=dem)
+    keys = {"coupling": "directional", "visibility": 10.0}
+    case = case.model_copy(update={"atmosphere": case.atmosphere.model_copy(update=keys)})
+    seen = pixels(case)
+    at = seen.stages.index("coupling")
+    both = seen.ndvi[(1,) * at][:, *(1,) * (len(seen.stages) - at - 1)]
+    for found, coupling in zip(both, ("lambert", "directional"), strict=True):
+        run = fifesim.simulate(case.replace(coupling=coupling))
+        # The fused pass has its own table, within 1e-5: a count may differ.
+        np.testing.assert_allclose(found, run["image"]["ndvi"].values.ravel(), atol=0.01)
+    assert 1e-3 < abs(both[1] - both[0]).mean() < 0.03
+    no_air = [slice(None)] * seen.ndvi.ndim
+    no_air[seen.stages.index("atmosphere")] = 0
+    without = np.moveaxis(seen.ndvi[tuple(no_air)], at - (at > seen.stages.index("atmosphere")), 0)
+    np.testing.assert_array_equal(*without)
 
 
 def test_a_tangent_has_the_value_and_slope_of_the_curve_at_the_middle():
