@@ -41,7 +41,12 @@ def test_every_field_reaches_its_step(lai, site):
     image = fifesim.sense(fifesim.to_toa(rho, **air, clouds=cells), "TM", **SENSOR)
     xr.testing.assert_identical(image_of(setup, rho), image)
     told = {"instrument", "dem", "horizon", "clouds", *GROUND, *air, *SENSOR}
-    assert {field.name for field in fields(Setup)} - told == {"onto"}
+    upright = replace(setup, slopes="upright", canopy=fifesim.Canopy(hotspot=0.2))
+    own = GROUND | {"canopy": upright.canopy, "slopes": "upright"}
+    expected = fifesim.surface_reflectance(lai, "TM", dem=dem, horizon=horizon, **own)
+    xr.testing.assert_identical(reflectance_of(upright, lai), expected)
+    # The coupling has tests of its own.
+    assert {field.name for field in fields(Setup)} - told == {"onto", "slopes", "coupling"}
 
 
 def test_pixels_may_lie_on_a_grid_of_ones_own(lai, site, whole):
