@@ -312,8 +312,8 @@ def _images(scenario, offsets):
     dem, horizon, _ = elevation(scenario, grid)
     land = ground_scene(scenario, grid, dem=dem)
     truth = aggregate(truth_of(scenario, setup, land)[list(VARIABLES)], scenario.sensor.size, min_valid=setup.min_valid)
-    reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land).compute()
     setup = replace(setup, dem=dem, horizon=horizon)
+    reflectance = reflectance_of(setup, land).compute()
     seen = [image_of(replace(setup, offset=offset), reflectance, land) for offset in offsets]
     pair = [nearest_band(seen[0]["wavelength"].values, window) for window in (RED, NEAR_INFRARED)]
     # The image and the blocks of the truth are paired by row and column.
