@@ -296,7 +296,7 @@ def _checked(clouds, scene):
     base, top = _base_and_top((float(clouds["base"]), float(clouds["top"])))
     thickness = clouds["optical_thickness"]
     cf.check_units(thickness, "optical_thickness")
-    return with_crs_of(thickness.transpose("y", "x"), scene).astype(float), (base + top) / 2
+    return with_crs_of(thickness.transpose("y", "x"), scene).astype(float, copy=False), (base + top) / 2
 
 
 def _chunks_of(scene, *others):
@@ -374,6 +374,8 @@ def _along(way, rows, columns, cells, elevation=None):
     at = np.arange(rows.stop - rows.start)[:, None], np.arange(columns.stop - columns.start)
     if not relief:
         row, column = (first + along for first, along in zip(starts, at, strict=True))
+        if min(row[0], column[0]) >= 0 and row[-1] < way.shape[0] and column[-1] < way.shape[1]:
+            return cells
         inside = (row >= 0) & (row < way.shape[0]) & (column >= 0) & (column < way.shape[1])
         return np.where(inside, cells, 0.0)
     above = way.height + way.reference - elevation
@@ -406,7 +408,9 @@ def with_clouds(toa, clouds, atmosphere, bands, geometry, *, elevation=None):
     sky = cloud_tables(atmosphere, bands, geometry)
     columns = [clouds[name].drop_vars([*ANGLES, "earth_sun_distance"], errors="ignore") for name in COLUMNS]
     plain = toa.drop_vars(["band", *ANGLES], errors="ignore")
-    out = chunks.pointwise(layer.under_clouds, plain, *columns, bands=len(bands), sky=sky).astype(toa.dtype, copy=False)
+    # The reflectance without clouds is of no use to others, except in a graph of tasks.
+    kernel = partial(layer.under_clouds, sky=sky, in_place=toa.chunks is None)
+    out = chunks.pointwise(kernel, plain, *columns, bands=len(bands), dtype=toa.dtype)
     out = toa.copy(deep=False, data=out.transpose(*toa.dims).data)
     return cf.label(out, "toa_reflectance", source=toa, history="to_toa: with clouds")
 

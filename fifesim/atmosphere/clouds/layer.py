@@ -3,12 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.interpolate import CubicSpline
 
-from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
+from fifesim.atmosphere.column import wigner
+from fifesim.atmosphere.successive_orders import quadrature
 from fifesim.base import files
-from fifesim.base.arrays import jitable
+from fifesim.base.arrays import compiled, jitable
 from fifesim.base.bands import solar_irradiance_steps
 from fifesim.base.caches import cached
 from fifesim.base.geometry import scattering_angle_cosine
@@ -120,19 +120,18 @@ class LayerLight(NamedTuple):
     reflectance: np.ndarray  # bidirectional reflectance factor of the layer over black ground
     transmittance_down: np.ndarray  # direct and diffuse, from the sun
     transmittance_up: np.ndarray  # and to the sensor
-    diffuse_transmittance: np.ndarray  # of isotropic light
     spherical_albedo: np.ndarray
+    diffuse_transmittance: np.ndarray  # of isotropic light
 
 
-_THICKNESS = np.array(
-    [0.0, 0.01, 0.03, 0.06, 0.1, 0.18, 0.3, 0.5, 0.8, 1.2, 1.8, 2.6, 3.8, 5.5, 8.0, 11.5, 16.0, 23.0, 34.0, 55.0]
-    + [THICKEST]
-)
-_ZENITHS = np.arange(0.0, 76.0, 5.0)  # [degree]
-_AZIMUTHS = np.arange(0.0, 181.0, 7.5)  # [degree]
-_MOMENTS = ASYMMETRY ** np.arange(33)
-_STREAMS = 16
-_GAUSS, _WEIGHTS = (np.polynomial.legendre.leggauss(8)[0] + 1) / 2, np.polynomial.legendre.leggauss(8)[1] / 2
+_ZENITHS = np.arange(0.0, 86.0, 5.0)  # [degree]
+_BY_ZENITH = CubicSpline(np.concatenate([-_ZENITHS[:0:-1], _ZENITHS]), np.eye(2 * _ZENITHS.size - 1))
+_STREAMS = 16  # directions per hemisphere
+_MODES = np.arange(2 * _STREAMS)  # Fourier modes in azimuth, and degrees of the phase function
+_PEAK = ASYMMETRY ** (2 * _STREAMS)  # share of the forward peak that counts as not scattered [1]
+_PER_OCTAVE = 3  # optical thicknesses in the table per doubling
+_THINNEST, _DOUBLINGS = 0.0125, 13  # thinnest layer in the table, and its doublings
+_FIRST = 18  # doublings up to this layer, from one so thin that it scatters once
 
 
 def henyey_greenstein(cosine):
@@ -142,7 +141,7 @@ def henyey_greenstein(cosine):
 
 def layer_light(optical_thickness, co_albedo, sza, vza, raa):
     r"""
-    Reflectance and transmittance of a layer of cloud drops, from a table made by successive orders of scattering.
+    Reflectance and transmittance of a layer of cloud drops, from a table made by doubling.
 
     Parameters
     ----------
@@ -151,7 +150,7 @@ def layer_light(optical_thickness, co_albedo, sza, vza, raa):
     co_albedo : float
         One less the single scattering albedo. [1]
     sza, vza : float
-        0 to 75. [degree]
+        0 to 85. [degree]
     raa : float
         0 has sun and sensor on the same side. [degree]
 
@@ -163,12 +162,12 @@ def layer_light(optical_thickness, co_albedo, sza, vza, raa):
     Notes
     -----
     Drops scatter by the function of Henyey and Greenstein with asymmetry 0.85, without rainbow and glory. Single
-    scattering is exact, and the rest is interpolated: splines over the thickness, cubics every 5 degrees of zenith and
-    7.5 of azimuth.
+    scattering is exact. The rest is a Fourier series in azimuth, interpolated by cubic splines over the zenith angles,
+    every 5 degrees, and over the logarithm of the thickness, three per octave.
 
     References
     ----------
-    [Henyey1941]_; [Lenoble2007]_; [Nakajima1988]_
+    [Henyey1941]_; [Hansen1974]_, doubling; [Nakajima1988]_, single scattering
 
     Examples
     --------
@@ -178,92 +177,129 @@ def layer_light(optical_thickness, co_albedo, sza, vza, raa):
     >>> light.reflectance.round(1).tolist(), light.transmittance_down.round(1).tolist()
     ([0.0, 0.9], [1.0, 0.2])
     """
-    s, sun = _cubic(sza, _ZENITHS)
-    v, view = _cubic(vza, _ZENITHS)
-    r, turn = _cubic(raa, _AZIMUTHS)
-    parts = [_rescattered(co_albedo, float(_ZENITHS[s + i]))[:, v : v + 4, r : r + 4] for i in range(4)]
-    rescattered = np.einsum("stvr,s,v,r->t", np.array(parts), sun, view, turn)
-    through, diffuse, albedo = _fluxes(co_albedo)
-    down, up = through[:, s : s + 4] @ sun, through[:, v : v + 4] @ view
-    place, at = np.log1p(_THICKNESS), np.log1p(np.asarray(optical_thickness, float))
-    once = _scattered_once(np.asarray(optical_thickness, float), co_albedo, sza, vza, raa)
-    smooth = (CubicSpline(place, each)(at) for each in (rescattered, down, up, diffuse, albedo))
-    reflectance, down, up, diffuse, albedo = smooth
-    return LayerLight(once + reflectance, down, up, diffuse, albedo)
+    thickness, table = np.asarray(optical_thickness, float), _table(co_albedo)
+    sun, view = _zenith_weights(sza), _zenith_weights(vza)
+    # From the side of the sun, the azimuths of propagation differ by 180 degrees.
+    turn = np.where(_MODES == 0, 1, 2) * np.cos(_MODES * np.radians(raa + 180))
+    rescattered = np.einsum("tmvs,mv,ms,m->t", table.rescattered, view, sun, turn, optimize=True)
+    down, up = table.transmittance @ sun[0], table.transmittance @ view[0]
+    nodes = np.stack([rescattered, down, up, table.spherical_albedo, table.diffuse_transmittance], axis=1)
+    smooth = CubicSpline(_stretched(table.thickness), nodes)(_stretched(thickness)).T
+    cosines = np.cos(np.radians(sza)), np.cos(np.radians(vza))
+    phase = henyey_greenstein(scattering_angle_cosine(sza, vza, raa))
+    return LayerLight(_scattered_once(thickness, co_albedo, *cosines, phase) + smooth[0], *smooth[1:])
 
 
-def _cubic(value, nodes):
-    """First of the four nodes around a value, and their Lagrange weights."""
-    step = nodes[1]
-    first = min(max(int(value / step) - 1, 0), nodes.size - 4)
-    place, others = value / step - first, np.arange(4.0)
-    terms = [[(place - k) / (i - k) for k in others if k != i] for i in others]
-    return first, np.prod(terms, axis=1)
+def _stretched(thickness):
+    """Place of an optical thickness in the table, a logarithm except for the thinnest. [1]"""
+    return np.log1p(thickness / 0.05)
 
 
-def _scattered_once(thickness, co_albedo, sza, vza, raa):
-    """Reflectance by single scattering with the forward peak counted as not scattered, shape of thickness. [1]"""
-    mu_s, mu_v = np.cos(np.radians(sza)), np.cos(np.radians(vza))
-    phase, kept = henyey_greenstein(scattering_angle_cosine(sza, vza, raa)), 1 - (1 - co_albedo) * _MOMENTS[-1]
+def _zenith_weights(zenith):
+    """Weights of the zenith angles of the table for each Fourier mode, shape (mode, zenith). [1]"""
+    weights, count = _BY_ZENITH(zenith), _ZENITHS.size
+    # Beyond the zenith, the azimuth differs by 180 degrees: odd modes change their sign.
+    mirrored = np.concatenate([[0.0], weights[count - 2 :: -1]])
+    return weights[count - 1 :] + np.where(_MODES % 2 == 0, 1, -1)[:, None] * mirrored
+
+
+def _scattered_once(thickness, co_albedo, mu_s, mu_v, phase):
+    """Reflectance by single scattering with the forward peak counted as not scattered. [1]"""
+    kept = 1 - (1 - co_albedo) * _PEAK
     slant = -np.expm1(-(1 / mu_s + 1 / mu_v) * kept * thickness)
     return (1 - co_albedo) / kept * phase * slant / (4 * (mu_s + mu_v))
 
 
-def _accuracy(thickness):
-    """Options of the solver: layers thin enough, and a tolerance that holds in thick clouds."""
-    layers = int(np.clip(8 * thickness, 40, 360))
-    return {"polarized": False, "streams": _STREAMS, "layers": layers, "vertical": (0.0, 1.0), "tolerance": 1e-11}
+class _LayerTable(NamedTuple):
+    """Light of cloud layers by thickness, Fourier mode, and zenith angles of the view and the sun. [1]"""
+
+    thickness: np.ndarray  # shape (n,)
+    rescattered: np.ndarray  # reflectance by light scattered more than once, shape (n, mode, zenith, zenith)
+    transmittance: np.ndarray  # direct and diffuse, shape (n, zenith)
+    diffuse_transmittance: np.ndarray  # of isotropic light, shape (n,)
+    spherical_albedo: np.ndarray  # shape (n,)
 
 
-@cached(512, "light scattered in clouds")
-def _rescattered(co_albedo, sza):
-    """Reflectance by light scattered more than once, shape (thickness, view, azimuth). [1]"""
-    view, turn = _ZENITHS[:, None], _AZIMUTHS
-    phase = henyey_greenstein(scattering_angle_cosine(sza, view, turn))
-    out = np.zeros((_THICKNESS.size, _ZENITHS.size, _AZIMUTHS.size))
-    for number, depth in enumerate(_THICKNESS[1:].tolist(), 1):
-        cloud = 0.0, depth, 1 - co_albedo, _MOMENTS, phase
-        whole = path_reflectance(*cloud, sza, _ZENITHS, _AZIMUTHS, **_accuracy(depth))
-        out[number] = whole - _scattered_once(depth, co_albedo, sza, view, turn)
-    return out
+@cached(32, "light of cloud layers")
+def _table(co_albedo):
+    """Table of cloud layers, from no cloud on, by doubling of a layer so thin that it scatters once."""
+    points, gauss = (each[:_STREAMS] for each in quadrature(_STREAMS))
+    # The zenith angles of the table have no weight in the integrals over the streams.
+    mu = np.concatenate([np.cos(np.radians(_ZENITHS)), points])
+    weights = np.concatenate([np.zeros(_ZENITHS.size), 2 * points * gauss])
+    backward, forward = _phase_modes(mu)
+    thickness = _THINNEST * 2.0 ** (np.arange(_PER_OCTAVE) / _PER_OCTAVE - _FIRST)[:, None, None, None]
+    layer = _thin_layer(thickness, co_albedo, mu, backward, forward)
+    zeniths = _ZENITHS.size
+    unscattered = np.zeros((1, _MODES.size, zeniths, zeniths)), np.ones((1, mu.size)), np.zeros((1, mu.size))
+    found, depths = [unscattered], [np.zeros(1)]
+    for number in range(_FIRST + _DOUBLINGS):
+        layer, thickness = _twice(*layer, weights), 2 * thickness
+        if number >= _FIRST - 1:
+            reflectance, transmittance, direct = layer
+            once = _scattered_once(thickness, co_albedo, mu, mu[:, None], backward)
+            fluxes = (weights @ each[:, 0] for each in (transmittance, reflectance))
+            passed, reflected = fluxes
+            found.append(((reflectance - once)[..., :zeniths, :zeniths], direct[:, 0, 0] + passed, reflected))
+            depths.append(thickness[:, 0, 0, 0])
+    rescattered, passed, reflected = (np.concatenate(each) for each in zip(*found, strict=True))
+    return _LayerTable(np.concatenate(depths), rescattered, passed[:, :zeniths], passed @ weights, reflected @ weights)
 
 
-@cached(64, "fluxes through clouds")
-def _fluxes(co_albedo):
-    """Transmittance by zenith angle and of isotropic light, and spherical albedo, by thickness. [1]"""
-    zenith = np.concatenate([_ZENITHS, np.degrees(np.arccos(_GAUSS))])
-    found = [
-        flux_transmittance(0.0, depth, 1 - co_albedo, _MOMENTS, zenith, **_accuracy(depth))
-        for depth in _THICKNESS[1:].tolist()
-    ]
-    through = np.array([np.ones(zenith.size), *(each for each, _ in found)])
-    albedo = np.array([0.0, *(each for _, each in found)])
-    diffuse = through[:, _ZENITHS.size :] @ (2 * _GAUSS * _WEIGHTS)
-    diffuse[0] = 1.0
-    return through[:, : _ZENITHS.size], diffuse, albedo
+def _phase_modes(mu):
+    """Fourier modes of the phase function without its forward peak, backward and forward, shape (mode, mu, mu). [1]"""
+    moments = (2 * _MODES + 1) * (ASYMMETRY**_MODES - _PEAK)
+    functions = np.array([wigner(mode, 0, mu, _MODES.size) for mode in _MODES])
+    signs = np.where((_MODES + _MODES[:, None]) % 2 == 0, 1, -1)[:, None]
+    across = np.swapaxes(functions, 1, 2) * moments
+    return (across * signs) @ functions, across @ functions
+
+
+def _thin_layer(thickness, co_albedo, mu, backward, forward):
+    """Diffuse reflectance and transmittance of a layer that scatters once, and its direct transmittance. [1]"""
+    kept = 1 - (1 - co_albedo) * _PEAK
+    direct = np.exp(-kept * thickness / mu)
+    passed = (1 - co_albedo) * thickness * forward / (4 * mu * mu[:, None]) * direct
+    return _scattered_once(thickness, co_albedo, mu, mu[:, None], backward), passed, direct
+
+
+def _twice(reflectance, transmittance, direct, weights):
+    """Diffuse reflectance and transmittance, and direct transmittance, of two equal layers [Hansen1974]_. [1]"""
+    leaving = np.swapaxes(direct, -1, -2)
+    between = (reflectance * weights) @ reflectance
+    between = np.linalg.solve(np.eye(weights.size) - between * weights, between)
+    down = transmittance + between * direct + (between * weights) @ transmittance
+    up = reflectance * direct + (reflectance * weights) @ down
+    passed = leaving * down + transmittance * direct + (transmittance * weights) @ down
+    return reflectance + leaving * up + (transmittance * weights) @ up, passed, direct**2
 
 
 class CloudTables(NamedTuple):
-    """Tables of the clouds of one scene by band and on steps of thickness, for `under_clouds`. [1]"""
+    """Tables of the clouds of one scene, for `under_clouds`. [1]"""
 
-    seen: np.ndarray  # reflectance, transmittances down and up, and spherical albedo, shape (band, n, 4)
-    lit: np.ndarray  # transmittance from the sun, shape (band, n)
-    sky: np.ndarray  # transmittance of isotropic light, shape (band, n)
+    light: np.ndarray  # fields of `LayerLight` on steps of thickness, shape (kind of drops, field, step)
+    kind: np.ndarray  # of each band, shape (band,)
     path: np.ndarray  # apparent reflectance of the atmosphere over black ground, shape (band,)
     diffuse_fraction: np.ndarray  # of the irradiance without clouds, shape (band,)
+    ozone: np.ndarray  # transmittance of the ozone above the clouds, down and up, shape (band,)
 
 
-_STEPS = 4000  # of the root of the thickness, which interpolate reflectance to 1e-5
+_STEPS = 2000  # of the root of the thickness, which interpolate reflectance to 1e-4 of it
 _PER_ROOT = _STEPS / THICKEST**0.5
 
 
 def sky_tables(co_albedos, path, diffuse_fraction, ozone, sza, vza, raa):
     """Tables of `under_clouds` for each band; ozone, which lies above the clouds, dims the light that they reflect."""
+    kinds, kind = np.unique(co_albedos, return_inverse=True)
+    light = np.array([_steps(float(each), sza, vza, raa) for each in kinds])
+    return CloudTables(light, kind, *(np.asarray(each, float) for each in (path, diffuse_fraction, ozone)))
+
+
+@cached(64, "light of clouds by thickness")
+def _steps(co_albedo, sza, vza, raa):
+    """Light of clouds at the steps of `CloudTables`, shape (field, step). [1]"""
     thickness = np.minimum((np.arange(_STEPS + 1) / _PER_ROOT) ** 2, THICKEST)
-    lights = [layer_light(thickness, each, sza, vza, raa) for each in co_albedos]
-    reflectance, down, up, diffuse, albedo = (np.array(each) for each in zip(*lights, strict=True))
-    seen = np.stack([reflectance * np.asarray(ozone)[:, None], down, up, albedo], axis=-1)
-    return CloudTables(seen, down, diffuse, np.asarray(path, float), np.asarray(diffuse_fraction, float))
+    return np.array(layer_light(thickness, co_albedo, sza, vza, raa))
 
 
 @jitable
@@ -315,7 +351,7 @@ def clouded_reflectance(clear, path, diffuse, reflected, down, lit, sky, up, alb
     return reflected + up * below / (1 - clear * albedo)
 
 
-def under_clouds(clear, seen, sunlit, overhead, *, sky):
+def under_clouds(clear, seen, sunlit, overhead, *, sky, in_place=False):
     """
     Apparent reflectance of a scene with clouds, by `clouded_reflectance`.
 
@@ -326,6 +362,8 @@ def under_clouds(clear, seen, sunlit, overhead, *, sky):
     seen, sunlit, overhead : array, shape (y, x)
         Optical thickness of the clouds toward the sensor, toward the sun and overhead, 0 to 100. [1]
     sky : CloudTables
+    in_place : bool, optional
+        Whether to overwrite `clear`.
 
     Returns
     -------
@@ -341,67 +379,90 @@ def under_clouds(clear, seen, sunlit, overhead, *, sky):
     ----------
     [Liou2002]_
     """
-    columns = [np.ascontiguousarray(each, float) for each in (seen, sunlit, overhead)]
-    for each in columns:
-        if (wrong := each[(each < 0) | (each > THICKEST)]).size:
-            raise ValueError(
-                f"optical_thickness must be from 0 to {THICKEST:g}, got {wrong.flat[0]:g}: clip it, .clip(0, 100)"
-            )
-    clear = np.ascontiguousarray(np.moveaxis(clear, -1, 0), float)
-    out = np.empty(clear.shape)
-    _cloud_scene(clear, *columns, sky, out)
+    out = np.moveaxis(clear, -1, 0)
+    if not (in_place and out.flags.c_contiguous):
+        out = np.array(out, order="C")
+    _, rows, width = out.shape
+    found = np.empty((3, width), np.uint32), np.empty((3, width), np.uint32), np.empty((3, width))
+    light, size = np.empty((6, width)), max(_CELLS // max(width, 1), 1)
+    for first in range(0, rows, size):
+        columns = [np.ascontiguousarray(each[first : first + size], float) for each in (seen, sunlit, overhead)]
+        if _cloud_rows(out, first, *columns, sky, *found, light):
+            wrong = np.concatenate([each[(each < 0) | (each > THICKEST)] for each in columns])[0]
+            raise ValueError(f"optical_thickness must be from 0 to {THICKEST:g}, got {wrong:g}: clip it, .clip(0, 100)")
     return out
 
 
-@njit(nogil=True, cache=True)
-def _cloud_scene(clear, seen, sunlit, overhead, sky, out):
-    bands, rows, columns = clear.shape
-    cells = np.empty(columns, np.int64)
-    place, share = np.empty((3, columns), np.int64), np.empty((3, columns))
-    for i in range(rows):
-        # Only cells with clouds take the long way.
-        count = 0
-        for j in range(columns):
-            if seen[i, j] + sunlit[i, j] + overhead[i, j] != 0:
-                _find(seen[i, j], 0, count, place, share)
-                _find(sunlit[i, j], 1, count, place, share)
-                if overhead[i, j] == seen[i, j]:
-                    place[2, count], share[2, count] = place[0, count], share[0, count]
-                else:
-                    _find(overhead[i, j], 2, count, place, share)
-                cells[count] = j
-                count += 1
-        for b in range(bands):
-            out[b, i] = clear[b, i]
-            path, diffuse, table, lit, sky_light = (
-                sky.path[b],
-                sky.diffuse_fraction[b],
-                sky.seen[b],
-                sky.lit[b],
-                sky.sky[b],
-            )
-            for k in range(count):
-                v, s, o = place[0, k], place[1, k], place[2, k]
-                x, y, z = share[0, k], share[1, k], share[2, k]
-                out[b, i, cells[k]] = clouded_reflectance(
-                    clear[b, i, cells[k]],
-                    path,
-                    diffuse,
-                    table[v, 0] + x * (table[v + 1, 0] - table[v, 0]),
-                    table[v, 1] + x * (table[v + 1, 1] - table[v, 1]),
-                    lit[s] + y * (lit[s + 1] - lit[s]),
-                    sky_light[o] + z * (sky_light[o + 1] - sky_light[o]),
-                    table[v, 2] + x * (table[v + 1, 2] - table[v, 2]),
-                    table[v, 3] + x * (table[v + 1, 3] - table[v, 3]),
-                )
+_CELLS = 2**14  # whose three columns of clouds fit in the cache of a core
+
+
+@compiled
+def _cloud_rows(scene, first, seen, sunlit, overhead, sky, cell, step, share, light):
+    """Add clouds to some rows of a scene; whether a thickness is invalid."""
+    for i in range(len(seen)):
+        v = _find(seen[i], cell[0], step[0], share[0])
+        s = _find(sunlit[i], cell[1], step[1], share[1])
+        # Toward nadir, the clouds toward the sensor are those overhead.
+        up = 0 if _equal(seen[i], overhead[i]) else 2
+        o = v if up == 0 else _find(overhead[i], cell[2], step[2], share[2])
+        if min(v, s, o) < 0:
+            return True
+        if max(v, s, o) == 0:
+            continue
+        for field in range(6):
+            # Without clouds, reflectance and albedo are 0 and transmittances are 1, which changes nothing to the bit.
+            light[field] = 0 if field in (0, 3) else 1
+        for kind in range(len(sky.light)):
+            table = sky.light[kind]
+            for field in range(4):
+                _look_up(table[field], cell[0, :v], step[0, :v], share[0, :v], light[field])
+            _look_up(table[1], cell[1, :s], step[1, :s], share[1, :s], light[4])
+            _look_up(table[4], cell[up, :o], step[up, :o], share[up, :o], light[5])
+            for b in range(len(scene)):
+                if sky.kind[b] == kind:
+                    _cloud_row(scene[b, first + i], light, sky.path[b], sky.diffuse_fraction[b], sky.ozone[b])
+    return False
 
 
 @jitable
-def _find(thickness, which, number, place, share):
-    """Fill in the step of a thickness in the tables, and the share of the way to the next; NaN stays NaN."""
-    if np.isnan(thickness):
-        place[which, number], share[which, number] = 0, np.nan
-        return
-    at = np.sqrt(thickness) * _PER_ROOT
-    place[which, number] = min(int(at), _STEPS - 1)
-    share[which, number] = at - place[which, number]
+def _equal(one, other):
+    equal = True
+    for j in range(one.size):
+        equal &= one[j] == other[j]
+    return equal
+
+
+@jitable
+def _find(thickness, cell, step, share):
+    """Fill in the cells with clouds, the steps of the tables below their thickness and the shares of the way to the
+    next; their number, or -1 if a thickness is invalid."""
+    count, invalid = 0, False
+    for j in range(thickness.size):
+        cell[count] = j
+        count += thickness[j] != 0
+    for k in range(count):
+        value = thickness[cell[k]]
+        invalid |= (value < 0) | (value > THICKEST)
+        at = np.sqrt(value) * _PER_ROOT
+        # NaN has no step, and its share stays NaN.
+        step[k] = np.uint32(at if at < _STEPS - 0.5 else _STEPS - 0.5)
+        share[k] = at - step[k]
+    return -1 if invalid else count
+
+
+@jitable
+def _look_up(table, cell, step, share, out):
+    """Fill in a property of the cells with clouds, by linear interpolation."""
+    for k in range(cell.size):
+        value = table[step[k]]
+        out[cell[k]] = value + share[k] * (table[step[k] + np.uint32(1)] - value)
+
+
+@jitable
+def _cloud_row(cells, light, path, diffuse, ozone):
+    """Add clouds to a row of cells in one band."""
+    reflected, down, up, albedo, lit, sky = light[0], light[1], light[2], light[3], light[4], light[5]
+    for j in range(cells.size):
+        cells[j] = clouded_reflectance(
+            cells[j], path, diffuse, ozone * reflected[j], down[j], lit[j], sky[j], up[j], albedo[j]
+        )

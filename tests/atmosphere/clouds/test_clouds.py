@@ -32,15 +32,15 @@ def test_displacements_are_those_of_the_table():
 
 
 def test_two_stream_formula_and_exact_albedo():
-    """1e-10: the printed digits. The exact albedo for the sun at the zenith differs by up to 0.042."""
+    """1e-10: the printed digits. Exact albedos differ by up to 0.03 for the sun at 18 degrees, 0.042 at the zenith."""
     known = table("cloud_two_stream.csv")
     cloud = known["optical_depth"], known["asymmetry"]
     np.testing.assert_allclose(two_stream_reflectance(*cloud), known["cloud_reflectance"], rtol=1e-10)
     np.testing.assert_allclose(two_stream_reflectance(*cloud, known["ground"]), known["over_ground"], rtol=1e-10)
     options = {"polarized": False, "layers": 200, "vertical": (0.0, 1.0), "tolerance": 1e-9}
     for depth, asymmetry, expected in zip(*cloud, known["cloud_reflectance"], strict=True):
-        (through,), _ = flux_transmittance(0.0, depth, 1.0, asymmetry ** np.arange(33), [0.0], **options)
-        assert abs(1 - through - expected) < 0.042
+        through, _ = flux_transmittance(0.0, depth, 1.0, asymmetry ** np.arange(33), [0.0, 18.0], **options)
+        assert np.all(np.abs(1 - through - expected) < (0.042, 0.0305))
 
 
 def disort(thickness, co_albedo, sza, raa, ground=0.0):
@@ -60,17 +60,17 @@ def disort(thickness, co_albedo, sza, raa, ground=0.0):
     [
         (0.05, 0.0, 70.0, 180.0), (0.05, 0.005, 20.0, 60.0), (0.4, 0.0, 33.0, 111.0), (1.0, 0.03, 70.0, 0.0),
         (3.3, 0.0, 47.0, 20.0), (7.0, 5e-5, 61.0, 140.0), (20.0, 0.005, 8.0, 90.0), (42.0, 0.0, 55.0, 170.0),
-        (60.0, 0.0, 70.0, 180.0), (60.0, 0.005, 28.0, 45.0),
+        (60.0, 0.0, 70.0, 180.0), (60.0, 0.005, 28.0, 45.0), (2.05, 0.005, 0.5, 79.0), (0.35, 0.03, 2.0, 170.0),
     ],
 )  # fmt: skip
 def test_layer_is_that_of_discrete_ordinates(thickness, co_albedo, sza, raa):
-    """0.5 % in all views to 70 degrees, and 0.002 of the transmittance."""
+    """0.5 % in all views to 70 degrees, also within 5 degrees of nadir, and 2e-5 of the transmittance."""
     mu, expected, transmitted = disort(thickness, co_albedo, sza, raa)
     for one, reflectance in zip(mu, expected, strict=True):
         if one > np.cos(np.radians(70)):
             light = layer_light(np.array([thickness]), co_albedo, sza, np.degrees(np.arccos(one)), raa)
             np.testing.assert_allclose(light.reflectance, reflectance, rtol=5e-3)
-            np.testing.assert_allclose(light.transmittance_down, transmitted, atol=2e-3)
+            np.testing.assert_allclose(light.transmittance_down, transmitted, atol=2e-5)
 
 
 @pytest.mark.filterwarnings("ignore:Some delta-scaled single-scattering albedos")
@@ -79,18 +79,40 @@ def test_overcast_above_lambertian_ground_is_that_of_discrete_ordinates(thicknes
     mu, expected, _ = disort(thickness, 0.0, 40.0, 70.0, ground)
     index = int(np.argmin(np.abs(mu - 0.8)))
     light = layer_light(np.array([thickness]), 0.0, 40.0, np.degrees(np.arccos(mu[index])), 70.0)
-    reflected, down, up, sky, albedo = (each.item() for each in light)
+    reflected, down, up, albedo, sky = (each.item() for each in light)
     found = clouded_reflectance(ground, 0.0, 0.0, reflected, down, down, sky, up, albedo)
     np.testing.assert_allclose(found, expected[index], rtol=5e-3)
 
 
+@pytest.mark.filterwarnings("ignore:Some delta-scaled single-scattering albedos")
+def test_thin_clouds_lower_ndvi_as_in_discrete_ordinates_and_less_than_as_an_isotropic_reflector():
+    """0.0002 of NDVI, for the sun of the FIFE image near nadir: drops scatter little to the side of the sun."""
+    ground = np.array([0.08, 0.25])
+
+    def ndvi(red, near_infrared):
+        return (near_infrared - red) / (near_infrared + red)
+
+    for thickness, isotropic in ((0.05, -0.011), (0.3, -0.062), (1.0, -0.164)):
+        mu, *_ = disort(thickness, 0.0, 28.5, 180.0)
+        one = int(np.argmax(mu))
+        expected = ndvi(*(disort(thickness, 0.0, 28.5, 180.0, each)[1][one] for each in ground)) - ndvi(*ground)
+        light = layer_light(np.array([thickness]), 0.0, 28.5, np.degrees(np.arccos(mu[one])), 180.0)
+        reflected, down, up, albedo, sky = (each.item() for each in light)
+        found = [clouded_reflectance(each, 0.0, 0.0, reflected, down, down, sky, up, albedo) for each in ground]
+        assert ndvi(*found) - ndvi(*ground) == pytest.approx(expected, abs=2e-4)
+        assert ndvi(*two_stream_reflectance(thickness, layer.ASYMMETRY, ground)) - ndvi(*ground) == pytest.approx(
+            isotropic, abs=1e-3
+        )
+        assert 0.1 < expected / isotropic < 0.4
+
+
 def test_white_ground_and_conservative_clouds_return_all_light():
-    """1e-3, of the fluxes; the albedo and the transmittance of isotropic light are independent results."""
+    """1e-4, of the fluxes; the albedo and the transmittance of isotropic light are independent results."""
     thickness = np.array([0.3, 3.0, 30.0, 60.0, 100.0])
     for sza in (0.0, 45.0, 70.0):
         light = layer_light(thickness, 0.0, sza, 0.0, 0.0)
         sent = light.transmittance_down * light.diffuse_transmittance / (1 - light.spherical_albedo)
-        np.testing.assert_allclose(1 - light.transmittance_down + sent, 1, atol=1e-3)
+        np.testing.assert_allclose(1 - light.transmittance_down + sent, 1, atol=1e-4)
 
 
 @pytest.fixture(scope="module")
