@@ -226,20 +226,6 @@ def test_ctrl_c_ends_a_run_that_can_go_on(scenario, whole, tmp_path, options):
     assert resumed(scenario, out)[0] == whole
 
 
-@pytest.fixture
-def ignored_here():
-    """SIGINT ignored in this process, as where a script starts it in the background."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
-def test_ctrl_c_is_heard_where_the_tests_run_in_the_background(ignored_here):
-    code = HEARS_CTRL_C + "import os; os.kill(os.getpid(), signal.SIGINT)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert "KeyboardInterrupt" in done.stderr
-
-
 STUDY = """
 [grid]
 width = 600

@@ -10,18 +10,11 @@ import pytest
 
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.case import ALIGNED, NATIVE, PASSAGES, READINGS
+from fifesim.experiments.friedl1995.case import ALIGNED, NATIVE, READINGS
 
 DOCS = Path(__file__).parents[1] / "docs"
 NUMBERS = json.loads((DOCS / "paper.json").read_text(encoding="utf-8"))
 
-# The two sentences of the paper on cells and pixels, by section.
-SENTENCES = {
-    "Ground Scene Model": "For example, the simulations performed for this work used ground scene cell dimensions "
-    "roughly 0.11 times the size of the sensor IFOV (i.e., 9² ground cells per simulated sensor pixel).",
-    "Analyses": "To do this, we defined the high resolution ground scene as being composed of uniform cells with a "
-    "spatial dimension of 3.33 m, or 81 (9²) ground scene elements per 30-m TM pixel.",
-}
 
 # What the paper states, and round numbers of the definitions.
 STATED = {"0.05", "0.15", "0.24", "3.33", "4.778", "0.1", "1.0"}
@@ -102,81 +95,10 @@ def test_numbers_bear_the_statements_of_the_page(make_paper):
     assert [words for words, holds in statements.items() if not holds] == []
 
 
-def in_a_line(path):
-    """Text of a page or of an example without its line breaks."""
-    return re.sub(r"\s+", " ", path.read_text(encoding="utf-8").replace("\n# ", " "))
-
-
-def rows_below(heading):
-    """Cells of the first table of the page below some words, without its head."""
-    page = (DOCS / "paper.md").read_text(encoding="utf-8")
-    lines = page[page.index(heading) :].splitlines()
-    table = lines[next(k for k, line in enumerate(lines) if line.startswith("|")) :]
-    end = next(k for k, line in enumerate(table) if not line.startswith("|"))
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table[2:end]]
-
-
 def of_text(quantity, name):
     """Values of a reading and the paper's, by variable and arp."""
     rows = (row for row in NUMBERS["text"][name] if row["quantity"] == quantity and row["paper"] is not None)
     return {(row["variable"], row["arp"]): row for row in rows}
-
-
-def percent(ratio):
-    """A relative difference as the page prints it."""
-    return f"{100 * (ratio - 1):+.0f} %".replace("-", "−")
-
-
-def test_passages_are_sentences_of_the_paper():
-    assert PASSAGES.keys() == SENTENCES.keys()
-    assert all(passage in SENTENCES[section] for section, passage in PASSAGES.items())
-
-
-def test_page_quotes_both_passages_before_it_explains_the_reading():
-    page = in_a_line(DOCS / "paper.md")
-    reading = page[page.index("## Registration") : page.index("## Relief")]
-    for part in (page[: page.index("## Table 2")], reading[: reading.index("`fifesim reproduce` nevertheless")]):
-        assert "for pixels that are aligned with the blocks" in part
-        assert all(f'"{passage}" (*{section}*)' in part for section, passage in PASSAGES.items())
-    assert all(f'"{passage}"' in page[page.index("## Deviations") :] for passage in PASSAGES.values())
-    cells = (43e-6 * 705_000 / (30 / 9)) ** 2
-    assert f"would hold {cells:.1f}." in reading
-
-
-@pytest.mark.parametrize("path", ["physics.md", "gallery_src/instruments/plot_2_point_spread.py"])
-def test_other_pages_quote_the_passage_of_the_paper(path):
-    assert f'aligned pixels: "{PASSAGES["Analyses"]}"' in in_a_line(DOCS / path)
-
-
-def test_every_printed_noise_is_of_its_reading():
-    """Values and deviations are those of the numbers, the paper's those of its text, percentages of what is printed."""
-    stated = friedl1995.paper_text().query("quantity == 'ren'").set_index(["variable", "arp"])["value"]
-    native, aligned = of_text("ren", "native"), of_text("ren", "aligned")
-    rows = rows_below("**Mean relative equivalent")
-    assert len(rows) == len(stated) == len(native) == len(aligned) == 6
-    for variable, arp, paper, *cells, _, _ in rows:
-        key = variable.lower(), float(arp)
-        assert paper == f"{stated[key]:.2f}"
-        for one, (value, difference) in zip((native[key], aligned[key]), (cells[:2], cells[2:]), strict=True):
-            assert value == f"{one['value']:.3f} ± {one['deviation']:.3f}"
-            assert difference == percent(float(value[:5]) / float(paper))
-
-
-def test_noise_of_the_summary_is_that_of_the_table():
-    page, rows = in_a_line(DOCS / "paper.md"), rows_below("**Mean relative equivalent")[:3]
-    native, aligned, paper = ([row[k][:5] for row in rows] for k in (3, 5, 2))
-    said = "for LAI it is {} with drifting pixels and {} with aligned ones; the paper has {}."
-    assert said.format(*(f"{a}, {b} and {c}" for a, b, c in (native, aligned, paper))) in page
-    lower = [row[k].lstrip("−") for k in (4, 6) for row in rows]
-    said = "REN of LAI is {}, {} and {} below the paper's, with aligned pixels {}, {} and {}."
-    assert said.format(*lower) in page
-
-
-def test_noise_is_listed_as_fitted_and_not_as_found():
-    page = in_a_line(DOCS / "paper.md")
-    fitted, found = page.index("**Fitted to Table 2:**"), page.index("**Found**")
-    assert fitted < page.index("(REN) follows approximately from R²") < page.index("**Fitted to the paper's text:**")
-    assert "REN" not in page[found : page.index("## Table 2")]
 
 
 def test_estimate_of_noise_is_that_of_a_normal_pair(make_paper):
@@ -200,28 +122,6 @@ def test_noise_and_spread_are_those_of_this_program(make_paper):
             assert value == pytest.approx(row["value"], abs=4 * row["deviation"] * np.sqrt(1 / 3 + 1 / 20))
     for variable, by_arp in make_paper.spread(case, seeds).items():
         assert by_arp == pytest.approx(NUMBERS["spread"][variable], rel=0.05)
-
-
-def test_pixels_keep_more_of_the_range_than_the_papers():
-    """In all rows; LAI at arp 0.24 has the largest difference, NDVI at arp 0.05 the largest relative one."""
-    native, aligned = of_text("range_kept", "native"), of_text("range_kept", "aligned")
-    rows = rows_below("**Share of the cells' range")
-    assert len(rows) == len(native) == 6
-    for variable, arp, paper, value, difference, relative, other in rows:
-        key = variable.lower(), float(arp)
-        assert paper == f"{native[key]['paper']:.2f}"
-        for text, one in ((value, native[key]), (other, aligned[key])):
-            assert text == f"{one['value']:.3f} ± {one['deviation']:.3f}"
-        assert difference == f"{float(value[:5]) - float(paper):+.3f}" and difference[0] == "+"
-        assert relative == percent(float(value[:5]) / float(paper))
-    widest, steepest = (max(rows, key=lambda row: float(row[k].rstrip(" %"))) for k in (4, 5))
-    said = (
-        f"The difference is largest for {widest[0]} at arp {widest[1]} ({widest[3][:5]} compared with {widest[2]}), "
-        f"the relative difference for {steepest[0]} at arp {steepest[1]} ({steepest[5]})."
-    )
-    assert said in in_a_line(DOCS / "paper.md")
-    one = native["lai", 0.24]
-    assert one["value"] > one["paper"] + 3 * one["deviation"]
 
 
 @pytest.mark.slow

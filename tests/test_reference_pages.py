@@ -2,7 +2,6 @@
 
 import importlib
 import tomllib
-from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,6 @@ import fifesim
 from fifesim.cli import app
 from fifesim.scenario.keys import FIELD_LIMITS, Section, StandKeys
 from fifesim.scenario.scenario import Scenario
-from fifesim.sensor.description.instrument_file import Instrument, InstrumentBand
 from fifesim.sensor.response.noise import KINDS
 
 ROOT = Path(__file__).parents[1]
@@ -169,44 +167,6 @@ def test_values_of_an_instrument(tables):
     overview = rows(tables.instruments().partition("## ")[0])
     assert overview["[MSS](#instrument-mss)"][2:] == ["60", "6", "4", "unknown", "unknown", "unknown"]
     assert overview["[L4TM](#instrument-l4tm)"][-3] != "unknown" and overview["[L4TM](#instrument-l4tm)"][-1] == "8.5 m"
-
-
-@dataclass(frozen=True)
-class Origin:
-    """As an instrument file may state it."""
-
-    kind: str
-    uncertainty: float | None = None
-
-
-@dataclass(frozen=True)
-class DescribedBand(InstrumentBand):
-    origin: dict = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Described(Instrument):
-    origin: dict = field(default_factory=dict)
-
-
-def values_of(item):
-    return {each.name: getattr(item, each.name) for each in fields(item)}
-
-
-def test_instruments_with_further_fields_get_further_columns(tables):
-    known = fifesim.instrument("L4TM")
-    first, *others = (DescribedBand(**values_of(band)) for band in known.bands)
-    first = DescribedBand(**values_of(first) | {"origin": {"noise": Origin("assumed")}})
-    stated = {"blur": Origin("in-flight", 0.1), "noise": Origin("required", 2.0), "altitude": "read"}
-    item = Described(**values_of(known) | {"bands": (first, *others), "origin": stated})
-    found = rows(tables._instrument(item))
-    assert found["quantity"][-1] == "origin" and found["scan"][-1] == "" and found["altitude"][-1] == "read"
-    assert found["line spread function"][-1] == "in-flight; uncertainty 0.1"
-    names = [band.name for band in others]
-    assert found["noise"][-1] == f"assumed ({first.name}); required; uncertainty 2 ({names[0]}–{names[-1]})"
-    overview = tables._overview(item)
-    count = len(known.bands)
-    assert overview[-3:-1] == ["in-flight", f"assumed (1 of {count} bands), required ({count - 1} of {count} bands)"]
 
 
 def test_page_on_citing_has_the_work_and_the_paper(tables):

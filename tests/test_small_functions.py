@@ -6,25 +6,12 @@ import pytest
 from fifesim.analysis.regression import totals
 from fifesim.atmosphere.aerosols import covers
 from fifesim.atmosphere.coupling import nodes_of
-from fifesim.atmosphere.gases import absorber_layers, profile_above
 from fifesim.atmosphere.mixtures import sphere
-from fifesim.atmosphere.models import ozone_column, water_vapour_column
 from fifesim.base.bands import Band
 from fifesim.base.lattice import centres, whole_cells
-from fifesim.experiments.verification.deviations import integral
-from fifesim.ground.canopy.spectra import (
-    Background,
-    background_means,
-    did_you_mean,
-    is_mixture,
-    spectrum_names,
-)
 from fifesim.ground.terrain.slope import rise
-from fifesim.output.report import plus_minus
 from fifesim.scenario.toml import full_path
 from fifesim.sensor.description.fields import key
-from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.description.listing import sensor_in_words
 from fifesim.sensor.products.sentinel2 import band_name
 from fifesim.sensor.response.calibration import mask_bits
 
@@ -41,14 +28,6 @@ def test_weights_of_the_sphere_sum_to_one():
     assert sphere([0.0, 90.0, 180.0])[1].sum() == pytest.approx(1, abs=1e-6)
 
 
-def test_gas_columns_of_midlatitude_summer():
-    """Water vapour and ozone columns as tabulated for the profile, 2.93 g cm-2 and 0.319 cm-atm in 6S."""
-    levels = profile_above("midlatitude-summer", 0.0)
-    assert absorber_layers(levels, "h2o").sum() == pytest.approx(2.9, abs=0.05)
-    assert water_vapour_column(levels) == pytest.approx(2.93, abs=0.005)
-    assert ozone_column(levels) == pytest.approx(0.32, abs=0.005)
-
-
 def test_nodes_reach_beyond_a_band():
     assert nodes_of([Band("red", (0.6, 0.65), (1, 1))]).tolist() == [0.55, 0.59, 0.633, 0.67, 0.694]
 
@@ -58,37 +37,13 @@ def test_lattice_counts_from_the_origin():
     assert centres(100.5, 10.0, np.array([0, 3])).tolist() == [105.5, 135.5]
 
 
-def test_integral_with_a_kink():
-    assert integral(abs, (-1.0, 0.0, 2.0)) == pytest.approx(2.5, abs=1e-12)
-
-
-def test_background_is_a_linear_mixture():
-    assert "soil_dry" in spectrum_names()
-    assert is_mixture({"soil_dry": 1.0}) and not is_mixture({"TM3": 0.2})
-    red = Band("red", (0.6, 0.65, 0.7), (0, 1, 0))
-    half = background_means([red], Background({"soil_dry": 0.5, "shade": 0.5}))
-    # The reflectance of shade is 0.
-    assert abs(2 * half - background_means([red], Background({"soil_dry": 1.0}))) < 1e-15
-    assert did_you_mean("TM33", ["TM3", "TM4"]) == ", did you mean 'TM3'?"
-
-
 def test_rise_continues_past_a_missing_end():
     assert (rise(0.0, 1.0, 5.0), rise(np.nan, 1.0, 5.0), rise(np.nan, 1.0, np.nan)) == (5.0, 8.0, 0.0)
-
-
-def test_standard_error_follows_its_number():
-    assert plus_minus(0.25, 2) == " ± 0.25" and plus_minus(float("nan")) == ""
 
 
 def test_paths_of_a_scenario():
     assert full_path("../lai.tif", "/data/runs") == "/data/lai.tif"
     assert full_path("/vsizip//data/maps.zip/lai.tif", "/data/runs") == "/vsizip//data/maps.zip/lai.tif"
-
-
-def test_sensor_as_text():
-    assert sensor_in_words(instrument("TM"), ["TM3", "TM4"]) == (
-        "Landsat-5 Thematic Mapper, a whiskbroom scanner, 705 km up, in TM3 (0.66 µm) and TM4 (0.84 µm); 8 bits"
-    )
 
 
 def test_spellings_of_names():

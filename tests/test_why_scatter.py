@@ -1,8 +1,6 @@
 """Pictures, table and statements of the page on the scatter between NDVI and LAI follow from the budget."""
 
 import importlib
-import re
-from collections import Counter
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -11,7 +9,6 @@ import pandas as pd
 import pytest
 
 import fifesim
-from fifesim.experiments.scatter.stages import STAGES
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -29,13 +26,6 @@ def case(why):
     sections = why.scenario(cells=108).model_dump(exclude_unset=True)
     sections["terrain"], sections["landscape"]["covary"] = {"dem": "flat"}, {"soil": -0.3}
     return fifesim.Scenario(**sections)
-
-
-def test_panels_and_rows_have_each_stage_once(why):
-    # The scene has no clouds.
-    stages = [stage for stage in STAGES if stage not in ("clouds", "shadows")]
-    assert Counter(stage for stages in why.CAUSES.values() for stage in stages) == Counter(stages)
-    assert Counter(stage for stages in why.ROWS.values() for stage in stages) == Counter([*stages, "curvature"])
 
 
 def test_panels_are_the_budget_of_their_scene(why, case):
@@ -59,19 +49,6 @@ def test_mixed_pixel_has_the_ndvi_of_its_mean_reflectance(why):
     assert mean == (low + high) / 2 and np.all(np.diff(ndvi) > 0)
     assert np.interp([low, high, mean], area, ndvi) == pytest.approx([at_low, at_high, even], abs=1e-3)
     assert at_low < mixed < even - 0.1
-
-
-def test_displaced_pixel_is_typical(why, case):
-    figure = why.draw_pixel(case)
-    truth, pixel = (patch.get_label() for patch in figure.axes[1].patches)
-    difference = abs(np.subtract(*(float(re.search(r"[\d.]+$", text)[0]) for text in (truth, pixel))))
-    lai = fifesim.simulate(case)["scene"]["lai"].values
-    means = [
-        lai[9 + shift : 99 + shift, 9 + shift : 99 + shift].reshape(10, 9, 10, 9).mean(axis=(1, 3)) for shift in (0, 3)
-    ]
-    assert difference == pytest.approx(np.sqrt(np.mean((means[0] - means[1]) ** 2)), abs=0.03)
-    corners = [patch.get_xy() for patch in figure.axes[1].patches]
-    assert corners[0] == (0, 0) and corners[1] == pytest.approx((10, -10))
 
 
 def test_table_sums_to_the_total_of_the_budget(why):

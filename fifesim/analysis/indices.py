@@ -23,11 +23,6 @@ def normalized_difference(nir, red):
     References
     ----------
     [Rouse1974]_; the criterion of [Friedl1995]_, Eq. 2, is `fifesim.analysis.scaling.linearity_correlation`
-
-    Examples
-    --------
-    >>> float(normalized_difference(0.75, 0.25))
-    0.5
     """
     nir, red = np.asarray(nir, float), np.asarray(red, float)
     return _ratio(nir - red, nir + red)
@@ -58,11 +53,6 @@ def normalized_difference_std(nir, red, nir_std, red_std):
     References
     ----------
     [JCGM2008]_, 5.1.2
-
-    Examples
-    --------
-    >>> round(float(normalized_difference_std(0.4, 0.1, 0.02, 0.0)), 9)
-    0.016
     """
     nir, red = np.asarray(nir, float), np.asarray(red, float)
     return _ratio(2 * np.hypot(red * nir_std, nir * red_std), (nir + red) ** 2)
@@ -90,11 +80,6 @@ def enhanced(nir, red, blue):
     References
     ----------
     [Huete2002]_
-
-    Examples
-    --------
-    >>> round(float(enhanced(0.5, 0.1, 0.08)), 3)
-    0.667
     """
     nir, red, blue = (np.asarray(each, float) for each in (nir, red, blue))
     return _ratio(2.5 * (nir - red), nir + 6 * red - 7.5 * blue + 1)
@@ -122,11 +107,6 @@ def enhanced_of_two_bands(nir, red):
     References
     ----------
     [Jiang2008]_
-
-    Examples
-    --------
-    >>> round(float(enhanced_of_two_bands(0.5, 0.1)), 3)
-    0.575
     """
     nir, red = np.asarray(nir, float), np.asarray(red, float)
     return _ratio(2.5 * (nir - red), nir + 2.4 * red + 1)
@@ -156,11 +136,6 @@ def soil_adjusted(nir, red, soil=0.5):
     References
     ----------
     [Huete1988]_
-
-    Examples
-    --------
-    >>> float(soil_adjusted(0.75, 0.25)), float(soil_adjusted(0.75, 0.25, soil=0))
-    (0.5, 0.5)
     """
     nir, red = np.asarray(nir, float), np.asarray(red, float)
     return _ratio((1 + soil) * (nir - red), nir + red + soil)
@@ -188,13 +163,6 @@ def modified_soil_adjusted(nir, red):
     References
     ----------
     [Qi1994]_, the second of them
-
-    Examples
-    --------
-    The index is 1 if no red light is reflected:
-
-    >>> float(modified_soil_adjusted(0.5, 0.0))
-    1.0
     """
     nir, red = np.asarray(nir, float), np.asarray(red, float)
     square = (2 * nir + 1) ** 2 - 8 * (nir - red)
@@ -220,11 +188,6 @@ def near_infrared_of_vegetation(nir, red):
     References
     ----------
     [Badgley2017]_
-
-    Examples
-    --------
-    >>> float(near_infrared_of_vegetation(0.75, 0.25))
-    0.375
     """
     return normalized_difference(nir, red) * np.asarray(nir, float)
 
@@ -257,11 +220,6 @@ def date_of_maximum(index):
     References
     ----------
     [Holben1986]_
-
-    Examples
-    --------
-    >>> date_of_maximum([[0.2, 0.5, 0.4], [np.nan, -0.1, np.nan], [np.nan] * 3]).tolist()
-    [1, 1, -1]
     """
     index = np.asarray(index, float)
     known = ~np.isnan(index)
@@ -285,11 +243,6 @@ def date_of_median(index):
     -------
     chosen : array of int, shape (...)
         -1 where no date has data.
-
-    Examples
-    --------
-    >>> date_of_median([[0.2, 0.5, 0.4], [np.nan, -0.1, 0.3], [np.nan] * 3]).tolist()
-    [2, 1, -1]
     """
     index = np.asarray(index, float)
     count = (~np.isnan(index)).sum(axis=-1)
@@ -318,13 +271,6 @@ def maximum_of_normals(dates):
     References
     ----------
     [David2003]_, order statistics
-
-    Examples
-    --------
-    For two dates the mean is 1 over the root of pi:
-
-    >>> [round(each, 4) for each in maximum_of_normals(2)]
-    [0.5642, 0.8256]
     """
     # The trapezoidal rule converges exponentially for a smooth integrand that vanishes at both ends.
     z = np.linspace(-12.0, 12.0, 4001)

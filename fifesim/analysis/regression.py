@@ -247,13 +247,6 @@ def equivalent_noise(deviation, slope, value):
     References
     ----------
     [Friedl1995]_, Eq. 7; [Baret1991]_
-
-    Examples
-    --------
-    A scatter of 0.02 in NDVI, with a slope of 0.4 per unit of LAI, is 5 % of an LAI of 1:
-
-    >>> round(equivalent_noise(0.02, 0.4, 1.0), 12)
-    0.05
     """
     return deviation / (slope * value)
 

@@ -34,11 +34,6 @@ def ramp(values, low, high):
     -------
     ramp : array, shape of values
         [1]
-
-    Examples
-    --------
-    >>> ramp([-10.0, 2.01, 30.0], -8.0, 12.02).round(6).tolist()
-    [0.0, 0.5, 1.0]
     """
     return np.clip((np.asarray(values, float) - low) / (high - low), 0.0, 1.0)
 
@@ -73,11 +68,6 @@ def light_use_gpp(tmin_c, vpd_pa, fpar, par_mj, lue_kg_mj=LIGHT_USE, tmin_ramp=T
     References
     ----------
     [Running2004]_
-
-    Examples
-    --------
-    >>> round(float(light_use_gpp(15.0, 650.0, 0.5, 10.0)), 3)
-    6.075
     """
     limits = ramp(tmin_c, *tmin_ramp) * (1 - ramp(vpd_pa, *vpd_ramp))
     return 1000 * lue_kg_mj * limits * (np.asarray(fpar, float) * par_mj)
@@ -120,11 +110,6 @@ def maintenance_respiration(lai, tmean_c, sla=38.0, root_per_leaf=2.6, leaf_rate
     References
     ----------
     [Running2004]_
-
-    Examples
-    --------
-    >>> round(float(maintenance_respiration(3.8, 20.0).leaf), 3)
-    0.98
     """
     warmth = (np.asarray(tmean_c, float) - 20) / 10
     carbon = 1000 / sla * np.asarray(lai, float)
@@ -163,13 +148,6 @@ def canopy_photosynthesis(lai, extinction, par, quantum_yield, p_max):
     References
     ----------
     [MonsiSaeki1953]_
-
-    Examples
-    --------
-    In weak light each absorbed photon counts:
-
-    >>> round(float(canopy_photosynthesis(3.0, 0.5, 1e-6, 0.05, 20.0) / 0.05e-6), 4)
-    0.7769
     """
     k, p = np.asarray(extinction, float), np.asarray(p_max, float)
     top = quantum_yield * k * par
@@ -281,11 +259,6 @@ def farquhar_canopy(lai, par, diffuse_fraction, sza, ta_k, vcmax25=60.0, ci_pa=2
     References
     ----------
     [DePury1997]_; [Farquhar1980]_
-
-    Examples
-    --------
-    >>> round(float(farquhar_canopy(3.0, 1500.0, 0.2, 30.0, 298.15)), 1)
-    22.5
     """
     ta_k = np.asarray(ta_k, float)
     leaves = two_leaves(lai, par, diffuse_fraction, sza, vcmax25)

@@ -44,14 +44,6 @@ def table_posterior(measured, members, states, probabilities):
     References
     ----------
     [BevenBinley1992]_
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> prior = np.random.default_rng(1).normal(0, 1, (20_000, 1))
-    >>> mean, sd, _, _ = table_posterior(np.array([[2.0]]), prior, prior, np.array([0.5]))
-    >>> bool(abs(mean[0, 0] - 1) < 0.02), bool(abs(sd[0, 0] - 0.5**0.5) < 0.02)
-    (True, True)
     """
     orders = np.argsort(states, axis=0, kind="stable").T.copy()
     arrays = (np.ascontiguousarray(each, float) for each in (measured, members.T, states))

@@ -29,13 +29,6 @@ def network(inputs, layers):
     Returns
     -------
     outputs : array, shape (n, outputs)
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> layers = Network((np.ones((2, 1)), np.full((1, 1), 3.0)), (np.zeros(1), np.ones(1)))
-    >>> network(np.array([[0.5, -0.5]]), layers).tolist()
-    [[1.0]]
     """
     values = inputs
     for weight, bias in zip(layers.weights[:-1], layers.biases[:-1], strict=True):

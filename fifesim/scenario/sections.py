@@ -205,10 +205,11 @@ class Sensor(SensorKeys):
     @classmethod
     def _known_noise_model(cls, value):
         _check_keys(value, NoiseModel, without="along")
+        detectors = value.get("detectors", 1)
+        if detectors % 1:
+            raise ValueError(f"detectors must be a whole number, got {detectors:g}")
         if value:
-            NoiseModel(**{"thermal": 0.0, "shot": 0.0} | value)
-        if value.get("detectors", 1) % 1:
-            raise ValueError(f"detectors must be a whole number, got {value['detectors']:g}")
+            NoiseModel(**{"thermal": 0.0, "shot": 0.0} | value | {"detectors": int(detectors)})
         return value
 
     def given_noise(self):

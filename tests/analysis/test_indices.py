@@ -1,7 +1,5 @@
 """Vegetation indices at their limits, and the date of each cell of a composite."""
 
-from itertools import pairwise
-from math import asin, pi, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +7,7 @@ import pandas as pd
 import pytest
 
 from fifesim.analysis import indices
-from fifesim.analysis.indices import date_of_maximum, normalized_difference, normalized_difference_std, values_of_date
-from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, SHORTWAVE_INFRARED
+from fifesim.analysis.indices import date_of_maximum, normalized_difference, normalized_difference_std
 
 # As the catalogue of spyndex writes them, with its letters for the bands.
 CATALOGUE = {
@@ -35,26 +32,12 @@ def test_formulas_are_those_of_the_catalogue(name):
     assert np.isnan(index(np.nan, *[0.2] * (len(letters) - 1)))
 
 
-def test_soil_adjustment_of_a_modified_index_is_its_own():
-    """MSAVI is SAVI with L = 1 - MSAVI, the fixed point from which its closed form was found (Qi et al. 1994)."""
-    nir, red = np.random.default_rng(2).uniform([[0.2], [0.02]], [[0.6], [0.15]], (2, 50))
-    msavi = indices.modified_soil_adjusted(nir, red)
-    np.testing.assert_allclose(msavi, indices.soil_adjusted(nir, red, soil=1 - msavi), rtol=1e-12)
-
-
 def test_index_without_a_denominator_or_a_root_is_missing_and_integers_do_not_wrap():
     assert np.isnan(indices.enhanced(0.5, 0.0, 0.2)) and np.isnan(indices.modified_soil_adjusted(0.5, -0.3))
     assert np.isnan(normalized_difference([0.0, 0.1, 0.1], [0.0, -0.1, np.nan])).all()
     np.testing.assert_array_equal(normalized_difference([0.5, 0.0], [0.0, 0.5]), [1.0, -1.0])
     ndvi = normalized_difference(np.array([1000, 65000], "uint16"), np.array([2000, 65000], "uint16"))
     np.testing.assert_allclose(ndvi, [-1 / 3, 0.0], rtol=1e-12)
-
-
-def test_windows_of_bands_do_not_overlap():
-    """But for the blue and the green, of which a band at 0.5 to 0.52 um shows both."""
-    windows = (BLUE, GREEN, RED, NEAR_INFRARED, SHORTWAVE_INFRARED)
-    assert all(each.low < each.best < each.high for each in windows)
-    assert all(one.high <= other.low for one, other in pairwise(windows[1:]))
 
 
 @pytest.mark.parametrize(("nir", "red"), [(0.4, 0.05), (0.25, 0.25), (0.05, 0.2)])
@@ -66,19 +49,6 @@ def test_error_of_ndvi_follows_from_its_derivatives(nir, red):
     found = normalized_difference_std(nir, red, 0.003, 0.001)
     assert found == pytest.approx(np.hypot(by_nir * 0.003, by_red * 0.001), rel=1e-8)
     assert np.isnan(normalized_difference_std(0.0, 0.0, 0.003, 0.001))
-
-
-# Expected largest of n standard normal numbers, in closed form.
-LARGEST = {2: 1 / sqrt(pi), 3: 3 / (2 * sqrt(pi)), 5: 5 / (4 * sqrt(pi)) * (1 + 6 / pi * asin(1 / 3))}
-
-
-@pytest.mark.parametrize("n", LARGEST)
-def test_composite_of_noisy_ndvi_is_high_by_the_largest_of_normal_numbers(n):
-    """Within four standard errors of the mean of 90 000 cells."""
-    deviation, cells = 0.03, 90_000
-    ndvi = 0.4 + deviation * np.random.default_rng(n).standard_normal((cells, n))
-    bias = values_of_date(ndvi, date_of_maximum(ndvi), np.nan) - 0.4
-    assert bias.mean() / deviation == pytest.approx(LARGEST[n], abs=4 / sqrt(cells))
 
 
 def test_missing_dates_are_passed_over_and_equal_ones_are_the_first():

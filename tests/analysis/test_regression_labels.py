@@ -6,18 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from lazy import CHUNKS, ODD_CHUNKS, in_chunks
-from scipy import stats
 
 import fifesim
-from fifesim.analysis.regression_labels import matched, origins, sound_cells
+from fifesim.analysis.regression_labels import matched, sound_cells
 from fifesim.grids import grid as grids
-
-
-def test_regression_agrees_with_scipy(pair):
-    fitted, theirs = fifesim.regress(*pair), stats.linregress(pair[1].values.ravel(), pair[0].values.ravel())
-    assert fitted.slope == pytest.approx(theirs.slope, rel=1e-10)
-    assert fitted.intercept == pytest.approx(theirs.intercept, rel=1e-10)
-    assert fitted.r2 == pytest.approx(theirs.rvalue**2, rel=1e-10)
 
 
 def test_regression_has_the_same_bits_in_any_chunks(pair):
@@ -77,13 +69,6 @@ def test_rasters_are_cut_to_their_common_ground(lai):
     np.testing.assert_array_equal(other, lai[:20, 11:41])
 
 
-def test_origins_are_means_of_first_rows_where_there_is_one(lai):
-    gap, empty = lai.copy(), lai.copy()
-    gap[0, 3], empty[0] = np.inf, np.nan
-    expected = [lai.values[0].mean(), np.delete(lai.values[0], 3).mean(), 0.0]
-    np.testing.assert_allclose(origins(lai, gap, in_chunks(empty, ODD_CHUNKS)), expected, rtol=1e-14)
-
-
 def test_digital_numbers_are_refused(lai):
     with pytest.raises(ValueError, match="lai holds digital numbers, whose 0 is no data: convert it with"):
         sound_cells(lai.assign_coords(gain=1.0))
@@ -100,16 +85,6 @@ def test_noise_on_a_line_is_its_deviation_over_slope_and_value(scattered):
     np.testing.assert_allclose(found["ren"], expected, rtol=0.12)
     assert found.attrs["slope"] == pytest.approx(0.3, rel=0.01)
     assert int(found["count"].sum()) == lai.size
-
-
-def test_noise_agrees_with_groups_of_pandas(scattered):
-    lai, ndvi = scattered
-    lai = lai.where(lai < 2)
-    found = fifesim.relative_equivalent_noise(lai, ndvi, 0.25, slope=0.3)
-    table = xr.Dataset({"lai": lai, "ndvi": ndvi}).to_dataframe()[["lai", "ndvi"]].dropna()
-    groups = table.groupby(np.floor(table["lai"] / 0.25))
-    np.testing.assert_array_equal(found["count"], groups.size())
-    np.testing.assert_allclose(found["ren"], groups["ndvi"].std() / 0.3 / groups["lai"].mean(), rtol=1e-10)
 
 
 def test_noise_has_the_same_bits_in_any_chunks(scattered):

@@ -71,11 +71,6 @@ def test_aggregates_of_bands_keep_them(lai):
     np.testing.assert_array_equal(truth.isel(band=1), fifesim.aggregate(cube.isel(band=1), 30.0))
 
 
-def test_a_block_is_a_size_in_metres(lai):
-    with pytest.raises(TypeError, match=r"^pixel must be a size in metres, such as 30\.0, got GeoBox"):
-        fifesim.aggregate(lai, grids.geobox(lai))
-
-
 # ------------------------------------------------------------------------------------------ biases and densities
 
 
@@ -133,13 +128,6 @@ def test_white_noise_keeps_a_ninth_of_its_deviation():
     assert scaling.pixel_shares(fifesim.aggregate(cells), cells) == pytest.approx(
         (float(kept["range"]), float(kept["variance"])), rel=1e-12
     )
-
-
-def test_share_kept_stays_lazy(lai_with_hole):
-    with no_compute():
-        lazy = fifesim.share_kept(fifesim.aggregate(in_chunks(lai_with_hole, CHUNKS)), in_chunks(lai_with_hole, CHUNKS))
-    assert lazy["range"].chunks is not None
-    assert 0 < float(lazy["range"]) < 1
 
 
 def test_density_of_a_raster_integrates_to_one_and_ignores_chunks(lai_with_hole):

@@ -57,14 +57,6 @@ def test_user_raster_with_only_wavelengths_goes_through(site):
     np.testing.assert_allclose(toa.fifesim.to_surface(), mine, rtol=0, atol=1e-12)
 
 
-def test_user_raster_may_name_the_instrument(site):
-    mine = directions.with_geometry(user_raster(site, [0.66, 0.83]), fifesim.fife_geometry())
-    as_tm = fifesim.to_toa(mine, AIR, instrument="TM")
-    named = fifesim.to_toa(mine.assign_coords(band=TM34), AIR, instrument="TM")
-    np.testing.assert_array_equal(as_tm, named)
-    assert not np.array_equal(as_tm, fifesim.to_toa(mine, AIR))
-
-
 @pytest.mark.parametrize("names", [[3, 4], ["B03", "B04"], ["red", "nir"], ["tm_3", "TM 4"]])
 def test_bands_by_the_names_that_people_have(site, names):
     """They are the instrument's from here on, with its wavelengths."""

@@ -29,20 +29,6 @@ def test_each_image_is_that_of_the_chain(lai):
     xr.testing.assert_identical(oli, rho.fifesim.to_toa().fifesim.sense("OLI"))
 
 
-def test_each_has_its_own_grid_and_red_and_near_infrared(lai):
-    images = fifesim.compare(lai, NAMES)
-    assert {name: grids.cell_size(grids.geobox(images[name]["dn"]))[0] for name in NAMES} == {
-        "TM": 30.0,
-        "OLI": 30.0,
-        "MSI": 10.0,
-    }
-    for name in NAMES:
-        red, nir = images[name]["dn"]["wavelength"].values
-        assert 0.6 < red < 0.7 and 0.75 < nir < 1.0
-        ndvi = fifesim.ndvi(images[name]["dn"])
-        assert 0.2 < float(ndvi.mean()) < 0.7
-
-
 def test_one_pass_makes_them_all(lai):
     """Lazy until asked, the same bits, and each chunk of the scene is read once."""
     reads = []
@@ -83,22 +69,6 @@ def test_bands_and_options_reach_the_instruments(lai):
 def test_what_cannot_be_compared_is_refused(lai, instruments, options, message):
     with pytest.raises(ValueError, match=message):
         fifesim.compare(lai, instruments, **options)
-
-
-def test_one_leaf_and_one_soil_are_seen_by_all(lai):
-    """A leaf without red absorption on grey ground has no vegetation signal, in whichever bands."""
-    white = fifesim.Leaf(structure=2.0, chlorophyll=0, carotenoids=0, water=0, dry_matter=0)
-    clear = fifesim.Atmosphere(aerosol="none")
-    images = fifesim.compare(
-        lai, NAMES, fifesim.Setup(canopy=fifesim.Canopy(leaf_optics=white, background=0.3), atmosphere=clear)
-    )
-    green = fifesim.compare(
-        lai, NAMES, fifesim.Setup(canopy=fifesim.Canopy(leaf_optics=fifesim.Leaf(), background={"soil_wet": 1.0}))
-    )
-    for name in NAMES:
-        assert (
-            float(fifesim.ndvi(images[name]["dn"]).mean()) < 0.1 < 0.4 < float(fifesim.ndvi(green[name]["dn"]).mean())
-        )
 
 
 def test_a_band_beyond_the_spectra_is_named(lai):

@@ -7,8 +7,7 @@ import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.base.footprints import Boxcar
-from fifesim.chain.driver import Driver, cell_block_means, shared_operators, varying_parts
+from fifesim.chain.driver import Driver, cell_block_means, varying_parts
 from fifesim.chain.setup import image_of, reflectance_of
 from fifesim.grids import grid as grids
 from fifesim.ground.terrain.labels import light_on_slopes
@@ -97,10 +96,3 @@ def test_a_shared_driver_draws_the_noise_of_each_seed(lai):
     images = [driver.image(toa, GRID, replace(setup, seed=seed)) for seed in (1, 2)]
     assert (images[0] != images[1]).any()
     np.testing.assert_array_equal(images[1], Driver(replace(setup, seed=2)).image(toa, GRID))
-
-
-def test_operators_are_kept_for_grids_of_one_place():
-    pixels = grids.aligned_grid(GRID, 30.0)
-    first = shared_operators((Boxcar(30.0), Boxcar(30.0)), GRID, pixels)
-    assert shared_operators((Boxcar(30.0), Boxcar(30.0)), GRID, pixels) is first
-    assert shared_operators((Boxcar(30.0), Boxcar(30.0)), GRID, pixels, (3.0, 0.0)) is not first

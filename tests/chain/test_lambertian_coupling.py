@@ -183,30 +183,12 @@ def test_production_makes_one_reflectance_factor_of_sunlight_and_skylight():
         assert float(toa.sel(band=name)[0, 0]) == pytest.approx(expected, rel=1e-9)
 
 
-def test_table_has_six_cases():
-    assert [row[:2] for row in ROWS] == [(v, s) for v in ("45", "15") for s in ("28.5", "45", "60")]
-
-
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row[0]}-{row[1]}")
 def test_errors_at_nadir_are_those_of_the_page(row):
     visibility, sza, *printed = row
     found, ndvi = errors(float(visibility), float(sza))
     for text, values, digit in zip(printed, (*found, ndvi), (0.1, 0.1, 0.001), strict=True):
         np.testing.assert_allclose(numbers(text), [values.min(), values.max()], rtol=0, atol=0.6 * digit)
-
-
-def test_summary_of_the_benchmarks_is_that_of_the_table():
-    """With the sun at 45 degrees or higher."""
-    page = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
-    found = re.search(
-        r"within ([\d.]+) % at\s+45 km visibility and ([\d.]+) % at 15 km at nadir, and up to ([\d.]+) %", page
-    )
-    high = [row for row in ROWS if float(row[1]) <= 45]
-    largest = [
-        max(abs(each) for row in high if row[0] == km for each in numbers(row[2] + row[3])) for km in ("45", "15")
-    ]
-    (in_hot_spot,) = re.findall(r"too bright at 45 km and [\d.]+ to ([\d.]+) % at 15 km", TEXT)
-    assert [float(each) for each in found.groups()] == [*largest, float(in_hot_spot)]
 
 
 def test_errors_in_the_hot_spot_are_those_of_the_page():

@@ -51,20 +51,6 @@ def test_reflectance_is_lazy_and_has_the_same_bits_in_chunks(land, rho, chunks, 
     xr.testing.assert_identical(made.compute(), expected)
 
 
-def test_reflectance_of_a_landscape_goes_on_as_of_a_lone_leaf_area(land, rho):
-    assert rho.name == "surface_reflectance" and rho.attrs["instrument"] == "TM" and rho.attrs["site"] == "FIFE"
-    assert "spherical" in rho.attrs["leaf_angles"] and rho.attrs["background"] == "by class"
-    image = rho.fifesim.to_toa().fifesim.sense(fifesim.instrument("TM", response="paper"))
-    assert image.dtype == np.uint8 and (image > 0).all()
-
-
-def test_landscape_without_cover_is_one_class(land):
-    alone = land[["lai"]].fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(hotspot=0.1))
-    xr.testing.assert_identical(
-        alone, land.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(hotspot=0.1))
-    )
-
-
 def test_arguments_are_those_of_classes_that_leave_them_open(land, rho, lai):
     """Rasters as well: here of the background of the one class that says none."""
     open_one = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed")}
@@ -248,13 +234,6 @@ def test_variables_of_a_landscape_win_over_its_classes(site, land):
     xr.testing.assert_equal(
         number, land.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(brown=0.3))
     )
-
-
-@pytest.mark.slow
-def test_other_processes_make_the_same_bits(site, land, rho):
-    lazy = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=CLASSES, seed=7, chunks=CHUNKS)
-    made = lazy.fifesim.surface_reflectance("TM", bands=TM34)
-    np.testing.assert_array_equal(made.compute(scheduler="processes", num_workers=2), rho)
 
 
 def test_landscape_of_several_dates_goes_date_by_date(land, rho):

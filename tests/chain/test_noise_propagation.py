@@ -124,30 +124,6 @@ def test_scale_of_square_roots_has_steps_that_grow(toa):
     np.testing.assert_allclose(std, (up - down) / 2 / np.sqrt(12), rtol=1 / (8 * 5**2))
 
 
-def test_swath_keeps_its_lines_and_samples(toa):
-    image = toa.fifesim.sense("OLI")
-    swath = xr.DataArray(
-        image.values, dims=("band", "line", "sample"), attrs=image.attrs,
-        coords={name: each for name, each in image.coords.items() if not {"y", "x"} & set(each.dims)},
-    )  # fmt: skip
-    assert swath.fifesim.noise_std().dims == ("line", "sample")
-    np.testing.assert_array_equal(swath.fifesim.noise_std(), image.fifesim.noise_std())
-
-
-def test_dates_stay_apart(toa):
-    image = toa.fifesim.sense("OLI")
-    times = xr.DataArray(np.array(["1987-06-06T16:35", "1987-06-22T16:35"], "datetime64[ns]"), dims="time", name="time")
-    stack = xr.concat([image, image], times)
-    xr.testing.assert_allclose(stack.fifesim.noise_std().isel(time=1, drop=True), image.fifesim.noise_std())
-
-
-def test_bands_are_known_by_their_names(toa):
-    """Without wavelengths, and in any order."""
-    image = toa.fifesim.sense("OLI")
-    nameless = image.drop_vars("wavelength").isel(band=[1, 0])
-    np.testing.assert_array_equal(nameless.fifesim.noise_std(instrument="OLI"), image.fifesim.noise_std())
-
-
 @pytest.mark.parametrize(
     ("change", "options", "message"),
     [

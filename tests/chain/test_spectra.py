@@ -90,10 +90,6 @@ def test_derivatives_at_the_ends_of_the_range_are_one_sided():
         np.testing.assert_allclose(found.sel(quantity=name)[:, 0], (moved - own)[:, 0] / step, rtol=1e-4)
 
 
-def test_quantities_that_are_equal_everywhere_have_derivatives_too():
-    found = fifesim.canopy_spectra({"lai": [1.0, 2.0]}, geometry=SUN, derivatives=["background", "sza", "leaf_water"])
-    assert found.derivative.dims == ("quantity", "canopy", "band")
-    assert np.isfinite(found.derivative).all() and (found.derivative.sel(quantity="background") > 0).all()
 
 
 @pytest.mark.parametrize("name", ["lai", "brown", "sza", "leaf_water", "background", "moisture"])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from lazy import ODD_CHUNKS, in_chunks, no_compute
+from lazy import no_compute
 
 import fifesim
 from fifesim.atmosphere import engines
@@ -27,14 +27,6 @@ def test_chain_has_the_same_bits_lazily_and_computes_nothing_early(site, contrac
     assert fifesim.regress(lazy["truth"], lazy["ndvi"]) == fifesim.regress(whole["truth"], whole["ndvi"])
 
 
-def test_chunks_may_begin_anywhere_in_the_chain(whole):
-    """`DataArray.chunk` makes coordinates such as the wavelength lazy, too."""
-    toa = whole["rho"].chunk(ODD_CHUNKS).fifesim.to_toa()
-    image = toa.chunk({"band": 1, "y": 9}).fifesim.sense("TM")
-    xr.testing.assert_identical(image.compute(), whole["image"])
-    xr.testing.assert_identical(image.chunk(2).fifesim.ndvi().compute(), whole["ndvi"])
-
-
 def test_every_step_lies_where_it_should(site, whole):
     for name in ("lai", "rho", "toa"):
         assert grids.same_grid(grids.geobox(whole[name]), site)
@@ -49,13 +41,6 @@ def test_history_tells_every_stage(whole):
     verbs = [line.split(":")[0] for line in whole["ndvi"].attrs["history"].splitlines()]
     assert verbs == ["lai_scene", "surface_reflectance", "to_toa", "sense", "to_radiance", "to_reflectance", "ndvi"]
     assert whole["ndvi"].attrs["rng_seed"] == "7"
-
-
-def test_image_is_that_of_the_paper_case(whole):
-    """Sparse green grass: brighter in the near infrared than in the red, NDVI between soil and dense canopy."""
-    assert whole["image"].dtype == np.uint8 and whole["image"].dims == ("band", "y", "x")
-    assert 0.1 < float(whole["ndvi"].min()) < float(whole["ndvi"].max()) < 0.9
-    assert fifesim.regress(whole["truth"], whole["ndvi"]).slope > 0
 
 
 def test_defaults_are_the_paper_case(lai):
@@ -81,14 +66,6 @@ def test_skylight_of_the_atmosphere_reaches_the_ground(lai):
     assert rho.fifesim.to_toa().attrs["atmosphere"] == haze.text
 
 
-def test_bare_ground_is_the_background(lai):
-    bare = xr.zeros_like(lai)
-    expected = np.array(optics.band_background(TM34))[:, None, None]
-    np.testing.assert_allclose(
-        bare.fifesim.surface_reflectance("TM", bands=TM34), expected + 0 * bare.values, rtol=1e-12
-    )
-
-
 def test_background_is_a_number_a_mapping_or_a_raster(lai):
     number, mapping = (
         lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=value))
@@ -103,23 +80,6 @@ def test_background_is_a_number_a_mapping_or_a_raster(lai):
         for value in (0.2, raster)
     ]
     np.testing.assert_allclose(exact[0], exact[1], rtol=1e-12)
-
-
-def test_raster_of_background_stays_lazy(lai):
-    soil = in_chunks(xr.full_like(lai, 0.2).expand_dims(band=TM34), {"band": 1, "y": 20})
-    with no_compute():
-        rho = in_chunks(lai, ODD_CHUNKS).fifesim.surface_reflectance(
-            "TM", bands=TM34, canopy=fifesim.Canopy(background=soil)
-        )
-    np.testing.assert_allclose(
-        rho, lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=0.2)), rtol=0, atol=1e-6
-    )
-
-
-def test_tabulated_reflectance_is_within_a_millionth_of_the_exact_one(lai):
-    options = {"bands": TM34, "canopy": fifesim.Canopy(hotspot=0.1, leaf_angles="planophile")}
-    fast, exact = (lai.fifesim.surface_reflectance("TM", **options, exact=each) for each in (False, True))
-    np.testing.assert_allclose(fast, exact, rtol=0, atol=1e-6)
 
 
 def test_there_and_back_through_the_atmosphere(whole):
@@ -177,10 +137,3 @@ def test_impossible_canopy_is_refused(lai, field, message):
 def test_low_sun_is_refused_by_the_atmosphere(lai):
     with pytest.raises(ValueError, match=r"sza.*89"):
         fifesim.surface_reflectance(lai, geometry=Geometry(89.0, 100.0))
-
-
-def test_one_band_goes_through_the_chain(lai):
-    rho = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"])
-    both = fifesim.sense(fifesim.to_toa(rho))
-    one = fifesim.sense(fifesim.to_toa(rho.sel(band="TM4")))
-    np.testing.assert_array_equal(one.squeeze("band"), both.sel(band="TM4"))

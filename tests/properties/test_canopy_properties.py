@@ -53,11 +53,6 @@ def test_conservative_leaves_lose_no_light(lai, rho, sza, shape):
     np.testing.assert_allclose(with_background(canopy, 1.0).rdd, 1, atol=1e-9)
 
 
-@modest
-@given(zenith, zenith, azimuth, leaf_angles, hotspot, fraction)
-def test_bare_ground_is_the_background(sza, vza, raa, shape, hotspot, r):
-    surface = with_background(sail(0.0, 0.3, 0.3, sza=sza, vza=vza, raa=raa, leaf_angles=shape, hotspot=hotspot), r)
-    assert all(value == r for value in surface)
 
 
 @modest

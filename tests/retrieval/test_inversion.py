@@ -43,14 +43,6 @@ def saturating(states, pixels):
     return np.hstack([0.4 - 0.3 * decay, 0.05 + 0.1 * decay]), np.stack([0.3 * decay, -0.1 * decay], axis=1)
 
 
-def test_saturating_problem_recovers_the_state_without_noise():
-    true = np.linspace(0.2, 4, 20)[:, None]
-    measured, _ = saturating(true, None)
-    found = optimal_estimation(
-        measured, saturating, np.array([2.0]), np.array([[1e4]]), 1e-10 * np.eye(2), tolerance=1e-6, iterations=50
-    )
-    assert found.converged.all()
-    assert found.state == pytest.approx(true, abs=1e-3)
 
 
 def test_estimate_is_the_least_of_the_cost():
