@@ -90,8 +90,6 @@ def test_derivatives_at_the_ends_of_the_range_are_one_sided():
         np.testing.assert_allclose(found.sel(quantity=name)[:, 0], (moved - own)[:, 0] / step, rtol=1e-4)
 
 
-
-
 @pytest.mark.parametrize("name", ["lai", "brown", "sza", "leaf_water", "background", "moisture"])
 def test_a_missing_value_is_a_missing_spectrum(name):
     values = drawn(3)

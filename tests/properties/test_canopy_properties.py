@@ -53,8 +53,6 @@ def test_conservative_leaves_lose_no_light(lai, rho, sza, shape):
     np.testing.assert_allclose(with_background(canopy, 1.0).rdd, 1, atol=1e-9)
 
 
-
-
 @modest
 @given(lai, lai, fraction, fraction, zenith, leaf_angles, fraction)
 def test_two_layers_add_up_to_one(upper, lower, rho, share, sza, shape, r):

@@ -43,8 +43,6 @@ def saturating(states, pixels):
     return np.hstack([0.4 - 0.3 * decay, 0.05 + 0.1 * decay]), np.stack([0.3 * decay, -0.1 * decay], axis=1)
 
 
-
-
 def test_estimate_is_the_least_of_the_cost():
     measured = np.array([[0.31, 0.09], [0.2, 0.14]])
     prior, spread, error = np.array([1.0]), np.array([[0.5]]), np.diag([1e-4, 4e-4])

@@ -10,7 +10,6 @@ import xarray as xr
 import fifesim
 from fifesim.chain.driver import Driver
 from fifesim.retrieval import inversion, labels, methods, training
-from fifesim.retrieval.description import Retrieval
 from fifesim.scenario.ensemble import uniform_reflectance
 from fifesim.scenario.simulation import setup_of
 from tests.lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
@@ -303,8 +302,6 @@ def test_impossible_training_is_refused(chips, options, message):
         fifesim.train(chips, **options)
 
 
-
-
 def test_files_that_are_no_retrieval_are_refused(tmp_path, chips):
     with pytest.raises(ValueError, match="no such file"):
         fifesim.read_retrieval(tmp_path / "none.nc")
@@ -318,8 +315,6 @@ def test_files_that_are_no_retrieval_are_refused(tmp_path, chips):
     newer.to_netcdf(tmp_path / "newer.nc")
     with pytest.raises(ValueError, match="has the format 2"):
         fifesim.read_retrieval(tmp_path / "newer.nc")
-
-
 
 
 def test_batches_do_not_change_the_estimates(chips, image, monkeypatch):
