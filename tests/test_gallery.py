@@ -88,6 +88,7 @@ def test_table_of_the_hot_spot_is_that_of_its_picture():
         assert f"{abs(percent[there]).max():.1f}" == printed
 
 
+@pytest.mark.slow
 def test_table_of_accuracy_has_the_deviations_of_the_checks():
     """Errors of SAIL, of 5S in clear air, of successive orders and of the gases, rounded as the table has them."""
     page = (DOCS / "benchmarks.md").read_text(encoding="utf-8")

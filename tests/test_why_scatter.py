@@ -75,6 +75,7 @@ def test_statements_of_the_page_on_the_table(why):
     assert causes.loc["correlation of LAI with soil and terrain", ["TM", "MSI"]].max() < -3
 
 
+@pytest.mark.slow
 def test_statements_of_the_page_on_the_panels(why):
     """Of the very scene of the picture."""
     page = (DOCS / "why_scatter.md").read_text("utf-8")

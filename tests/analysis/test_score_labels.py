@@ -112,10 +112,10 @@ def test_groups_are_scored_one_by_one(estimate, truth):
 
 
 def test_standard_errors_are_the_spread_over_redrawn_landscapes():
-    """Errors that a landscape shares, 200 sets of 20 landscapes; of independent pixels they would be much smaller."""
+    """Errors that a landscape shares, 120 sets of 20 landscapes; of independent pixels they would be much smaller."""
     rng = np.random.default_rng(4)
     drawn, errors, biases, stated = [], [], [], []
-    for _ in range(200):
+    for _ in range(120):
         shared = rng.normal(0, 0.2, (20, 1))
         truth = xr.DataArray(rng.normal(2, 0.5, (20, 100)), dims=("landscape", "pixel"), name="lai")
         value = truth + shared + rng.normal(0, 0.2, truth.shape)
@@ -125,8 +125,8 @@ def test_standard_errors_are_the_spread_over_redrawn_landscapes():
         errors.append(float(found.coverage_se[0]))
         biases.append(float(found.bias))
         stated.append(float(found.bias_se))
-    assert np.mean(errors) == pytest.approx(np.std(drawn), rel=0.2)
-    assert np.mean(stated) == pytest.approx(np.std(biases), rel=0.2)
+    assert np.mean(errors) == pytest.approx(np.std(drawn), rel=0.25)
+    assert np.mean(stated) == pytest.approx(np.std(biases), rel=0.25)
     assert np.mean(errors) > 3 * np.sqrt(0.7 * 0.3 / 2000)
 
 

@@ -186,7 +186,9 @@ def test_streams_of_other_directions_or_beyond_reflectance_are_refused():
 
 def test_discrete_ordinates_have_no_directional_streams():
     with pytest.raises(ValueError, match="one direction of sun and view"):
-        ground(streams="directional", canopy=GRASS.replace(model="discrete-ordinates"))
+        exact = {"canopy": GRASS.replace(model="discrete-ordinates"), "exact": True}
+        known = {"atmosphere": HAZE, "geometry": SLANT}
+        LAI[:2, :2].fifesim.surface_reflectance("TM", bands=BANDS, streams="directional", **known, **exact)
 
 
 def test_adjacency_of_equal_streams_is_lambertian_and_of_even_ground_nothing():

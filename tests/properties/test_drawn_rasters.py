@@ -21,7 +21,7 @@ from rasterio.control import GroundControlPoint
 import fifesim
 from fifesim.grids.opening import ErrorsOfGdal
 
-COUNT = int(os.environ.get("FIFESIM_DRAWS", "150"))
+COUNT = int(os.environ.get("FIFESIM_DRAWS", "80"))
 WEST, NORTH = 708000.0, 4332000.0
 GRID = fifesim.grid_at("EPSG:26914", WEST, NORTH, 240.0, 200.0, 10.0)
 

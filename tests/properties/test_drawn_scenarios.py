@@ -29,7 +29,7 @@ from fifesim.scenario.scenario import parse_scenario, read_scenario
 from fifesim.scenario.simulation import simulate
 from fifesim.scenario.toml import check_spelling, write_scenario
 
-DRAWS = int(os.environ.get("FIFESIM_DRAWS", 300))
+DRAWS = int(os.environ.get("FIFESIM_DRAWS", 150))
 
 # Nine pixels of nine cells, on level ground: what is not drawn.
 SMALL = {"grid": {"width": 90.0, "height": 90.0, "cell": 10.0}, "terrain": {"dem": "flat"}}

@@ -8,7 +8,7 @@ from fifesim.analysis.scaling import shapley
 from fifesim.experiments.scatter.errors import ERROR_STAGES
 from fifesim.experiments.scatter.shares import budget_cases
 
-SQUARE = {"west": 707970.0, "north": 4331220.0, "width": 600.0, "height": 600.0}
+SQUARE = {"west": 707970.0, "north": 4331220.0, "width": 420.0, "height": 420.0}
 BURNED = {"grid": SQUARE, "terrain": {"dem": "flat"}, "sensor": {"offset": [0.3, 0.0]}}
 TREATMENTS = ("burned-grazed", "burned-ungrazed", "unburned-ungrazed")
 PASTURES = BURNED | {
@@ -68,9 +68,10 @@ def test_linear_quantity_with_a_line_has_the_shares_of_the_closed_form(tmp_path)
     NDVI. The total of the budget gives q, and q the three shares.
     """
     path = tmp_path / "narrow.csv"
-    np.savetxt(path, np.random.default_rng(1).normal(2.0, 0.1, 2000), header="lai", comments="")
+    np.savetxt(path, np.random.default_rng(1).normal(2.0, 0.1, 200), header="lai", comments="")
     sensor = {"instrument": "OLI2", "response": "detector", "offset": [1 / 3, 0.0]}
     sections = BURNED | {"sensor": sensor, "ground": {"distribution": str(path), "arp": 0.0}}
+    sections |= {"grid": SQUARE | {"width": 600.0, "height": 600.0}}
     found = shares_of(sections, lambda area: 3.0 * area, realisations=8)
     shares, total = found.variance / found.truth_variance, found.total_variance / found.truth_variance
     q = (4 / 9) / (1 - float(total.mean())) - 1
