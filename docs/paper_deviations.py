@@ -8,13 +8,8 @@ import numpy as np
 import fifesim
 from fifesim.analysis.scaling_labels import aggregate_blocks
 from fifesim.atmosphere.labels import diffuse_fraction
-from fifesim.base.geometry import (
-    SITE_ALTITUDE,
-    SITE_LATITUDE,
-    SITE_LONGITUDE,
-    SITE_SIZE,
-    sun_geometry,
-)
+from fifesim.base.geometry import sun_geometry
+from fifesim.base.times import SITE_ALTITUDE, SITE_LATITUDE, SITE_LONGITUDE, SITE_SIZE
 from fifesim.chain.setup import image_of, reflectance_of
 from fifesim.chain.steps import ndvi
 from fifesim.experiments.friedl1995 import case as friedl1995

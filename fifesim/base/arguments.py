@@ -27,7 +27,7 @@ from typing import (
 
 import numpy as np
 
-from fifesim.base.messages import unknown_argument
+from fifesim.base.messages import closest, unknown_argument
 
 
 class Kind(NamedTuple):
@@ -39,6 +39,8 @@ class Kind(NamedTuple):
     dimensions: int | None = None
     # Kinds of numpy's dtypes that rasters in the value may have; None for any.
     numbers: str | None = "iuf"
+    # The only values, if they can be listed.
+    allowed: tuple = ()
 
 
 _class_name = attrgetter("__name__")
@@ -200,7 +202,7 @@ def kind_of(annotation):
     if origin in (Union, UnionType):
         return _either([kind_of(each) for each in parts if each is not NoneType])
     if origin is Literal:
-        return kind_of(type(parts[0]))
+        return kind_of(type(parts[0]))._replace(allowed=parts)
     for key in (annotation, origin, getattr(annotation, "__name__", None)):
         if key is not None and key in _KINDS:
             return _KINDS[key]
@@ -238,6 +240,11 @@ def check(name, value, kind):
     """Raise TypeError if a value is not of a kind."""
     if not kind.fits(value):
         raise TypeError(f"{name} must be {kind.words}, got {described(value)}{_cure(value, kind)}")
+    if kind.allowed and value not in kind.allowed:
+        *others, last = map(repr, kind.allowed)
+        near = closest(value, kind.allowed)
+        hint = f": did you mean {near!r}?" if near else ""
+        raise ValueError(f"{name} must be {', '.join(others)} or {last}, got {described(value)}{hint}")
     if kind.dimensions is None or not is_a(value, "DataArray"):
         return
     if value.ndim < kind.dimensions:

@@ -18,17 +18,7 @@ LONGEST = 100.0
 
 
 class Window(NamedTuple):
-    """
-    Spectral window in which a band must lie for a purpose.
-
-    Parameters
-    ----------
-    name : str
-    low, high : float
-        Wavelengths between which it lies. [um]
-    best : float
-        The best place. [um]
-    """
+    """Spectral window in which a band must lie for a purpose: its limits and the best wavelength. [um]"""
 
     name: str
     low: float

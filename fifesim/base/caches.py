@@ -39,7 +39,7 @@ class Results(dict):
     def __setitem__(self, key, result):
         super().__setitem__(key, result)
         for old in list(self)[: -self._size]:
-            del self[old]
+            self.pop(old, None)
 
     def cache_info(self):
         """Number of results, as `functools.lru_cache` states it."""

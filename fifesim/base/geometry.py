@@ -1,8 +1,7 @@
-"""Directions of sun and sensor, dates and times, and the place of the paper's site."""
+"""Directions of sun and sensor."""
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,9 +9,10 @@ import numpy as np
 import pandas as pd
 import pvlib
 
-from fifesim.base.arguments import check_fields, described, is_a
+from fifesim.base.arguments import check_fields, is_a
 from fifesim.base.caches import cached
 from fifesim.base.messages import warn
+from fifesim.base.times import SITE_ALTITUDE, SITE_LATITUDE, SITE_LONGITUDE, SITE_TIME, utc
 
 ANGLES = ("sza", "saa", "vza", "vaa")
 
@@ -229,45 +229,3 @@ def angle_between(zenith, azimuth, other_zenith, other_azimuth):
     turn = np.radians(np.subtract(azimuth, other_azimuth)) / 2
     square = np.sin((theta - other) / 2) ** 2 + np.sin(theta) * np.sin(other) * np.sin(turn) ** 2
     return np.degrees(2 * np.arcsin(np.sqrt(np.clip(square, 0, 1))))
-
-
-# A hypothetical overpass: the paper simulates TM for this day (section Data), on which no Landsat passed the FIFE site
-# (WRS-2 cycle). It states no time: this is about when one passed on other days.
-SITE_TIME = "1987-06-06T16:35:00Z"
-SITE_LATITUDE = 39.06  # [degree north]
-SITE_LONGITUDE = -96.54  # [degree east]
-SITE_ALTITUDE = 400.0  # [m]
-
-
-# The site is a square, in UTM zone 14. [m]
-SITE_SIZE = 15000.0
-# FIFE's own corner in NAD27, and the nearest point of the 30 m lattice of today's NAD83 elevation models to the place
-# that a Helmert transformation (EPSG:1173, good to 7 m) gives it: 704968 E 4334211 N.
-SITE_CORNERS = {"NAD83": ("EPSG:26914", 704970.0, 4334220.0), "NAD27": ("EPSG:26714", 705000.0, 4334000.0)}
-
-
-# Day and month in another order are another season, and a time alone is today's.
-_WRITTEN = re.compile(r"\s*\d{4}-?\d{2}-?\d{2}[T ]\d{2}(:?\d{2}.*)?\s*", re.ASCII)
-_YEARS = 1700, 2200  # range of dates in nanoseconds
-
-
-def utc(time, name="time"):
-    """Time in UTC, from text after ISO 8601 or a datetime; UTC is assumed if no time zone is given."""
-    if isinstance(time, str) and re.fullmatch(r"\s*\d{4}-?\d{2}-?\d{2}\s*", time):
-        raise ValueError(f"{name} = {time!r} is a date alone: add the time of day, such as {time.strip()}T17:10Z")
-    if isinstance(time, str) and not _WRITTEN.fullmatch(time):
-        raise ValueError(
-            f"{name} must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}: the year first, "
-            "then month and day, for other orders are read in several ways"
-        )
-    try:
-        # A number would be taken for nanoseconds since 1970.
-        stamp = pd.NaT if isinstance(time, int | float | np.number) else pd.Timestamp(time)
-    except (TypeError, ValueError):
-        stamp = pd.NaT
-    if stamp is pd.NaT:
-        raise ValueError(f"{name} must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}")
-    if not _YEARS[0] <= stamp.year < _YEARS[1]:
-        allowed = f"{_YEARS[0]} to {_YEARS[1]}"
-        raise ValueError(f"{name} must be a date and time of the years {allowed}, got {described(time)}")
-    return pd.DatetimeIndex([stamp.tz_localize("UTC") if stamp.tzinfo is None else stamp.tz_convert("UTC")])

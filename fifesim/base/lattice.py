@@ -11,11 +11,12 @@ origin of each grid would differ by 1e-10 m, and xarray aligns exactly. A value 
 window and chunk.
 """
 
-from functools import lru_cache
+from weakref import ref
 
 import numpy as np
 
 from fifesim.base.arguments import described
+from fifesim.base.caches import cached
 
 SEED_LIMIT = 2**63  # scenario files hold signed whole numbers
 
@@ -78,14 +79,16 @@ def _overlap(tile, index, window_start, window_size):
 
 
 class KeptTiles:
-    """Cache of the last tiles of ``make(tile_row, tile_column)``; a copy in another process starts empty."""
+    """Function ``make(tile_row, tile_column)`` whose last tiles are cached; a copy in another process starts empty."""
 
     def __init__(self, make):
-        self._make = make
-        self._kept = lru_cache(maxsize=4)(make)
+        self.make = make
 
     def __call__(self, tile_row, tile_column):
-        return self._kept(tile_row, tile_column)
+        return _kept_tile(ref(self), tile_row, tile_column)
 
-    def __reduce__(self):
-        return KeptTiles, (self._make,)
+
+@cached(8, "tiles of elevation models")
+def _kept_tile(tiles, row, column):
+    # By a weak reference, so that the source of the tiles is not kept.
+    return tiles().make(row, column)

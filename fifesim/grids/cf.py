@@ -12,41 +12,19 @@ from fifesim.base.caches import cached
 
 @dataclass(frozen=True)
 class Quantity:
-    """
-    Name, units, range and colours of a variable, for files, pictures, reports and pages.
+    """Name, units, range and colours of a variable, for files, pictures, reports and pages."""
 
-    Parameters
-    ----------
-    units : str
-        In CF spelling.
-    standard_name : str
-        CF standard name, "" where none exists.
-    long_name : str
-    comment : str, optional
-    label : str, optional
-        Short label for axes, colour bars and tables; by default the long name.
-    shown_units : str, optional
-        Units in pictures, if different from ``units``.
-    lowest, highest : float, optional
-        Physical range in ``units``; None if unbounded.
-    colours : str, optional
-        Colour map: a name of matplotlib, or "land" for elevation. "gray" is for images.
-    middle : float, optional
-        Value about which the colours diverge.
-    ends : (float or None, float or None), optional
-        Values of the first and the last colour in style files, the same for all files; None is a percentile.
-    """
-
-    units: str
-    standard_name: str
+    units: str  # in CF spelling
+    standard_name: str  # of CF, "" where none exists
     long_name: str
     comment: str = ""
-    label: str = ""
-    shown_units: str = ""
+    label: str = ""  # short, for axes, colour bars and tables; by default the long name
+    shown_units: str = ""  # in pictures, if different from `units`
     lowest: float | None = None
     highest: float | None = None
-    colours: str = "viridis"
-    middle: float | None = None
+    colours: str = "viridis"  # a colour map of matplotlib, or "land" for elevation; "gray" is for images
+    middle: float | None = None  # value about which the colours diverge
+    # Values of the first and the last colour in style files, the same for all files; None is a percentile.
     ends: tuple[float | None, float | None] = (None, None)
 
     def __post_init__(self):

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from fifesim.base.arrays import compiled, read_only
+from fifesim.base.arrays import compiled
 from fifesim.base.caches import cached
 from fifesim.base.geometry import ANGLES
 from fifesim.grids import chunks as chunking
@@ -17,8 +17,6 @@ NO_CLASS = -1
 def check_codes(codes, table):
     """Codes of classes as int16, with -1 for NaN; unknown codes raise ValueError."""
     codes = np.asarray(codes)
-    if codes.dtype == np.int16 and not _others(codes.ravel(), _numbers(tuple(table))):
-        return codes
     if codes.dtype.kind == "f":
         codes = np.where(np.isnan(codes), NO_CLASS, codes)
     wrong = ~np.isin(codes, [NO_CLASS, *table])
@@ -47,10 +45,8 @@ def cells_by_class(codes, table):
 
 def numbers_of(codes, table):
     """Positions of the codes of cells in a table, its length for unknown codes, and which of them occur."""
-    codes, present = np.ascontiguousarray(codes, np.int16), np.zeros(len(table) + 1, bool)
-    numbers = np.empty(codes.shape, np.int16)
-    _look_up(read_only(codes.reshape(-1)), _numbers(tuple(table)), numbers.reshape(-1), present)
-    return numbers, present
+    numbers = _numbers(tuple(table))[np.asarray(codes, np.int16)]
+    return numbers, np.bincount(numbers.ravel(), minlength=len(table) + 1) > 0
 
 
 @cached(16, "numbers of class codes")
@@ -59,22 +55,6 @@ def _numbers(table):
     numbers = np.full(2**15 + 1, len(table), np.int16)
     numbers[list(table)] = np.arange(len(table))
     return numbers
-
-
-@compiled
-def _others(codes, numbers):
-    """Number of codes outside of a table, apart from -1."""
-    count, none = 0, numbers[-1]
-    for i in range(codes.size):
-        count += (codes[i] < NO_CLASS) | ((codes[i] >= 0) & (numbers[codes[i]] == none))
-    return count
-
-
-@compiled
-def _look_up(codes, numbers, out, present):
-    for i in range(codes.size):
-        out[i] = numbers[codes[i]]
-        present[out[i]] = True
 
 
 @compiled

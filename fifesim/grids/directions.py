@@ -7,16 +7,9 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.arguments import Kind
-from fifesim.base.geometry import (
-    ANGLES,
-    Geometry,
-    earth_sun_distance,
-    fife_geometry,
-    sun_geometry,
-    utc,
-    warn_of_radians,
-)
+from fifesim.base.geometry import ANGLES, Geometry, earth_sun_distance, fife_geometry, sun_geometry, warn_of_radians
 from fifesim.base.messages import warn
+from fifesim.base.times import utc
 from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
 from fifesim.grids.sites import is_fife

@@ -16,7 +16,7 @@ from odc.geo.geobox import GeoBox
 from odc.geo.xr import xr_coords
 
 from fifesim.base.arguments import Kind, Pair
-from fifesim.base.caches import cached
+from fifesim.base.caches import Results, cached
 from fifesim.base.lattice import centres, whole_cells
 from fifesim.grids import projection
 
@@ -109,14 +109,10 @@ def exact_cell(array, cell_x, cell_y):
     return cell_x, cell_y
 
 
-def reference_of(grid):
-    """Coordinate ``spatial_ref`` of a grid, a new copy for each call."""
-    return _made(grid).copy()
-
-
 # Cached, because every step of a chain needs it, and making it takes a millisecond.
 @cached(64, "CRS coordinates of grids")
-def _made(grid):
+def _reference(grid):
+    """Coordinate ``spatial_ref`` of a grid, to be copied."""
     return xr_coords(grid)["spatial_ref"]
 
 
@@ -267,7 +263,7 @@ def coordinates(grid):
         out[axis] = xr.DataArray(values, dims=axis, attrs=attrs)
         # xarray would write a fill value, which CF forbids for coordinate variables (section 2.5.1).
         out[axis].encoding = {"_FillValue": None}
-    out["spatial_ref"] = reference_of(on_lattice(grid))
+    out["spatial_ref"] = _reference(on_lattice(grid)).copy()
     return out
 
 
@@ -314,14 +310,12 @@ def _whole(grid):
     found = xr.Coordinates(coordinates(grid))
     with _placing:
         _placed[id(_pandas_index(found, "x"))] = found, as_carried(grid)
-        if len(_placed) > 64:
-            del _placed[next(iter(_placed))]
     return found
 
 
 # Coordinates made by `place` and their grid, by the identity of the pandas index of x, which copies of a raster share.
 # Reading the grid from the coordinates takes 0.2 ms, several times in each step.
-_placed: dict = {}
+_placed = Results(64, "grids of coordinates")
 _placing = Lock()
 
 

@@ -14,35 +14,23 @@ from fifesim.base.caches import cached
 from fifesim.base.files import in_a_line, shown
 from fifesim.base.messages import warn
 
-_OWN = threading.local()
 
-# Maximum number of cached transformers.
-_MOST = 32
-
-
+@cached(32, "coordinate transformers")
 def transformer(source, target):
-    """Transformer between two CRSs of this thread, easting or longitude first."""
-    return _kept((source, target), lambda: pyproj.Transformer.from_crs(source, target, always_xy=True))
+    """Transformer between two CRSs, easting or longitude first; threads may share it."""
+    return pyproj.Transformer.from_crs(source, target, always_xy=True)
 
 
-def projection_of(crs):
-    """Projection of a CRS of this thread, for scale factors and convergence."""
-    return _kept(crs, lambda: pyproj.Proj(crs))
+@cached(64, "projections of threads")
+def _projection(crs, own_meridian, thread):
+    """Projection of a CRS for one thread, because threads must not share it."""
+    found = pyproj.Proj(crs)
+    return pyproj.Proj(re.sub(r"\+pm=\S+", "", found.srs)) if own_meridian else found
 
 
-def from_own_meridian(crs):
-    """Projection of a CRS of this thread with longitudes from its prime meridian, as factors require."""
-    return _kept((crs, "own"), lambda: pyproj.Proj(re.sub(r"\+pm=\S+", "", pyproj.Proj(crs).srs)))
-
-
-def _kept(key, make):
-    known = _OWN.__dict__.setdefault("kept", {})
-    found = known.get(key)
-    if found is None:
-        if len(known) >= _MOST:
-            known.clear()
-        found = known[key] = make()
-    return found
+def projection_of(crs, *, own_meridian=False):
+    """Projection of a CRS of this thread, with longitudes from Greenwich or, for factors, from its prime meridian."""
+    return _projection(crs, own_meridian, threading.get_ident())
 
 
 # Maximum scale error of a projection. [1]
@@ -172,7 +160,7 @@ def _warn_of_scale(name, scale, longitude, latitude):
 @cached(1024, "scales of projections")
 def _scale(crs, x, y):
     """Scale farthest from 1 at a point, None outside of the CRS, and longitude and latitude. [degree]"""
-    plane = from_own_meridian(crs)
+    plane = projection_of(crs, own_meridian=True)
     longitude, latitude = plane(x, y, inverse=True, errcheck=False)
     if not np.allclose(plane(longitude, latitude, errcheck=False), (x, y), rtol=0, atol=_RETURNS):
         return None, longitude, latitude

@@ -12,7 +12,7 @@ from odc.geo.geobox import GeoBox
 from fifesim.base import geometry
 from fifesim.base.arguments import UNCHECKED, Numbers, Times, described
 from fifesim.base.caches import cached
-from fifesim.base.geometry import SITE_CORNERS, SITE_LATITUDE, SITE_LONGITUDE, SITE_SIZE
+from fifesim.base.times import SITE_CORNERS, SITE_LATITUDE, SITE_LONGITUDE, SITE_SIZE
 from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
 
@@ -57,8 +57,6 @@ def fife_site(
     >>> fife_site(30).shape
     Shape2d(x=500, y=500)
     """
-    if datum not in SITE_CORNERS:
-        raise ValueError(f"datum must be one of {', '.join(SITE_CORNERS)}, got {datum!r}")
     if not 0 < cell <= SITE_SIZE:
         raise ValueError(f"cell must be in (0, {SITE_SIZE:g}] m, got {cell:g}")
     crs, west, north = SITE_CORNERS[datum]

@@ -17,8 +17,6 @@ from fifesim.grids.dates import by_date
 
 DIMS = ("line", "sample")
 
-METHODS = ("nearest", "mean")
-
 # Rows and columns of a map that are made at once. [cell]
 _BLOCK = 512
 
@@ -112,8 +110,6 @@ def grid_swath(
 
 
 def _check(image, method, min_valid):
-    if method not in METHODS:
-        raise ValueError(f"method must be 'nearest' or 'mean', got {method!r}")
     if not 0 <= min_valid <= 1:
         raise ValueError(f"min_valid must be in [0, 1], got {min_valid}: it is a share of a cell")
     if not set(DIMS) <= set(image.dims) or set(image.dims) - {"band", *DIMS}:

@@ -25,23 +25,12 @@ _Places = Annotated[list[float], Field(max_length=_LINES)]
 
 
 class Fingerprint(BaseModel, extra="forbid"):
-    """
-    Values of cells on a regular subset of the rows and columns of a file.
+    """Values of cells on a regular subset of the rows and columns of a file."""
 
-    Parameters
-    ----------
-    size : (float, float)
-        Size of a cell, down and across. [m]
-    y, x : list of float
-        Centres of the rows and columns. [m]
-    values : list, shape (band, y, x)
-        None where a cell is NaN.
-    """
-
-    size: tuple[float, float]
-    y: _Places
+    size: tuple[float, float]  # of a cell, down and across [m]
+    y: _Places  # centres of the rows [m]
     x: _Places
-    values: list[list[list[float | None]]]
+    values: list[list[list[float | None]]]  # shape (band, y, x), None where a cell is NaN
 
     @model_validator(mode="after")
     def _fits(self):

@@ -174,25 +174,13 @@ class Bar(NamedTuple):
 
 
 class Map(NamedTuple):
-    """
-    Map as shown on a page.
+    """Map as shown on a page."""
 
-    Parameters
-    ----------
-    pixels : array of uint8, shape (rows, columns, 3)
-    title : str
-    bar : Bar or None
-    scale : (float, str)
-        A round length along the lower edge, as a share of the width, and in words. [%]
-    frame : (float, float, float, float) or None
-        Left, top, width and height of a part that is marked. [%]
-    """
-
-    pixels: np.ndarray
+    pixels: np.ndarray  # of uint8, shape (rows, columns, 3)
     title: str
     bar: Bar | None
-    scale: tuple[float, str]
-    frame: tuple[float, float, float, float] | None = None
+    scale: tuple[float, str]  # a round length along the lower edge, as a share of the width [%] and in words
+    frame: tuple[float, float, float, float] | None = None  # left, top, width and height of a marked part [%]
 
     @property
     def picture(self):

@@ -39,20 +39,9 @@ def memory():
 
 
 class CellProgress:
-    """
-    Progress of cells, as a context manager around the work.
+    """Progress of cells, of which an earlier run has done some, as a context manager around the work."""
 
-    Parameters
-    ----------
-    cells : int
-        Total number of cells.
-    done : int, optional
-        Cells done in an earlier run.
-    as_json : bool, optional
-        Print up to one JSON line per second on standard output, instead of a bar on a terminal or a line per minute on
-        standard error.
-    """
-
+    # JSON has up to one line per second on standard output; text is a bar, or a line per minute on standard error.
     # Work and its counted units; decimals of the rate in JSON, and the text of a line with its scale.
     label, counted, decimals = "simulating", "cells", None
     text, scale = "{done:.1f} of {cells:.1f} million cells, {rate:.1f} million/s", 1e6

@@ -23,25 +23,12 @@ _LONGEST = 1_000_000
 
 
 class Rerun(NamedTuple):
-    """
-    Result of the comparison of a file with its reproduction.
+    """Result of the comparison of a file with its reproduction."""
 
-    Parameters
-    ----------
-    cells : int
-        Number of cells in all bands.
-    differing : int
-        Number of differing cells.
-    largest : float
-        Largest difference.
-    versions : dict of str to (str, str)
-        Versions of differing packages, in the original run and here; "none" if missing.
-    """
-
-    cells: int
+    cells: int  # in all bands
     differing: int
-    largest: float
-    versions: dict
+    largest: float  # difference
+    versions: dict  # of packages that differ, in the original run and here; "none" if missing
 
 
 def rerun(path, output=None, *, overwrite=False, threads=None):

@@ -14,32 +14,8 @@ from fifesim.base.messages import nearest
 
 
 def points(sequence, seed, stream, count, dimensions):
-    """
-    Points in the unit cube.
-
-    Parameters
-    ----------
-    sequence : {"sobol", "random"}
-        Type of sequence. The first points do not depend on `count`.
-    seed, stream : int
-        Seed, and stream number of the sequence.
-    count, dimensions : int
-
-    Returns
-    -------
-    points : array, shape (count, dimensions)
-        In [0, 1). [1]
-
-    References
-    ----------
-    [Sobol1967]_ with the scrambling of [Matousek1998]_
-
-    Examples
-    --------
-    >>> some, more = (points("sobol", 7, 3, count, 2) for count in (5, 12))
-    >>> bool((some == more[:5]).all())
-    True
-    """
+    """Points in the unit cube, shape (count, dimensions), the first of which do not depend on their number."""
+    # [Sobol1967] with the scrambling of [Matousek1998], or independent random numbers.
     if not count or not dimensions:
         return np.empty((count, dimensions))
     random = np.random.default_rng((seed, stream))
@@ -50,9 +26,6 @@ def points(sequence, seed, stream, count, dimensions):
         warnings.filterwarnings("ignore", "The balance properties of Sobol")
         return qmc.Sobol(dimensions, scramble=True, seed=random).random(count)
 
-
-SEQUENCES = ("sobol", "random")
-"""Names of the sequences of points."""
 
 # Description of the values of each distribution, and the second key of its table.
 _KINDS = {

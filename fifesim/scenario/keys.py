@@ -10,8 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator
 
 from fifesim.atmosphere import ENGINES
 from fifesim.base.files import check_regular, shown
-from fifesim.base.geometry import SITE_CORNERS, SITE_SIZE, utc
 from fifesim.base.messages import nearest
+from fifesim.base.times import SITE_CORNERS, SITE_SIZE, utc
 from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
 
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
@@ -90,20 +90,16 @@ class Section(BaseModel):
             return suffix is None or bool(found)
         return found in suffix if isinstance(suffix, tuple) else found == suffix
 
-    @classmethod
-    def name_or_raster(cls, key, value):
-        """Value of a key that is one of its names or the path of a raster file; otherwise raise ValueError."""
-        names = cls.model_fields[key].json_schema_extra["file"]["names"]
-        if value not in names and not cls.names_a_file(key, value):
-            allowed = f"use {', '.join(names)}, or a raster file such as {key}.tif"
-            raise ValueError(nearest(value, names) + allowed)
-        return value
-
     @field_validator("*")
     @classmethod
     def _openable(cls, value, info):
-        """Check that a path is valid text and not empty. Missing files are reported by their reader."""
-        if cls.names_a_file(info.field_name, value):
+        """Check a path, or a name in its place. Missing files are reported by their reader."""
+        key = info.field_name
+        names = ((cls.model_fields[key].json_schema_extra or {}).get("file") or {}).get("names")
+        is_file = cls.names_a_file(key, value)
+        if names and value not in names and not is_file:
+            raise ValueError(f"{nearest(value, names)}use {', '.join(names)}, or a raster file such as {key}.tif")
+        if is_file:
             if not value:
                 raise ValueError("name a file, or remove the key")
             value.encode()  # ValueError if it cannot be encoded
@@ -237,11 +233,6 @@ class LandscapeKeys(Section):
         """Whether one stand covers the scene and only its LAI varies."""
         return self.cover == "none" and not any((*self.deviations.values(), *self.covary.values()))
 
-    @field_validator("cover")
-    @classmethod
-    def _known_cover(cls, value):
-        return cls.name_or_raster("cover", value)
-
     @field_validator("deviations", "arps", "covary")
     @classmethod
     def _known_properties(cls, values, info):
@@ -307,11 +298,6 @@ class TerrainKeys(Section):
         if self.slopes != "kt" and self.dem == "flat":
             raise ValueError(f"slopes = {self.slopes!r} needs an elevation, dem is 'flat': name hills or remove slopes")
         return self
-
-    @field_validator("dem")
-    @classmethod
-    def _known_land(cls, value):
-        return cls.name_or_raster("dem", value)
 
 
 class SunAndViewKeys(Section):

@@ -14,8 +14,8 @@ from fifesim.atmosphere.models import Atmosphere
 from fifesim.base import files, geometry
 from fifesim.base.arguments import FilePath
 from fifesim.base.files import shown
-from fifesim.base.geometry import SITE_CORNERS, SITE_LATITUDE, SITE_LONGITUDE, SITE_TIME, utc
 from fifesim.base.messages import nearest
+from fifesim.base.times import SITE_CORNERS, SITE_LATITUDE, SITE_LONGITUDE, SITE_TIME, utc
 from fifesim.grids import grid as grids
 from fifesim.grids import projection
 from fifesim.grids.opening import covering_grid

@@ -15,7 +15,7 @@ from fifesim.base.arguments import FilePath, Kind, check_fields
 from fifesim.base.files import shown
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import nearest
-from fifesim.scenario.distributions import SEQUENCES, distribution_of
+from fifesim.scenario.distributions import distribution_of
 from fifesim.scenario.keys import COVERS, LAND_FORMS, OFFSET_PARTS
 from fifesim.scenario.scenario import Scenario, find_key, grid_keys, parse_scenario, put, values_of
 from fifesim.scenario.toml import full_path, load_values, write_tables
@@ -228,10 +228,7 @@ def _check_ground(scenario):
 
 
 def _check_plan(study):
-    """Check sequence, number of landscapes and split."""
-    if study.sequence not in SEQUENCES:
-        hint = nearest(str(study.sequence), SEQUENCES)
-        raise ValueError(f"dataset.sequence = {shown(study.sequence)}: {hint}must be one of {', '.join(SEQUENCES)}")
+    """Check number of landscapes and split."""
     split, landscapes = study.split, study.landscapes
     if not isinstance(landscapes, int) or isinstance(landscapes, bool) or landscapes < 1:
         raise ValueError(f"dataset.landscapes = {shown(landscapes)}: must be an integer of at least 1")

@@ -10,7 +10,7 @@ import xarray as xr
 
 from fifesim.base import files
 from fifesim.base.arguments import Kind, Pair, Time
-from fifesim.base.geometry import utc
+from fifesim.base.times import utc
 from fifesim.grids import cf
 from fifesim.grids.sites import sun_position
 from fifesim.sensor.description.instrument_file import InstrumentLike

@@ -83,11 +83,6 @@ def test_the_band_nearest_to_the_best_place_of_a_window_is_taken(window, wavelen
     assert nearest_band(wavelengths, window) == number
 
 
-def test_thematic_mapper_shows_red_in_its_third_and_near_infrared_in_its_fourth_band():
-    centers = [Band(f"TM{key}", *response.T).center for key, response in RSR_reader("Landsat-5", "TM").items()]
-    assert [nearest_band(centers, window) for window in (GREEN, RED, NEAR_INFRARED)] == [1, 2, 3]
-
-
 def test_a_quadrature_is_the_mean_of_any_spectrum_on_its_wavelengths():
     band, wavelength = Band("red", (0.6, 0.63, 0.66), (0.2, 1.0, 0.4)), np.linspace(0.55, 0.7, 31)
     spectra, weight = np.random.default_rng(1).random((3, 31)), np.linspace(1, 2, 31)

@@ -10,8 +10,8 @@ import fifesim
 from fifesim.base import caches
 from fifesim.base.caches import CACHES, Results, cached, clear_caches
 
-# Functions that check arguments or find public names keep no results. Those of a lattice go with it.
-OTHERS = {"accessor.py", "base/arguments.py", "base/lattice.py", "base/caches.py"}
+# Functions that check arguments or find public names keep no results.
+OTHERS = {"accessor.py", "base/arguments.py", "base/caches.py"}
 
 
 @pytest.fixture

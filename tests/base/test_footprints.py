@@ -149,13 +149,6 @@ def test_min_valid_decides_at_the_scene_edge():
     assert np.isfinite(regularize(scene, inner, inner, min_valid=1.0)).all()
 
 
-def test_pixels_outside_the_scene_are_missing():
-    rows = operator(30, 12, origin=-100.0)
-    image = regularize(np.ones((30, 30)), rows, rows, min_valid=0.0)
-    assert np.isnan(image[[0, 1, -1]]).all()
-    assert np.isfinite(image[4, 4])
-
-
 @pytest.mark.parametrize(("pixel", "origin", "width"), GRIDS)
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_any_window_gives_the_same_bits(pixel, origin, width, dtype):
@@ -201,15 +194,6 @@ def test_rows_of_a_north_up_grid_count_from_the_north():
     plain = operator(90, 9, origin=7.5)
     np.testing.assert_array_equal(north.start, plain.start)
     np.testing.assert_allclose(north.weights, plain.weights, rtol=0, atol=1e-12)
-
-
-def test_values_are_left_untouched_and_integers_are_accepted():
-    scene = np.random.default_rng(0).integers(0, 255, (30, 30))
-    before = scene.copy()
-    rows = operator(30, 3)
-    image = regularize(scene, rows, rows)
-    np.testing.assert_array_equal(scene, before)
-    np.testing.assert_array_equal(image, regularize(scene.astype(float), rows, rows))
 
 
 def test_mistakes_are_named():

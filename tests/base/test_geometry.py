@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 
 import fifesim
-from fifesim.base.geometry import Geometry, angle_between, relative_azimuth, scattering_angle_cosine, sun_geometry, utc
+from fifesim.base.geometry import Geometry, angle_between, relative_azimuth, scattering_angle_cosine, sun_geometry
+from fifesim.base.times import utc
 
 
 def almanac_sun(time, latitude, longitude):

@@ -34,10 +34,6 @@ def test_each_tile_is_made_once_and_no_other():
     assert made == [(-1, 1), (0, 1)]
 
 
-def test_empty_window_makes_no_tile():
-    assert assemble(None, TILE, 3, 3, (0, 4)).shape == (0, 4)
-
-
 GRID = fifesim.fife_site(30 / 9, window=((90, 108), (180, 198)))
 
 

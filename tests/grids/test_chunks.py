@@ -3,7 +3,6 @@
 import subprocess
 import sys
 import threading
-from typing import NamedTuple
 
 import dask
 import dask.array as da
@@ -97,32 +96,6 @@ def test_rasters_seen_under_other_suns_are_refused():
         chunks.pointwise(lambda a, b, c: a, suns[0].drop_vars("sza"), *suns[1:])
 
 
-class Seen(NamedTuple):
-    """Cells that lie one further down the diagonal for each row of the result."""
-
-    array: object
-
-    def window(self, rows, columns):
-        return slice(rows.start, rows.stop), slice(columns.start + rows.start, columns.stop + rows.stop - 1)
-
-
-def diagonals(rows, columns, cells):
-    width = columns.stop - columns.start
-    return np.stack([line[k : k + width] for k, line in enumerate(cells)])
-
-
-@pytest.mark.parametrize("size", [1, 4, 99])
-def test_blocks_read_windows_of_any_shape(array_type, size):
-    """Lazy where an array is, in the fixed blocks; what a block reads need not go by rows and columns."""
-    cells = array_type(raster())
-    with no_compute():
-        found = chunks.in_blocks(diagonals, [Seen(cells.data)], (30, 12), size)
-    if cells.chunks is not None:
-        assert found.chunks[1] == tuple([size] * (12 // size) + [12 % size] * bool(12 % size))
-    expected = [cells.values[k, k : k + 12] for k in range(30)]
-    np.testing.assert_array_equal(found, expected)
-
-
 @pytest.mark.parametrize("lazy", [True, False])
 def test_entries_along_the_first_axis_are_views(lazy):
     whole = np.arange(24.0).reshape(2, 3, 4)
@@ -135,33 +108,6 @@ def test_entries_along_the_first_axis_are_views(lazy):
         assert blocks[0].base is not None
     else:
         assert np.shares_memory(found[1], whole)
-
-
-VALUES = np.random.default_rng(2).random((3, 20, 30))
-
-
-def total(rows, columns, block):
-    """Sum of all cells of a band, on every cell of the result."""
-    return np.broadcast_to(block.sum(axis=(-2, -1), keepdims=True), (*block.shape[:-2], 4, 5))
-
-
-@pytest.mark.parametrize("pieces", [ODD_CHUNKS, ODD_CHUNKS | {"band": 1}, ODD_CHUNKS | {"band": 2}])
-def test_every_cell_reads_the_whole_of_its_band(pieces):
-    lazy = in_chunks(xr.DataArray(VALUES, dims=("band", "y", "x")), pieces).data
-    with no_compute():
-        found = chunks.windows_by_band([total] * 3, [chunks.whole_reads(lazy, (4, 5))], (1, 1, 1), (4, 5), ((4,), (5,)))
-    assert found.chunks == ((1, 1, 1), (4,), (5,))
-    at_once = chunks.windows_by_band([total] * 3, [chunks.whole_reads(VALUES, (4, 5))], (1, 1, 1), (4, 5))
-    np.testing.assert_array_equal(found, at_once)
-    np.testing.assert_array_equal(at_once[:, 0, 0], VALUES.sum(axis=(1, 2)))
-
-
-def test_each_group_of_bands_has_its_kernel():
-    kernels = [lambda rows, columns, block, factor=factor: factor * block for factor in (1, -1)]
-    place = np.arange(20), np.arange(30)
-    reads = [chunks.Reads(VALUES, *((at, at + 1) for at in place))]
-    found = chunks.windows_by_band(kernels, reads, (1, 2), (20, 30))
-    np.testing.assert_array_equal(found, VALUES * np.array([1, -1, -1])[:, None, None])
 
 
 def test_second_pass_begins_when_the_first_is_over():
@@ -253,15 +199,6 @@ def test_the_same_array_has_the_same_key_and_shared_parts_are_computed_once():
     np.testing.assert_array_equal(found[1], array.compute().sum(axis=0))
 
 
-def test_what_fails_in_it_is_told():
-    def refuse(block):
-        raise ValueError("brightness must be in [-1, 1]")
-
-    array = da.ones((4, 4), chunks=2).map_blocks(refuse, dtype=float, meta=np.empty((0, 0)))
-    with pytest.raises(ValueError, match="brightness must be in"):
-        apart(array).compute()
-
-
 def test_samples_of_samples_are_made_once_by_all_threads():
     """And each who asks has values of its own."""
     calls = []
@@ -273,15 +210,6 @@ def test_samples_of_samples_are_made_once_by_all_threads():
     first = few.compute(scheduler="synchronous")
     first += 1
     np.testing.assert_array_equal(few.compute(scheduler="synchronous"), first - 1)
-
-
-def test_large_samples_are_not_kept(monkeypatch):
-    monkeypatch.setattr(chunks, "_FEW", 100)
-    calls = []
-    few = apart(counted(calls)[::3, ::3])
-    for times in (1, 2):
-        few.compute(scheduler="synchronous")
-        assert len(calls) == 9 * times
 
 
 def test_numbers_fill_layers_and_order_stays(lai):

@@ -41,10 +41,6 @@ def test_a_sun_without_azimuth_is_refused():
             directions.geometry_of(given)
 
 
-def test_sun_alone_is_a_nadir_view():
-    assert directions.geometry_of(raster().assign_coords(sza=30.0, saa=20.0)) == Geometry(30.0, 20.0)
-
-
 def ramp(low, high):
     """A raster on the cells that grows to the east."""
     return raster().copy(data=np.broadcast_to(np.linspace(low, high, 3), (2, 3)))
@@ -61,11 +57,6 @@ def test_angles_by_cell_are_a_dataset_and_travel(scan):
     again = directions.geometry_of(directions.with_geometry(raster(), found))
     xr.testing.assert_equal(again, found)
     assert again["vza"].attrs["standard_name"] == "sensor_zenith_angle"
-
-
-def test_a_dataset_of_numbers_is_a_geometry():
-    numbers = xr.Dataset({"sza": 40.0, "saa": 10.0, "vza": 5.0})
-    assert directions.checked_geometry(numbers) == Geometry(40.0, 10.0, 5.0)
 
 
 def test_given_wins_over_carried_and_that_over_the_papers(lai):

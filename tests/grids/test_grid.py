@@ -12,7 +12,7 @@ import pyproj
 import pytest
 import xarray as xr
 from affine import Affine
-from lazy import ODD_CHUNKS, check_place, in_chunks, no_compute
+from lazy import check_place
 from odc.geo.geobox import GeoBox
 
 import fifesim
@@ -317,16 +317,6 @@ def test_every_combination_of_rasters_takes_one(lai):
         xr.testing.assert_equal(without, kept)
         if kept.ndim:
             assert grids.same_grid(grids.geobox(without), grids.geobox(kept))
-
-
-def test_stays_lazy(lai):
-    soil = in_chunks(lost(lai * 0.01), ODD_CHUNKS)
-    with no_compute():
-        found = in_chunks(lai, ODD_CHUNKS).fifesim.surface_reflectance(
-            bands=TM34, canopy=fifesim.Canopy(background=soil)
-        )
-    whole = lai.fifesim.surface_reflectance(bands=TM34, canopy=fifesim.Canopy(background=lai * 0.01))
-    xr.testing.assert_equal(found.compute(), whole)
 
 
 GRID = fifesim.fife_site(cell=10, window=((0, 60), (0, 60)))

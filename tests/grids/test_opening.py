@@ -230,19 +230,6 @@ def test_what_may_lead_elsewhere_is_refused(tmp_path):
             opening.mosaic_sources(tmp_path / "a.vrt")
 
 
-def test_files_are_named_once(tmp_path):
-    (tmp_path / "a.tif").touch()
-    one = '<SimpleSource><SourceFilename relativeToVRT="1">a.tif</SourceFilename></SimpleSource>'
-    (tmp_path / "a.vrt").write_text(f'<VRTDataset><VRTRasterBand band="1">{one}{one}</VRTRasterBand></VRTDataset>')
-    assert opening.mosaic_sources(tmp_path / "a.vrt") == [str(tmp_path / "a.tif")]
-
-
-def test_descriptions_are_known_by_their_first_character(tmp_path):
-    for text, expected in (("\n <GDAL_WMS/>", True), ('{"type":"Feature"}', True), ("ncols 3", False), ("", False)):
-        (tmp_path / "a").write_text(text)
-        assert opening.is_description(tmp_path / "a") == expected
-
-
 LOCAL = 'LOCAL_CS["bench",UNIT["metre",1]]'
 POINTS = [GroundControlPoint(row, row**2, 708000 + row, 4332000 - row) for row in range(4)]
 
@@ -306,12 +293,6 @@ def test_no_data_beyond_the_type_mark_nothing(tmp_path):
     band = re.search("<VRTRasterBand[^>]*>", text)[0]
     (tmp_path / "marked.vrt").write_text(text.replace(band, f"{band}<NoDataValue>-9999</NoDataValue>"))
     assert (fifesim.open_image(tmp_path / "marked.vrt") == 3).all()
-
-
-def test_memory_is_asked_for_first():
-    opening.check_memory(10, 8, "it", "leave it")
-    with pytest.raises(ValueError, match=r"it takes 8e\+09 GB of memory, .* GB are free: leave it"):
-        opening.check_memory(1e18, 8, "it", "leave it")
 
 
 IN_DEGREES = Affine(0.0002, 0, -96.6, 0, -0.0002, 39.12)

@@ -27,7 +27,7 @@ def test_site_is_15_km_of_whole_cells_from_its_corner():
 def test_site_refuses_what_makes_no_grid():
     refused = {
         r"cell must be in \(0, 15000\] m, got 0": {"cell": 0},
-        "datum must be one of NAD83, NAD27, got 'WGS84'": {"cell": 30, "datum": "WGS84"},
+        "datum must be 'NAD83' or 'NAD27', got 'WGS84'": {"cell": 30, "datum": "WGS84"},
         "within 500 rows and 500 columns": {"cell": 30, "window": ((0, 10), (0, 501))},
         "within 500 rows": {"cell": 30, "window": ((5, 5), (0, 10))},
         "window must be": {"cell": 30, "window": 10},

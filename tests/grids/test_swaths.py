@@ -127,7 +127,7 @@ def test_what_is_no_scan_is_refused():
     with pytest.raises(ValueError, match="takes the image of a scan"):
         grid_swath(on_grid, GRID)
     with pytest.raises(ValueError, match="method must be 'nearest' or 'mean', got 'cubic'"):
-        grid_swath(swath(), GRID, "cubic")
+        fifesim.grid_swath(swath(), GRID, "cubic")
     with pytest.raises(ValueError, match="min_valid must be"):
         grid_swath(swath(), GRID, "mean", min_valid=2)
     far = fifesim.grid_at("EPSG:26914", 725000.0, 4334000.0, 1500.0, 1200.0, 30.0)

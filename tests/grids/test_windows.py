@@ -1,7 +1,6 @@
 """Lazy arrays whose blocks know their place and read windows of others."""
 
 import gc
-import pickle
 
 import dask
 import dask.array as da
@@ -176,13 +175,6 @@ def test_an_origin_stays_with_the_values():
     assert origin_of(made) == "leaves" and origin_of(made.compute()) is None
     assert origin_of(made.assign_coords(sza=30.0).rename("other")) == "leaves"
     assert origin_of(made + 1) is None and origin_of(made[1:]) is None and origin_of(made.persist()) is None
-
-
-def test_an_origin_does_not_travel():
-    made = made_of(raster(2), lambda: "nothing that pickle takes")
-    other = pickle.loads(pickle.dumps(made))
-    assert origin_of(other) is None
-    np.testing.assert_array_equal(other, made)
 
 
 def test_an_origin_is_forgotten_with_its_raster():

@@ -15,7 +15,8 @@ from mistakes import check_message, lines, mistakes
 import fifesim
 from fifesim.atmosphere import six_s
 from fifesim.base import files
-from fifesim.base.geometry import SITE_TIME, earth_sun_distance, sun_geometry
+from fifesim.base.geometry import earth_sun_distance, sun_geometry
+from fifesim.base.times import SITE_TIME
 from fifesim.grids import grid as grids
 from fifesim.scenario.scenario import (
     Scenario,

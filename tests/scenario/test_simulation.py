@@ -8,7 +8,8 @@ from lazy import no_compute
 
 import fifesim
 from fifesim.base import files
-from fifesim.base.geometry import SITE_TIME, Geometry, earth_sun_distance
+from fifesim.base.geometry import Geometry, earth_sun_distance
+from fifesim.base.times import SITE_TIME
 from fifesim.grids import grid as grids
 from fifesim.scenario.ground import elevation
 from fifesim.scenario.scenario import parse_scenario

@@ -14,9 +14,10 @@ from fifesim.atmosphere.clouds import layer
 from fifesim.atmosphere.clouds.field import LONGEST, PERIOD, SHORTEST, CloudCover, cloud_displacement, cloud_thickness
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import Chunks, Kind, Pair, Time, Times, WholeNumber
-from fifesim.base.geometry import ANGLES, utc
+from fifesim.base.geometry import ANGLES
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import warn
+from fifesim.base.times import utc
 from fifesim.grids import cf, chunks, directions, windows
 from fifesim.grids import grid as grids
 from fifesim.grids.dates import by_date, joined

@@ -14,7 +14,7 @@ import pandas as pd
 from fifesim.base import files
 from fifesim.base.arguments import is_path
 from fifesim.base.files import check_regular, in_a_line, shown
-from fifesim.base.geometry import SITE_CORNERS, SITE_SIZE
+from fifesim.base.times import SITE_CORNERS, SITE_SIZE
 from fifesim.grids.grid import as_carried
 from fifesim.ground.canopy import optics as canopy_optics
 from fifesim.ground.canopy.spectra import Background, spectrum_names

@@ -13,9 +13,9 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.base.arguments import Chunks, LaiDistribution, Times, WholeNumber
 from fifesim.base.files import in_a_line
-from fifesim.base.geometry import utc
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import warn
+from fifesim.base.times import utc
 from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids

@@ -24,33 +24,15 @@ _FLOAT = np.float32
 
 
 class Layout(NamedTuple):
-    """
-    Common description of the chips of a study.
+    """Common description of the chips of a study."""
 
-    Parameters
-    ----------
-    bands : xarray.Dataset
-        Coordinates along ``band``.
-    truth : tuple of str
-        Names of the true quantities of the ground of the pixels.
-    has_ndvi : bool
-    dn : numpy.dtype
-        Type of the digital numbers.
-    pixels : (int, int)
-        Rows and columns.
-    pixel : float
-        [m]
-    crs : xarray.Variable
-        Without dimensions, whose attributes are the coordinate reference system.
-    """
-
-    bands: xr.Dataset
-    truth: tuple[str, ...]
+    bands: xr.Dataset  # coordinates along band
+    truth: tuple[str, ...]  # names of the true quantities of the ground of the pixels
     has_ndvi: bool
     dn: np.dtype
-    pixels: tuple[int, int]
-    pixel: float
-    crs: xr.Variable
+    pixels: tuple[int, int]  # rows and columns
+    pixel: float  # [m]
+    crs: xr.Variable  # without dimensions, whose attributes are the coordinate reference system
 
     @property
     def variables(self):
@@ -164,18 +146,7 @@ ROOT = "zarr.json"
 
 
 class Shards:
-    """
-    Division of the chips of a dataset into shards.
-
-    Parameters
-    ----------
-    count : int
-        Chips in all.
-    size : int
-        Size of a chip. [byte]
-    together : int
-        Number of chips that are made together for speed.
-    """
+    """Division of the chips of a dataset into shards, by the size of a chip [byte] and how many are made together."""
 
     def __init__(self, count, size, together):
         self._count = count
