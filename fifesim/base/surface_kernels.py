@@ -6,8 +6,10 @@ from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from fifesim.base.arguments import Numbers, check_fields
+from fifesim.base.caches import cached
 
 
 def ross_thick(sza, vza, raa):
@@ -230,8 +232,9 @@ class RPV:
 
     Parameters
     ----------
-    rho0, k, theta, rhoc : number or sequence
-        Parameters of `fifesim.base.surface_kernels.rpv`: a number, or one for each band. [1]
+    rho0, k, theta, rhoc : number, sequence or xarray.DataArray
+        Parameters of `fifesim.base.surface_kernels.rpv`: a number, one for each band, or a raster over ([band], y, x).
+        Of rasters, each different set of k, theta and rhoc takes 2 ms. [1]
 
     Examples
     --------
@@ -268,40 +271,75 @@ class RPV:
         return np.asarray(rpv(*own, sza=sza, vza=vza, raa=raa))
 
 
-def check_surface(surface, largest_zenith=75.0):
-    """Raise ValueError if a surface of numbers reflects negatively, or more than it receives, within some zenith."""
+_LARGEST_ZENITH = 75.0  # of sun and view in the check of a surface [degree]
+_AT_ONCE = 64  # surfaces in a check
+
+
+@cached(1, "directions of the check of a surface")
+def _checked_directions():
+    """Directions (sun, view, azimuth) of a check, those after the last sun being a quadrature, and its weights."""
     nodes, weights = np.polynomial.legendre.leggauss(16)
     mu, share = (nodes + 1) / 2, (nodes + 1) * weights / 2  # 2 mu dmu
-    sun, view, azimuth = np.arange(0.0, largest_zenith + 1, 5.0), np.degrees(np.arccos(mu)), np.arange(5.0, 180, 10)
-    seen = sun[:, None, None], np.append(sun, view)[:, None], azimuth
-    values = np.stack([each.reflectance(*seen) for each in surfaces_by_band(surface)])
-    if not np.isfinite(values).all():
-        raise ValueError(f"{surface!r} has a reflectance that is not finite: check its parameters for NaN")
+    sun, view, azimuth = np.arange(0.0, _LARGEST_ZENITH + 1, 5.0), np.degrees(np.arccos(mu)), np.arange(5.0, 180, 10)
+    return (sun[:, None, None], np.append(sun, view)[:, None], azimuth), share
+
+
+@cached(1, "extremes of the Ross-Li kernels")
+def _extreme_directions():
+    """Directions in which a sum of Ross-Li kernels may be smallest, flat indices of `_checked_directions`."""
+    angles, _ = _checked_directions()
+    suns = angles[0].size
+    kernels = np.stack([kernel(*angles)[:, :suns].ravel() for kernel in (ross_thick, li_sparse)], axis=-1)
+    return ConvexHull(kernels).vertices, kernels
+
+
+def check_surface(surface):
+    """Raise ValueError if a surface, of numbers or shape (n,), reflects negatively or more than it receives."""
+    values = (np.ravel(np.asarray(getattr(surface, each.name), float)) for each in fields(surface))
+    rows = np.unique(np.stack(np.broadcast_arrays(*values)), axis=1)
+    if not np.isfinite(rows).all():
+        raise ValueError(f"{surface!r} has a parameter that is not finite: check it for NaN")
+    if isinstance(surface, RossLi):
+        rows = _least_ross_li(rows)
+    for first in range(0, rows.shape[1], _AT_ONCE):
+        _check_rows(type(surface), rows[:, first : first + _AT_ONCE])
+
+
+def _least_ross_li(rows):
+    """Weights whose reflectance is lowest, and whose albedo is highest, at one of the suns."""
+    (angles, share), (corners, kernels) = _checked_directions(), _extreme_directions()
+    lowest = (rows[0] + kernels[corners] @ rows[1:]).min(axis=0)
+    quadrature = [kernel(*angles)[:, angles[0].size :].mean(axis=-1) @ share for kernel in (ross_thick, li_sparse)]
+    highest = (rows[0] + np.transpose(quadrature) @ rows[1:]).max(axis=0)
+    return rows[:, np.unique([lowest.argmin(), highest.argmax()])]
+
+
+def _check_rows(kind, rows):
+    """Check surfaces, a column of parameters for each."""
+    (sun, view, azimuth), share = _checked_directions()
+    values = kind(*(row[:, None, None, None] for row in rows)).reflectance(sun, view, azimuth)
     within = values[:, :, : sun.size]
     if within.min() < 0:
-        _, s, v, a = np.unravel_index(within.argmin(), within.shape)
+        number, s, v, a = np.unravel_index(within.argmin(), within.shape)
         raise ValueError(
-            f"{surface!r} reflects {within[:, s, v, a].min():.3g} at sza {sun[s]:g}, vza {sun[v]:g} and raa "
-            f"{azimuth[a]:g}: reflectance must not be negative; check the order of the weights"
+            f"{kind(*rows[:, number].tolist())!r} reflects {within.min():.3g} at sza {sun.flat[s]:g}, vza "
+            f"{view.flat[v]:g} and raa {azimuth[a]:g}: reflectance must not be negative; check the order of the weights"
         )
     albedo = values[:, :, sun.size :].mean(axis=-1) @ share
     if albedo.max() > 1:
-        s = np.unravel_index(albedo.argmax(), albedo.shape)[1]
+        number, s = np.unravel_index(albedo.argmax(), albedo.shape)
         raise ValueError(
-            f"{surface!r} reflects {albedo.max():.3g} of the sunlight at sza {sun[s]:g}: it must not reflect more than "
-            "it receives; weights are fractions, not percent"
+            f"{kind(*rows[:, number].tolist())!r} reflects {albedo.max():.3g} of the sunlight at sza {sun.flat[s]:g}: "
+            "it must not reflect more than it receives; weights are fractions, not percent"
         )
 
 
-def surfaces_by_band(surface, bands=None):
-    """Surfaces with a number for each parameter, one for each band, or one if all bands are alike."""
-    names = [each.name for each in fields(surface)]
-    values = {name: np.atleast_1d(np.asarray(getattr(surface, name), float)) for name in names}
-    if rasters := [name for name, each in values.items() if each.ndim > 1]:
-        raise ValueError(f"{', '.join(rasters)} is a raster, a number or one for each band is needed here")
-    count = max(each.size for each in values.values()) if bands is None else bands
-    for name, each in values.items():
-        if each.shape not in ((1,), (count,)):
-            raise ValueError(f"{name} must be a number, or one for each of {count} bands, got shape {each.shape}")
-    rows = zip(*(np.broadcast_to(each, count).tolist() for each in values.values()), strict=True)
-    return [type(surface)(*row) for row in rows]
+def parameters_by_band(surface, bands):
+    """Parameters of a surface of numbers, each of shape (band,)."""
+    found = []
+    for each in fields(surface):
+        value = np.atleast_1d(np.asarray(getattr(surface, each.name), float))
+        if value.shape not in ((1,), (bands,)):
+            raise ValueError(f"{each.name} must be a number, or one for each of {bands} bands, got shape {value.shape}")
+        found.append(np.broadcast_to(value, bands))
+    return found

@@ -1,4 +1,4 @@
-"""Ground whose reflectance depends on direction, below the light of an atmosphere: canopies and kernels."""
+"""Ground whose reflectance depends on direction, below the light of an atmosphere: streams, and their coupling."""
 
 from functools import partial
 
@@ -7,18 +7,9 @@ import xarray as xr
 
 from fifesim.atmosphere import adjacency_labels, engines
 from fifesim.atmosphere.adjacency import environment_weights
-from fifesim.atmosphere.coupling import apparent_reflectance
 from fifesim.atmosphere.labels import EQUATION_SOURCE
-from fifesim.atmosphere.skylight import (
-    GroundStreams,
-    atmospheric_sky,
-    directional_coupling,
-    ground_streams,
-    scale_of_ground,
-    weighted_sky,
-)
+from fifesim.atmosphere.skylight import GroundStreams, atmospheric_sky, directional_coupling, ground_streams
 from fifesim.base.caches import cached
-from fifesim.base.surface_kernels import check_surface, surfaces_by_band
 from fifesim.grids import cf, directions
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
@@ -124,11 +115,16 @@ def scene_streams(lai, background, scene, skies):
             "brown, dissociation or crown_cover vary by cell, streams need numbers: use coupling='lambert', or give "
             "each class its own canopy"
         )
+    return streams_over_background(lai, background, scene, skies).reshape(-1, *lai.shape)
+
+
+def streams_over_background(lai, background, scene, skies):
+    """Streams of cells from the table of a scene, shape (stream, band) + lai.shape."""
     found = interpolation.interpolate(_stream_table(scene, skies), lai)
     by_band = found.reshape(len(scene.sky), -1, *lai.shape)
     below = np.broadcast_to(background, (len(scene.sky), *lai.shape) if np.ndim(background) > 1 else len(scene.sky))
     below = below if below.ndim > 1 else below.reshape(-1, *(1,) * lai.ndim)
-    return _over(by_band, below).reshape(-1, *lai.shape)
+    return _over(by_band, below)
 
 
 def reflectance_streams(land, bands, canopies, light, skies, level):
@@ -167,7 +163,7 @@ def coupled(coupling, streams, terms, around=()):
     """Reflectance at the top of the atmosphere of streams (arrays) below BandTerms, with those of surroundings. [1]"""
     ground = _ground(coupling, *streams)
     around = _ground(coupling, *streams[: -len(around)], *around) if around else None
-    return directional_coupling(ground, *_through(terms), around=around)
+    return directional_coupling(ground, *through_air(terms), around=around)
 
 
 def _ground(coupling, *streams):
@@ -177,35 +173,15 @@ def _ground(coupling, *streams):
     return GroundStreams(so, do, do, sd, dd, dd, sd, dd, dd)
 
 
-def _through(terms):
+def through_air(terms):
     """Direct and diffuse transmittances, spherical albedo, path reflectance and gas transmittance of BandTerms. [1]"""
     t, tss, too = terms, terms.direct_transmittance_down, terms.direct_transmittance_up
     fluxes = tss, t.transmittance_down - tss, too, t.transmittance_up - too
     return *fluxes, t.spherical_albedo, t.path_reflectance, t.gas_transmittance
 
 
-def surface_like(toa, like, atmosphere, bands, geometry):
-    """Surface reflectance factor of ground with the shape of a RossLi or RPV, dims (band, y, x). [1]"""
-    terms = band_terms_of(atmosphere, bands, geometry)
-    streams = surface_streams(like, "directional", atmosphere, bands, geometry)
-    share = terms.diffuse_fraction
-    factor = (1 - share) * streams[0] + share * streams[1]
-    if not (factor > 0).all():
-        raise ValueError(f"{like!r} reflects {factor.min():g} in a band, which has no shape: it must be above 0")
-    by_band = [xr.Variable("band", each) for each in (factor, *streams, *_through(terms))]
-
-    def kernel(seen, factor, *values):
-        return factor * scale_of_ground(seen, GroundStreams(*values[:9]), *values[9:])
-
-    plain = _with_bands(toa).transpose("band", "y", "x").drop_vars("band", errors="ignore")
-    out = chunking.pointwise(kernel, plain, *by_band)
-    names = {"band": toa.coords["band"]} if "band" in toa.coords else {}
-    out = directions.with_geometry(grids.place(out, grids.geobox(toa), names), geometry)
-    text = f"to_surface: {atmosphere.engine}, shape of {type(like).__name__}, {atmosphere.text}"
-    return cf.label(out, "surface_reflectance", source=toa, history=text, atmosphere=atmosphere.text)
-
-
-def _with_bands(raster):
+def with_bands(raster):
+    """Raster with bands, checked."""
     if "band" not in raster.dims:
         raise ValueError("reflectance has no dimension band: type .expand_dims('band')")
     return raster
@@ -224,7 +200,7 @@ def toa_of_streams(streams, coupling, atmosphere, bands, geometry, adjacency=Fal
             f"{', '.join(known) or 'no names'}: make it with surface_reflectance(..., streams={cure})"
         )
     terms, names = band_terms_of(atmosphere, bands, geometry), STREAMS_OF[coupling]
-    streams = _with_bands(streams).isel(stream=[known.index(name) for name in names])
+    streams = with_bands(streams).isel(stream=[known.index(name) for name in names])
     around = _means_around(_layers(streams), names, terms, geometry.vza, surroundings) if adjacency else []
     arrays = _layers(chunking.second_pass(streams, around[0].data) if around else streams)
     by_band = [xr.Variable("band", each) for each in terms]
@@ -291,31 +267,3 @@ def _seen_table(background, scene, skies, terms):
         return coupled(coupling, list(_over(_scene_terms(lai, scene, found), np.array(background)[:, None])), above)
 
     return interpolation.tabulate(seen, decay(scene) / (scene.crown_cover or 1.0), tolerance=_TOLERANCE)
-
-
-def toa_of_surface(surface, coupling, atmosphere, bands, geometry):
-    """Apparent reflectance of a RossLi or RPV, shape (band,). [1]"""
-    terms = band_terms_of(atmosphere, bands, geometry)
-    if coupling == "lambert":
-        so, do, *_ = surface_streams(surface, "four-stream", atmosphere, bands, geometry)
-        mixed = (1 - terms.diffuse_fraction) * so + terms.diffuse_fraction * do
-        return apparent_reflectance(mixed, **terms.uniform)
-    return coupled(coupling, surface_streams(surface, coupling, atmosphere, bands, geometry), terms)
-
-
-def surface_streams(surface, coupling, atmosphere, bands, geometry):
-    """Streams of a RossLi or RPV in each band, list of arrays of shape (band,). [1]"""
-    check_surface(surface)
-    towards, found = (geometry.sza, geometry.vza, geometry.raa), []
-    for own, band in zip(surfaces_by_band(surface, len(bands)), bands, strict=True):
-        if coupling == "directional":
-            skies = [atmospheric_sky(atmosphere, band.center, float(zenith)) for zenith in towards[:2]]
-        else:
-            skies = [weighted_sky(_even, np.ones_like, zenith) for zenith in towards[:2]]
-        means = ground_streams(own.reflectance, *skies, *towards)
-        found.append(means if coupling == "directional" else (means[0], means[1], means[3], means[4]))
-    return [np.array(each) for each in zip(*found, strict=True)]
-
-
-def _even(zenith, azimuth):
-    return np.ones((zenith.size, azimuth.size))

@@ -18,7 +18,7 @@ from fifesim.base.bands import Band
 from fifesim.base.caches import cached
 from fifesim.base.messages import warn
 from fifesim.base.surface_kernels import RPV, RossLi
-from fifesim.chain import coupled_ground, landscapes
+from fifesim.chain import coupled_ground, ground_shapes, landscapes
 from fifesim.chain.landscapes import seen_through_air, warn_of_tallgrass
 from fifesim.grids import cf, directions
 from fifesim.grids.dates import by_date
@@ -53,6 +53,12 @@ _NARROW = 0.0025
 GROUND = Kind(
     "an xarray.DataArray, an xarray.Dataset, a fifesim.RossLi or a fifesim.RPV",
     lambda value: isinstance(value, xr.DataArray | xr.Dataset | RossLi | RPV),
+    dimensions=2,
+)
+# Ground whose directional shape is known.
+SHAPE = Kind(
+    "a fifesim.RossLi, a fifesim.RPV or a fifesim.Canopy",
+    lambda value: isinstance(value, RossLi | RPV | Canopy),
     dimensions=2,
 )
 # Streams of a surface reflectance.
@@ -472,7 +478,7 @@ def to_toa(
     reflectance : xarray.DataArray, dims (band, y, x), xarray.Dataset of bands, RossLi or RPV
         Surface reflectance factor, with band names of an instrument or a coordinate ``wavelength`` [um] along band.
         Integers need an attribute ``scale_factor``. Streams of `surface_reflectance` have a dimension ``stream``. A
-        RossLi or RPV needs ``instrument`` and ``geometry``; it is on level ground in all bands. [1]
+        RossLi or RPV needs ``instrument`` and, unless it has rasters with their own, ``geometry``. [1]
     atmosphere : Atmosphere, optional
         By default from the array. If it has none: midlatitude summer, continental aerosol, 45 km visibility and 0.4 km
         altitude, with a warning for rasters from other sources.
@@ -503,7 +509,7 @@ def to_toa(
 
     Returns
     -------
-    reflectance : xarray.DataArray, dims (band, y, x), or (band) for RossLi and RPV
+    reflectance : xarray.DataArray, dims (band, y, x), or (band) for RossLi and RPV of numbers
         Lazy if the input is. [1]
 
     Raises
@@ -542,10 +548,15 @@ def to_toa(
     if coupling not in (None, "lambert", *coupled_ground.STREAMS_OF):
         raise ValueError(f"coupling must be 'directional', 'four-stream' or 'lambert', got {coupling!r}")
     if isinstance(reflectance, RossLi | RPV):
-        given = {"elevation": elevation, "adjacency": adjacency or None, "surroundings": surroundings, "clouds": clouds}
-        if others := [name for name, each in (given | {"time": time}).items() if each is not None]:
-            raise ValueError(f"{', '.join(others)} needs a raster, got a {type(reflectance).__name__}: leave it out")
-        return _toa_of_surface(reflectance, coupling or "directional", atmosphere, geometry, instrument)
+        if rasters := ground_shapes.rasters_of(reflectance):
+            coupling, geometry = coupling or "directional", directions.given_geometry(geometry, rasters[0], time)
+            reflectance = _surface_raster(reflectance, rasters, coupling, atmosphere, geometry, instrument)
+        else:
+            given = {"elevation": elevation, "adjacency": adjacency or None, "surroundings": surroundings}
+            given |= {"clouds": clouds, "time": time}
+            if others := [name for name, each in given.items() if each is not None]:
+                raise ValueError(f"{', '.join(others)} needs rasters, got numbers in {reflectance!r}: leave it out")
+            return _toa_of_surface(reflectance, coupling or "directional", atmosphere, geometry, instrument)
     streams = isinstance(reflectance, xr.DataArray) and "stream" in reflectance.dims
     by_direction = streams or coupling in coupled_ground.STREAMS_OF
     if by_direction and elevation is not None:
@@ -586,11 +597,21 @@ def _toa_of_surface(surface, coupling, atmosphere, geometry, instrument):
     atmosphere, selected = atmosphere or _default_atmosphere(), find_instrument(instrument).select(None)
     bands = [each.response for each in selected]
     geometry = directions.uniform_geometry(directions.checked_geometry(geometry), "to_toa of a surface")
-    values = coupled_ground.toa_of_surface(surface, coupling, atmosphere, bands, geometry)
+    values = ground_shapes.toa_of_surface(surface, coupling, atmosphere, bands, geometry)
     along = {"band": [each.name for each in selected], "wavelength": [each.wavelength for each in selected]}
     out = xr.DataArray(values, dims="band", coords=cf.band_coordinates(**along) | directions.coordinates_of(geometry))
     history = f"to_toa: {type(surface).__name__}, {coupling} coupling, {atmosphere.text}"
     return cf.label(out, "toa_reflectance", history=history, atmosphere=atmosphere.text)
+
+
+def _surface_raster(surface, rasters, coupling, atmosphere, geometry, instrument):
+    """Streams of a RossLi or RPV of rasters, or its reflectance factor, in the bands of an instrument."""
+    if instrument is None:
+        raise ValueError(f"a {type(surface).__name__} has no instrument: give instrument=")
+    names = [each["band"].values.tolist() for each in rasters if "band" in each.dims and "band" in each.coords]
+    selected = find_instrument(instrument).select(names[0] if names else None)
+    geometry = directions.uniform_geometry(geometry, "to_toa of a surface")
+    return ground_shapes.surface_raster(surface, coupling, air_of(atmosphere, rasters[0]), selected, geometry)
 
 
 @by_date
@@ -605,7 +626,7 @@ def to_surface(
     elevation: xr.DataArray | None = None,
     adjacency: bool = False,
     surroundings: Surroundings | None = None,
-    like: RossLi | RPV | None = None,
+    like: Annotated[RossLi | RPV | Canopy, SHAPE] | None = None,
 ) -> xr.DataArray:
     """
     Surface reflectance from reflectance at the top of the atmosphere; the inverse of `to_toa`.
@@ -621,9 +642,10 @@ def to_surface(
         wrong aerosol load. The given atmosphere is saved with the result.
     geometry, time, instrument, elevation, adjacency, surroundings : optional
         As in `to_toa`.
-    like : RossLi or RPV, optional
+    like : RossLi, RPV or Canopy, optional
         Directional shape of the ground. The result is the reflectance factor, under sun and sky, of this surface times
-        the factor that the image requires. By default the ground is Lambertian.
+        the factor that the image requires in each band. A canopy of numbers has the leaf area that fits all bands of a
+        cell best. By default the ground is Lambertian.
 
     Returns
     -------
@@ -658,12 +680,30 @@ def to_surface(
             raise ValueError(
                 "like= needs one altitude and no adjacency: leave out elevation, adjacency and surroundings"
             )
-        return _of(instrument, coupled_ground.surface_like(directions.dated(reflectance, time), like, *air))
+        check_same_angles(air[-1], reflectance, "sza", "vza")
+        reflectance = directions.dated(reflectance, time)
+        if not isinstance(like, Canopy):
+            return _of(instrument, ground_shapes.surface_like(reflectance, like, *air))
+        return _of(instrument, ground_shapes.surface_like_canopy(reflectance, _even_canopy(like, *air), *air))
     surface = atmosphere_labels.surface_from_toa(
         directions.dated(reflectance, time), *air,
         elevation=elevation, adjacency=adjacency, surroundings=surroundings,
     )  # fmt: skip
     return _of(instrument, surface)
+
+
+def _even_canopy(canopy, atmosphere, bands, geometry):
+    """EvenCanopy of a description of numbers, without leaf area."""
+    geometry = directions.uniform_geometry(geometry, "to_surface(like=)")
+    light = Light(geometry, atmosphere_labels.diffuse_fraction(atmosphere, bands, geometry))
+    stand = landscapes.canopies_of(landscapes.Land(None), bands, canopy)[None]
+    even = canopy_labels.even_canopy(None, stand, light, False)
+    if even is None or even.scene.model != "sail":
+        raise ValueError(
+            "like= takes a Canopy of numbers, without dead leaves and crowns, by SAIL: leave out rasters, brown, "
+            "crown_cover and model"
+        )
+    return even
 
 
 def _of(instrument, array):

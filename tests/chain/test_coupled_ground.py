@@ -1,9 +1,11 @@
 """Ground that reflects by direction, from leaf area or kernels to the top of the atmosphere."""
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 import xarray as xr
-from lazy import no_compute
+from lazy import in_chunks, no_compute
 from odc.geo.xr import wrap_xr
 
 import fifesim
@@ -136,8 +138,12 @@ def test_refusals():
         fifesim.to_toa(fifesim.RossLi(20, 10, 3), HAZE, instrument="TM", geometry=SLANT)
     with pytest.raises(ValueError, match="not finite"):
         fifesim.to_toa(fifesim.RossLi([0.2, np.nan, 0.2, 0.2, 0.2, 0.2], 0, 0), HAZE, instrument="TM", geometry=SLANT)
-    with pytest.raises(ValueError, match="iso is a raster"):
-        fifesim.to_toa(fifesim.RossLi(0.1 + 0 * LAI, 0, 0), HAZE, instrument="TM", geometry=SLANT)
+    with pytest.raises(ValueError, match="has no instrument"):
+        fifesim.to_toa(fifesim.RossLi(0.1 + 0 * LAI, 0, 0), HAZE, geometry=SLANT)
+    with pytest.raises(ValueError, match=r"RossLi\(iso=0.05, vol=0.19, geo=0.06\) reflects -"):
+        fifesim.to_toa(fifesim.RossLi(xr.where(LAI > 1, 0.05, 0.3), 0.19, 0.06), HAZE, instrument="TM", geometry=SLANT)
+    with pytest.raises(ValueError, match="Canopy of numbers"):
+        ground().fifesim.to_toa().fifesim.to_surface(like=GRASS.replace(model="discrete-ordinates"))
     with pytest.raises(ValueError, match="no shape"):
         ground().fifesim.to_toa().fifesim.to_surface(like=fifesim.RossLi(0, 0, 0))
     with pytest.raises(ValueError, match="and surroundings"):
@@ -155,7 +161,7 @@ def test_a_wrong_coupling_is_refused(make):
 )
 def test_a_surface_takes_no_options_of_rasters(option):
     (name,) = option
-    with pytest.raises(ValueError, match=f"{name} needs a raster"):
+    with pytest.raises(ValueError, match=f"{name} needs rasters"):
         fifesim.to_toa(fifesim.RossLi(0.2, 0.1, 0.03), HAZE, instrument="TM", geometry=SLANT, **option)
 
 
@@ -252,3 +258,56 @@ def test_a_setup_is_its_steps(coupling):
     plain = fifesim.Setup(coupling=coupling, bands=BANDS, atmosphere=HAZE, geometry=SLANT)
     lazy = LAI.chunk(y=31).fifesim.compare(["TM"], plain, bands={"TM": BANDS})["TM"]["dn"]
     assert int(abs(lazy.astype(int) - LAI.fifesim.compare(["TM"], plain, bands={"TM": BANDS})["TM"]["dn"]).max()) <= 1
+
+
+@pytest.mark.parametrize("surface", [fifesim.RossLi(0.3, 0.1, 0.02), fifesim.RPV(0.1, 0.75, -0.1, 0.2)])
+def test_rasters_of_kernels_are_their_numbers(surface):
+    """Cell by cell and band by band, lazily; with NaN; as streams, adjacency of even ground changes nothing."""
+    first, *others = (each.name for each in fields(surface))
+    value = getattr(surface, first)
+    by_cell = xr.where(np.arange(72) < 36, value, 0.8 * value) + 0 * LAI.drop_attrs()
+    by_cell = by_cell.where(LAI[0, 0] != LAI).transpose("y", "x").odc.assign_crs(GRID.crs)
+    by_band = xr.concat([by_cell, 0.9 * by_cell], "band").assign_coords(band=BANDS)
+    # A Ross-Li surface is brighter by all weights, RPV by the first.
+    scaled = [first, *others] if isinstance(surface, fifesim.RossLi) else [first]
+    shape = {name: by_band / value * getattr(surface, name) for name in scaled}
+    raster = replace(surface, **shape)
+    given = {"instrument": "TM", "geometry": SLANT}
+    toa = fifesim.to_toa(raster, HAZE, **given)
+    assert toa.dims == ("band", "y", "x") and toa.band.values.tolist() == BANDS and np.isnan(toa[:, 0, 0]).all()
+    for column, factor in ((1, 1.0), (40, 0.8)):
+        for number, name in enumerate(BANDS):
+            one = replace(surface, **{key: factor * (1, 0.9)[number] * getattr(surface, key) for key in scaled})
+            for coupling in ("directional", "four-stream", "lambert"):
+                expected = fifesim.to_toa(one, HAZE, coupling=coupling, **given).sel(band=name)
+                found = fifesim.to_toa(raster, HAZE, coupling=coupling, **given).sel(band=name)[5, column]
+                assert float(found) == pytest.approx(float(expected), rel=1e-12)
+    lazy = replace(surface, **{name: each.chunk(y=31) for name, each in shape.items()})
+    with no_compute():
+        lazy = fifesim.to_toa(lazy, HAZE, **given)
+    np.testing.assert_allclose(lazy.compute(), toa, rtol=1e-12)
+    found = toa.fifesim.to_surface(like=raster)
+    half = replace(raster, **{name: 0.5 * each for name, each in shape.items()})
+    np.testing.assert_allclose(toa.fifesim.to_surface(like=half), found, rtol=1e-9)
+    near = fifesim.to_toa(raster, HAZE, adjacency=True, **given)
+    assert 0.001 < abs(near / toa - 1).max() < 0.2
+
+
+@pytest.mark.parametrize("lazy", [False, True])
+def test_to_surface_inverts_with_the_shape_of_a_canopy(lazy):
+    """The reflectance factor of every cell comes back, which one reflectance factor misses by up to 2 %."""
+    factor, toa = ground(), ground(streams="directional").fifesim.to_toa()
+    seen = in_chunks(toa, {"y": 31}) if lazy else toa
+    with no_compute():
+        found = seen.fifesim.to_surface(like=GRASS)
+    np.testing.assert_allclose(found, factor, rtol=2e-5)
+    assert abs(toa.fifesim.to_surface() / factor - 1).max() > 0.005
+    assert "shape of Canopy" in found.history
+    # Ground that is brighter than the canopy in both bands keeps the shape.
+    bright = 1.1 * ground(streams="directional")
+    bright = bright.assign_attrs(factor.attrs).fifesim.to_toa().fifesim.to_surface(like=GRASS)
+    np.testing.assert_allclose(bright, 1.1 * factor, rtol=0.02)
+    hole = toa.where(toa.x != toa.x[3])
+    assert np.isnan(hole.fifesim.to_surface(like=GRASS)[:, :, 3]).all()
+    with pytest.raises(ValueError, match="made for sza="):
+        toa.fifesim.to_surface(HAZE, assume=True, like=GRASS, geometry=fifesim.Geometry(10.0, 120.0, 30.0, 160.0))
