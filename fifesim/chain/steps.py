@@ -18,7 +18,7 @@ from fifesim.base.bands import Band
 from fifesim.base.caches import cached
 from fifesim.base.messages import warn
 from fifesim.base.surface_kernels import RPV, RossLi
-from fifesim.chain import coupled_ground, ground_shapes, landscapes
+from fifesim.chain import coupled_ground, landscapes
 from fifesim.chain.landscapes import seen_through_air, warn_of_tallgrass
 from fifesim.grids import cf, directions
 from fifesim.grids.dates import by_date
@@ -56,7 +56,7 @@ GROUND = Kind(
     dimensions=2,
 )
 # Ground whose directional shape is known.
-SHAPE = Kind(
+KNOWN_SHAPE = Kind(
     "a fifesim.RossLi, a fifesim.RPV or a fifesim.Canopy",
     lambda value: isinstance(value, RossLi | RPV | Canopy),
     dimensions=2,
@@ -548,15 +548,10 @@ def to_toa(
     if coupling not in (None, "lambert", *coupled_ground.STREAMS_OF):
         raise ValueError(f"coupling must be 'directional', 'four-stream' or 'lambert', got {coupling!r}")
     if isinstance(reflectance, RossLi | RPV):
-        if rasters := ground_shapes.rasters_of(reflectance):
-            coupling, geometry = coupling or "directional", directions.given_geometry(geometry, rasters[0], time)
-            reflectance = _surface_raster(reflectance, rasters, coupling, atmosphere, geometry, instrument)
-        else:
-            given = {"elevation": elevation, "adjacency": adjacency or None, "surroundings": surroundings}
-            given |= {"clouds": clouds, "time": time}
-            if others := [name for name, each in given.items() if each is not None]:
-                raise ValueError(f"{', '.join(others)} needs rasters, got numbers in {reflectance!r}: leave it out")
-            return _toa_of_surface(reflectance, coupling or "directional", atmosphere, geometry, instrument)
+        given = {"elevation": elevation, "surroundings": surroundings, "clouds": clouds, "time": time}
+        given |= {"adjacency": True} if adjacency else {}
+        options = {name: each for name, each in given.items() if each is not None}
+        return _toa_of_surface(reflectance, coupling or "directional", atmosphere, geometry, instrument, options)
     streams = isinstance(reflectance, xr.DataArray) and "stream" in reflectance.dims
     by_direction = streams or coupling in coupled_ground.STREAMS_OF
     if by_direction and elevation is not None:
@@ -573,7 +568,6 @@ def to_toa(
     if not streams:
         reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
     air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
-    check_same_angles(air[-1], reflectance, "sza", "vza")
     around = {"adjacency": adjacency, "surroundings": surroundings}
     if streams:
         toa = coupled_ground.toa_of_streams(reflectance, coupling, *air, **around)
@@ -584,34 +578,39 @@ def to_toa(
         )
         if by_direction:
             toa.attrs["history"] += f", {coupling} coupling"
+    # After the checks of the engine.
+    check_same_angles(air[-1], reflectance, "sza", "vza")
     if clouds is not None:
         toa = with_clouds(toa, clouds, *air, elevation=elevation)
     return _of(instrument, toa)
 
 
-def _toa_of_surface(surface, coupling, atmosphere, geometry, instrument):
-    """Apparent reflectance of a RossLi or RPV in the bands of an instrument, dims (band). [1]"""
-    for name, value in (("instrument", instrument), ("geometry", geometry)):
-        if value is None:
-            raise ValueError(f"a {type(surface).__name__} has no {name}: give {name}=")
-    atmosphere, selected = atmosphere or _default_atmosphere(), find_instrument(instrument).select(None)
-    bands = [each.response for each in selected]
-    geometry = directions.uniform_geometry(directions.checked_geometry(geometry), "to_toa of a surface")
-    values = ground_shapes.toa_of_surface(surface, coupling, atmosphere, bands, geometry)
-    along = {"band": [each.name for each in selected], "wavelength": [each.wavelength for each in selected]}
-    out = xr.DataArray(values, dims="band", coords=cf.band_coordinates(**along) | directions.coordinates_of(geometry))
-    history = f"to_toa: {type(surface).__name__}, {coupling} coupling, {atmosphere.text}"
-    return cf.label(out, "toa_reflectance", history=history, atmosphere=atmosphere.text)
-
-
-def _surface_raster(surface, rasters, coupling, atmosphere, geometry, instrument):
-    """Streams of a RossLi or RPV of rasters, or its reflectance factor, in the bands of an instrument."""
+def _toa_of_surface(surface, coupling, atmosphere, geometry, instrument, options):
+    """Apparent reflectance of a RossLi or RPV in the bands of an instrument, dims (band) or (band, y, x). [1]"""
+    kind, rasters = type(surface).__name__, coupled_ground.rasters_of(surface)
     if instrument is None:
-        raise ValueError(f"a {type(surface).__name__} has no instrument: give instrument=")
+        raise ValueError(f"a {kind} has no instrument: give instrument=")
+    if rasters:
+        geometry = directions.given_geometry(geometry, rasters[0], options.pop("time", None))
+    elif options:
+        raise ValueError(f"{', '.join(options)} needs rasters, got numbers in {surface!r}: leave it out")
+    if geometry is None:
+        raise ValueError(f"a {kind} has no geometry: give geometry=")
+    geometry = directions.uniform_geometry(directions.checked_geometry(geometry), "to_toa of a surface")
     names = [each["band"].values.tolist() for each in rasters if "band" in each.dims and "band" in each.coords]
     selected = find_instrument(instrument).select(names[0] if names else None)
-    geometry = directions.uniform_geometry(geometry, "to_toa of a surface")
-    return ground_shapes.surface_raster(surface, coupling, air_of(atmosphere, rasters[0]), selected, geometry)
+    if rasters:
+        atmosphere = air_of(atmosphere, rasters[0])
+        ground = coupled_ground.surface_raster(surface, coupling, atmosphere, selected, geometry)
+        return to_toa(ground, instrument=instrument, coupling=coupling, **options)
+    atmosphere = atmosphere or _default_atmosphere()
+    values = coupled_ground.toa_of_surface(
+        surface, coupling, atmosphere, [each.response for each in selected], geometry
+    )
+    along = {"band": [each.name for each in selected], "wavelength": [each.wavelength for each in selected]}
+    out = xr.DataArray(values, dims="band", coords=cf.band_coordinates(**along) | directions.coordinates_of(geometry))
+    history = f"to_toa: {kind}, {coupling} coupling, {atmosphere.text}"
+    return cf.label(out, "toa_reflectance", history=history, atmosphere=atmosphere.text)
 
 
 @by_date
@@ -626,7 +625,7 @@ def to_surface(
     elevation: xr.DataArray | None = None,
     adjacency: bool = False,
     surroundings: Surroundings | None = None,
-    like: Annotated[RossLi | RPV | Canopy, SHAPE] | None = None,
+    like: Annotated[RossLi | RPV | Canopy, KNOWN_SHAPE] | None = None,
 ) -> xr.DataArray:
     """
     Surface reflectance from reflectance at the top of the atmosphere; the inverse of `to_toa`.
@@ -683,8 +682,8 @@ def to_surface(
         check_same_angles(air[-1], reflectance, "sza", "vza")
         reflectance = directions.dated(reflectance, time)
         if not isinstance(like, Canopy):
-            return _of(instrument, ground_shapes.surface_like(reflectance, like, *air))
-        return _of(instrument, ground_shapes.surface_like_canopy(reflectance, _even_canopy(like, *air), *air))
+            return _of(instrument, coupled_ground.surface_like(reflectance, like, *air))
+        return _of(instrument, coupled_ground.surface_like_canopy(reflectance, _even_canopy(like, *air), *air))
     surface = atmosphere_labels.surface_from_toa(
         directions.dated(reflectance, time), *air,
         elevation=elevation, adjacency=adjacency, surroundings=surroundings,
