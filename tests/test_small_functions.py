@@ -12,7 +12,7 @@ from fifesim.base.lattice import centres, whole_cells
 from fifesim.ground.terrain.slope import rise
 from fifesim.scenario.toml import full_path
 from fifesim.sensor.description.fields import key
-from fifesim.sensor.products.sentinel2 import band_name
+from fifesim.sensor.products.sentinel2_labels import band_name
 from fifesim.sensor.response.calibration import mask_bits
 
 

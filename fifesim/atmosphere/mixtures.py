@@ -16,32 +16,15 @@ COMPONENTS = ("dust", "water_soluble", "oceanic", "soot")
 
 @dataclass(frozen=True, eq=False)
 class Component:
-    """
-    Optics of some particles, as tables.
+    """Optics of some particles, as tables."""
 
-    Parameters
-    ----------
-    log_wavelength : array, shape (wavelength,)
-        Logarithm of the wavelength in micrometres, increasing.
-    log_extinction, log_scattering : array, shape (wavelength,)
-        Logarithms of the cross sections.
-    asymmetry : array, shape (wavelength,)
-        Mean cosine of the scattering angle. [1]
-    angle : array, shape (angle,)
-        Scattering angle, from 0 to 180. [degree]
-    log_phase : array, shape (angle, wavelength)
-        Logarithm of the phase function, whose mean over the sphere is 1.
-    polarization : array, shape (angle, wavelength)
-        Degree of linear polarization of natural light scattered once. [1]
-    """
-
-    log_wavelength: np.ndarray
-    log_extinction: np.ndarray
+    log_wavelength: np.ndarray  # logarithm of the wavelength in um, increasing, shape (wavelength,)
+    log_extinction: np.ndarray  # logarithm of the cross section, shape (wavelength,)
     log_scattering: np.ndarray
-    asymmetry: np.ndarray
-    angle: np.ndarray
-    log_phase: np.ndarray
-    polarization: np.ndarray
+    asymmetry: np.ndarray  # mean cosine of the scattering angle, shape (wavelength,) [1]
+    angle: np.ndarray  # scattering angle, from 0 to 180, shape (angle,) [degree]
+    log_phase: np.ndarray  # logarithm of the phase function, whose mean is 1, shape (angle, wavelength)
+    polarization: np.ndarray  # degree of linear polarization of natural light scattered once, likewise [1]
 
 
 def cross_sections(component, wavelength):

@@ -16,7 +16,7 @@ from fifesim.grids import cf
 from fifesim.grids.sites import is_fife
 from fifesim.sensor.description.fields import band_called
 from fifesim.sensor.description.instrument_file import Instrument, InstrumentLike
-from fifesim.sensor.description.instruments import catalogued, instrument_names, noise_of
+from fifesim.sensor.description.instruments import catalogued, instrument_names
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.spectral_response import ResponseList
 
@@ -396,4 +396,4 @@ def _checked(radiance):
 def _noise_of(instrument, band):
     description = find_instrument(instrument)
     (found,) = description.select([band])
-    return noise_of(description, found)
+    return description.noise_model(found)

@@ -22,7 +22,6 @@ from fifesim.grids.inputs import HIGHEST, LOWEST, SAMPLED_ROWS, Image, RasterOrD
 from fifesim.grids.sites import check_same_angles
 from fifesim.grids.windows import held
 from fifesim.sensor.description.instrument_file import InstrumentLike
-from fifesim.sensor.description.instruments import noise_of
 from fifesim.sensor.instrument_labels import (
     attributes_of,
     coordinates_of_bands,
@@ -134,7 +133,7 @@ def noise_models(instrument, bands, kinds, given=None):
         given = {instrument.select(name)[0].name: model for name, model in given.items()}
     models = []
     for band in bands:
-        model = given if isinstance(given, NoiseModel) else (given or {}).get(band.name) or noise_of(instrument, band)
+        model = given if isinstance(given, NoiseModel) else (given or {}).get(band.name) or instrument.noise_model(band)
         if kinds != (ALL,) and (absent := [kind for kind in kinds if kind not in model.kinds]):
             known = " and ".join(model.kinds) or "none"
             raise ValueError(

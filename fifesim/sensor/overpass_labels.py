@@ -15,7 +15,7 @@ from fifesim.grids import cf
 from fifesim.grids.sites import sun_position
 from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
-from fifesim.sensor.response.orbit import Orbit, passes
+from fifesim.sensor.response.scan import Orbit, passes
 
 _EPOCH = pd.Timestamp("1970-01-01", tz="UTC")
 

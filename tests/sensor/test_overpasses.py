@@ -5,8 +5,7 @@ import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.sensor.response.orbit import DAY, Orbit, ground_track, passes
-from fifesim.sensor.response.scan import Track
+from fifesim.sensor.response.scan import DAY, Orbit, Track, ground_track, passes
 
 PLACE = 39.06, -96.54
 

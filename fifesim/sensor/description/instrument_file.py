@@ -41,38 +41,16 @@ class Noise:
 
     .. math:: \mathrm{NEdL} = L / \mathrm{SNR}
 
-    Parameters
-    ----------
-    radiance : float
-        Radiance L that the figure holds for. [W m-2 sr-1 um-1]
-    snr : float, optional
-        Ratio of signal to noise there. [1]
-    nedl : float, optional
-        Noise equivalent radiance there, standard deviation; instead of the ratio. [W m-2 sr-1 um-1]
-    high_radiance, high_snr : float, optional
-        A second, higher radiance and the ratio there. Both ratios determine the shot noise and the constant noise.
-        [W m-2 sr-1 um-1], [1]
-    shot : float, optional
-        Share of the variance at `radiance` that grows in proportion to the signal (shot noise); the rest is constant.
-        By default 1: the noise is limited by shot noise. Leave it out with two radiances. [1]
-    gain_spread : float, optional
-        Standard deviation of the detectors' relative gain: fixed pattern, which stripes the image. [1]
-    offset_spread : float, optional
-        Standard deviation of the detectors' offset. [W m-2 sr-1 um-1]
-
-    Raises
-    ------
-    pydantic.ValidationError
-        Unless one of the ratio and the noise is given, or if the second point is incomplete, lower than the first, or
-        needs a negative variance.
+    A second point determines shot noise and constant noise; otherwise `shot` does, by default all of the variance.
     """
 
-    radiance: Positive
-    snr: Positive | None = None
-    nedl: Positive | None = None
-    high_radiance: Positive | None = None
-    high_snr: Positive | None = None
-    shot: Annotated[float, Field(strict=True, ge=0, le=1)] | None = None
+    radiance: Positive  # L [W m-2 sr-1 um-1]
+    snr: Positive | None = None  # ratio of signal to noise there [1]
+    nedl: Positive | None = None  # standard deviation there, instead of the ratio [W m-2 sr-1 um-1]
+    high_radiance: Positive | None = None  # second, higher radiance [W m-2 sr-1 um-1]
+    high_snr: Positive | None = None  # ratio at the second radiance [1]
+    shot: Annotated[float, Field(strict=True, ge=0, le=1)] | None = None  # share of the variance that is shot noise [1]
+    # Fixed pattern: standard deviations of the detectors' relative gain [1] and of their offset [W m-2 sr-1 um-1].
     gain_spread: Annotated[float, Field(strict=True, ge=0, lt=1)] = 0.0
     offset_spread: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 0.0
 
@@ -102,17 +80,10 @@ class Noise:
 
 @dataclass(frozen=True, config=CONFIG)
 class Gain:
-    """
-    Radiances that a gain state spreads over the digital numbers.
+    """Radiances that a gain state spreads over the digital numbers. [W m-2 sr-1 um-1]"""
 
-    Parameters
-    ----------
-    full_scale_radiance, min_radiance : float
-        Radiances of the largest digital number and of digital number 0. [W m-2 sr-1 um-1]
-    """
-
-    full_scale_radiance: Number
-    min_radiance: Number
+    full_scale_radiance: Number  # of the largest digital number
+    min_radiance: Number  # of digital number 0
 
     def __post_init__(self):
         if self.full_scale_radiance <= self.min_radiance:
@@ -124,80 +95,34 @@ class Gain:
 
 @dataclass(frozen=True, config=CONFIG)
 class Product:
-    """
-    How the agency scales the digital numbers of its Level-1 product: by reflectance.
+    """How the agency scales the digital numbers of its Level-1 product: by reflectance."""
 
-    Parameters
-    ----------
-    gain, offset : float
-        Reflectance of one count and of digital number 0. [1]
-    bits : int
-        Number of bits of the digital numbers of the product.
-    sun_corrected : bool
-        Whether that reflectance has the cosine of the solar zenith angle divided out.
-    """
-
-    gain: Positive
-    offset: Number
+    gain: Positive  # reflectance of one count [1]
+    offset: Number  # reflectance of digital number 0 [1]
     bits: Annotated[int, Field(strict=True, ge=2, le=16)]
-    sun_corrected: Annotated[bool, Field(strict=True)]
+    sun_corrected: Annotated[bool, Field(strict=True)]  # whether the cosine of the solar zenith angle is divided out
 
 
 @dataclass(frozen=True, config=CONFIG)
 class ScanZone:
-    """
-    Zone of a scan in which samples are summed on board, on one side of nadir.
+    """Zone of a scan in which samples are summed on board, on one side of nadir."""
 
-    Parameters
-    ----------
-    samples : int
-        Samples of a line in the zone.
-    aggregation : int
-        Elementary samples in the sum.
-    deleted : int, optional
-        Lines that are deleted at each end of a sweep, as the neighbouring sweeps see the same ground.
-    """
-
-    samples: Count
-    aggregation: Count
-    deleted: Annotated[int, Field(strict=True, ge=0)] = 0
+    samples: Count  # of a line in the zone
+    aggregation: Count  # elementary samples in the sum
+    deleted: Annotated[int, Field(strict=True, ge=0)] = 0  # lines at each end of a sweep, which the next one sees too
 
 
 @dataclass(frozen=True, config=CONFIG)
 class Scan:
-    """
-    How an instrument covers the width of its swath.
+    """How an instrument covers the width of its swath; counts are for the first band."""
 
-    Parameters
-    ----------
-    kind : "whiskbroom" or "pushbroom"
-        A mirror that sweeps a few detectors across the track, or a row of detectors as long as the line.
-    max_angle : float
-        Largest angle from nadir, at the instrument. [degree]
-    samples : int, optional
-        Samples of a line of the first band.
-    lines : int, optional
-        Lines of a sweep of the first band, which are seen at once.
-    period : float, optional
-        Time from one sweep, or one line, to the next. [s]
-    swath : float, optional
-        Width on the ground that is published. [m]
-    zones : tuple of ScanZone, optional
-        From nadir outward, for the first band; the same on either side. The intervals of the instrument are then those
-        of the elementary samples.
-
-    Raises
-    ------
-    pydantic.ValidationError
-        If the samples of the zones are not half of all samples, or every line of a sweep is deleted.
-    """
-
-    kind: Literal["whiskbroom", "pushbroom"]
-    max_angle: Annotated[float, Field(strict=True, gt=0, lt=75)]
-    samples: Count | None = None
-    lines: Count | None = None
-    period: Positive | None = None
-    swath: Positive | None = None
+    kind: Literal["whiskbroom", "pushbroom"]  # a mirror sweeps a few detectors, or one row spans the line
+    max_angle: Annotated[float, Field(strict=True, gt=0, lt=75)]  # from nadir, at the instrument [degree]
+    samples: Count | None = None  # of a line
+    lines: Count | None = None  # of a sweep, which are seen at once
+    period: Positive | None = None  # from one sweep, or one line, to the next [s]
+    swath: Positive | None = None  # published width on the ground [m]
+    # From nadir outward, the same on either side. The intervals of the instrument are then between elementary samples.
     zones: tuple[ScanZone, ...] = ()
 
     def __post_init__(self):
@@ -559,8 +484,9 @@ class Instrument:
         """
         if band.noise is None:
             raise ValueError(
-                f"the description of {self.name} has no noise for {band.name}: leave noise out, or give an instrument "
-                "whose file has it"
+                f"the description of {self.name} has no noise for {band.name}: leave noise out, give "
+                "noise_models=fifesim.NoiseModel(...), in a scenario [sensor.noise_model], or take an instrument that "
+                "has it, such as OLI"
             )
         pushed = self.scan is not None and self.scan.kind == "pushbroom"
         return band.noise.model(band.detectors or self.detectors or 1, "columns" if pushed else "rows")

@@ -23,46 +23,24 @@ UNKNOWN = "unknown"
 
 @dataclass(frozen=True, config=CONFIG)
 class Origin:
-    """
-    Origin of one quantity of an instrument, from the best available source.
+    """Origin of one quantity of an instrument, from the best available source."""
 
-    Parameters
-    ----------
-    kind : {"in-flight", "pre-launch", "required", "assumed"}
-        Measured in flight, measured before launch, required by the mission, or assumed. A figure that was recalled
-        without reading its source is assumed.
-    uncertainty : float, optional
-        Blur: largest error of the modulation transfer at the Nyquist frequency, up or down [1]. Noise: factor by which
-        the standard deviation may be larger or smaller [1]. Geolocation: largest error of the root mean square, up or
-        down [m].
-    """
-
+    # Measured in flight, measured before launch, required by the mission, or assumed. A figure that was recalled
+    # without reading its source is assumed.
     kind: Literal["in-flight", "pre-launch", "required", "assumed"]
+    # Blur: largest error of the modulation transfer at the Nyquist frequency, up or down [1]. Noise: factor by which
+    # the standard deviation may be larger or smaller [1]. Geolocation: largest error of the root mean square [m].
     uncertainty: Positive | None = None
 
 
 class Provenance(NamedTuple):
-    """
-    Origin of one quantity in the bands that share it.
-
-    Parameters
-    ----------
-    quantity : {"blur", "noise", "geolocation"}
-    bands : tuple of str
-        Names of the bands.
-    origin : {"in-flight", "pre-launch", "required", "assumed", "unknown"}
-        An instrument file that has the quantity and states no origin counts as assumed.
-    uncertainty : float or None
-        As in `Origin`; None if it is not stated.
-    source : str
-        Publication or reason; for an unknown quantity what the search for it found, if the file says so.
-    """
+    """Origin of one quantity, "blur", "noise" or "geolocation", in the bands that share it."""
 
     quantity: str
     bands: tuple[str, ...]
-    origin: str
-    uncertainty: float | None
-    source: str
+    origin: str  # kind as in `Origin`; "assumed" if the file has the quantity and no origin; "unknown" without both
+    uncertainty: float | None  # as in `Origin`; None if it is not stated
+    source: str  # publication or reason; for an unknown quantity the result of the search for it, if the file states it
 
 
 def band_provenance(instrument, quantity, band):

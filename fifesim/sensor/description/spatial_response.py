@@ -17,25 +17,12 @@ from fifesim.sensor.response import spatial
 
 
 class View(NamedTuple):
-    """
-    How one band sees the ground at nadir, along one axis.
+    """View of the ground by one band at nadir, along one axis."""
 
-    Parameters
-    ----------
-    altitude : float
-        [m]
-    ifov : float or None
-        Instantaneous field of view. [rad]
-    interval : float
-        Angle between samples. [rad]
-    band : object
-        With the response-weighted mean ``wavelength``, which is only asked for where the response needs it. [um]
-    """
-
-    altitude: float
-    ifov: float | None
-    interval: float
-    band: object
+    altitude: float  # [m]
+    ifov: float | None  # instantaneous field of view [rad]
+    interval: float  # angle between samples [rad]
+    band: object  # with the response-weighted mean `wavelength`, which only some responses need [um]
 
     def width(self, response):
         """Instantaneous field of view on the ground. [m]"""
@@ -49,20 +36,10 @@ class View(NamedTuple):
 
 @dataclass(frozen=True, config=CONFIG)
 class CosineResponse:
-    """
-    A cosine truncated at half amplitude, sampled at angles, as tables of sensors give it.
-
-    Parameters
-    ----------
-    kind : "cosine"
-    step : float
-        Angle between samples of the response. [rad]
-    count : int
-        Number of samples.
-    """
+    """A cosine truncated at half amplitude, sampled at angles, as tables of sensors give it."""
 
     kind: Literal["cosine"]
-    step: Positive
+    step: Positive  # angle between samples of the response [rad]
     count: Count
 
     def spread(self, view):
@@ -72,18 +49,10 @@ class CosineResponse:
 
 @dataclass(frozen=True, config=CONFIG)
 class BoxcarResponse:
-    """
-    The detector alone: uniform over an angle.
-
-    Parameters
-    ----------
-    kind : "boxcar"
-    width : float, optional
-        By default the instantaneous field of view. [rad]
-    """
+    """The detector alone: uniform over an angle."""
 
     kind: Literal["boxcar"]
-    width: Positive | None = None
+    width: Positive | None = None  # by default the instantaneous field of view [rad]
 
     def spread(self, view):
         """Line spread function on the ground."""
@@ -98,22 +67,12 @@ class GaussianResponse:
     .. math:: M\left(\frac{1}{2 E}\right) = \frac{1}{2} \quad\Rightarrow\quad W = \frac{4 \ln 2}{\pi} E
 
     relates the effective instantaneous field of view E to the full width W at half of the maximum.
-
-    Parameters
-    ----------
-    kind : "gaussian"
-    fwhm : float, optional
-        Full width at half of the maximum. [rad]
-    mtf_at_nyquist : float, optional
-        Modulation transfer at the Nyquist frequency of the sampling interval. [1]
-    eifov : float, optional
-        Effective instantaneous field of view: half of the period that is passed by half. [rad]
     """
 
     kind: Literal["gaussian"]
-    fwhm: Positive | None = None
-    mtf_at_nyquist: Share | None = None
-    eifov: Positive | None = None
+    fwhm: Positive | None = None  # W [rad]
+    mtf_at_nyquist: Share | None = None  # modulation transfer at the Nyquist frequency of the sampling interval [1]
+    eifov: Positive | None = None  # E, half of the period that is passed by half [rad]
 
     def __post_init__(self):
         given = [name for name in ("fwhm", "mtf_at_nyquist", "eifov") if getattr(self, name) is not None]
@@ -130,21 +89,11 @@ class GaussianResponse:
 
 @dataclass(frozen=True, config=CONFIG)
 class TableResponse:
-    """
-    A measured response, linear between angles and zero beyond them.
-
-    Parameters
-    ----------
-    kind : "table"
-    angles : tuple of float
-        From the pixel's nominal centre, increasing. [rad]
-    values : tuple of float
-        Response, in any unit. [1]
-    """
+    """A measured response, linear between angles and zero beyond them."""
 
     kind: Literal["table"]
-    angles: Annotated[tuple[Number, ...], Field(min_length=2)]
-    values: Annotated[tuple[Number, ...], Field(min_length=2)]
+    angles: Annotated[tuple[Number, ...], Field(min_length=2)]  # from the nominal centre of the pixel, increasing [rad]
+    values: Annotated[tuple[Number, ...], Field(min_length=2)]  # in any unit
 
     def __post_init__(self):
         # Raises what is wrong with the table before anything is simulated.
@@ -157,36 +106,16 @@ class TableResponse:
 
 @dataclass(frozen=True, config=CONFIG)
 class SystemResponse:
-    """
-    Product of the modulation transfers of the parts of an instrument, in units of its field of view and interval.
-
-    Parameters
-    ----------
-    kind : "system"
-    detector : float, optional
-        Width of the detector, in instantaneous fields of view. [1]
-    smear : float, optional
-        Way of the detector over the ground while it integrates, in sampling intervals. [1]
-    blur : float, optional
-        Full width at half of the maximum of the optics, a Gaussian, in instantaneous fields of view. [1]
-    aperture : float, optional
-        Diameter of optics limited by diffraction. [m]
-    electronics : float, optional
-        Frequency at which the filter of the electronics halves the power. [cycles per sampling interval]
-    poles : int, optional
-        Number of poles of this filter.
-    truncation : float, optional
-        Largest share of the response that may be cut off. [1]
-    """
+    """Product of the modulation transfers of the parts of an instrument, in units of its field of view and interval."""
 
     kind: Literal["system"]
-    detector: Positive = 1.0
-    smear: Positive | None = None
-    blur: Positive | None = None
-    aperture: Positive | None = None
-    electronics: Positive | None = None
-    poles: Count = 1
-    truncation: Share = 1e-3
+    detector: Positive = 1.0  # width [instantaneous fields of view]
+    smear: Positive | None = None  # way of the detector over the ground while it integrates [sampling intervals]
+    blur: Positive | None = None  # full width at half maximum of Gaussian optics [instantaneous fields of view]
+    aperture: Positive | None = None  # diameter of optics limited by diffraction [m]
+    electronics: Positive | None = None  # frequency at which the filter halves the power [cycles per sampling interval]
+    poles: Count = 1  # of this filter
+    truncation: Share = 1e-3  # largest share of the response that may be cut off [1]
 
     def spread(self, view):
         """Line spread function on the ground."""

@@ -34,14 +34,7 @@ class NamedResponse:
 
 @dataclass(frozen=True, config=CONFIG)
 class PyrsrResponse(NamedResponse):
-    """
-    Relative spectral response among those that pyrsr distributes.
-
-    Parameters
-    ----------
-    satellite, sensor, band : str
-        Names in pyrsr, such as ``"Landsat-5"``, ``"TM"``, ``"3"``.
-    """
+    """Relative spectral response among those that pyrsr distributes, such as "Landsat-5", "TM", "3"."""
 
     satellite: Name
     sensor: Name
@@ -63,23 +56,12 @@ class PyrsrResponse(NamedResponse):
 
 @dataclass(frozen=True, config=CONFIG)
 class ResponseTable(NamedResponse):
-    """
-    Relative spectral response in a CSV table with columns satellite, band, wavelength [um] and response.
+    """Relative spectral response in a CSV table with columns satellite, band, wavelength [um] and response."""
 
-    Parameters
-    ----------
-    table : str
-        File in the instrument file's folder or in the data folder, such as ``"avhrr_response.csv"``.
-    satellite, band : str
-        Which rows.
-    folder : str, optional
-        Folder of the instrument file; the reader of the file fills it in.
-    """
-
-    table: Name
+    table: Name  # file in the folder of the instrument file or in the data folder, such as "avhrr_response.csv"
     satellite: Name
     band: Name
-    folder: str = ""
+    folder: str = ""  # of the instrument file; the reader of the file fills it in
 
     def _read(self, name):
         beside = Path(self.folder) / self.table
@@ -106,19 +88,10 @@ class ResponseTable(NamedResponse):
 
 @dataclass(frozen=True, config=CONFIG)
 class ResponseList(NamedResponse):
-    """
-    Relative spectral response written out in the file.
+    """Relative spectral response written out in the file."""
 
-    Parameters
-    ----------
-    wavelength : tuple of float
-        Increasing. [um]
-    response : tuple of float
-        [1]
-    """
-
-    wavelength: Annotated[tuple[Number, ...], Field(min_length=2)]
-    response: Annotated[tuple[Number, ...], Field(min_length=2)]
+    wavelength: Annotated[tuple[Number, ...], Field(min_length=2)]  # increasing [um]
+    response: Annotated[tuple[Number, ...], Field(min_length=2)]  # [1]
 
     def _read(self, name):
         if max(self.wavelength) > _LONGEST:
@@ -130,20 +103,10 @@ class ResponseList(NamedResponse):
 
 @dataclass(frozen=True, config=CONFIG)
 class CenteredResponse(NamedResponse):
-    """
-    Relative spectral response by its centre and width.
+    """Relative spectral response by its centre and width."""
 
-    Parameters
-    ----------
-    center : float
-        [um]
-    width : float
-        Full width at half of the maximum. [um]
-    shape : "gaussian" or "boxcar", optional
-    """
-
-    center: Positive
-    width: Positive
+    center: Positive  # [um]
+    width: Positive  # full width at half of the maximum [um]
     shape: Literal["gaussian", "boxcar"] = "gaussian"
 
     def __post_init__(self):

@@ -29,11 +29,6 @@ from fifesim.sensor.response.calibration import product_reflectance
 CHUNK = 2048
 
 
-def layer_chunk_sizes(given):
-    """Chunks of a layer."""
-    return {"y": CHUNK, "x": CHUNK} if given == "auto" else given
-
-
 def open_layer(folder, name, chunks, cure, count=None):
     """File of a product as a layer of integers, dims (y, x), or (band, y, x) with a count."""
     path = folder / name
@@ -52,7 +47,7 @@ def open_layer(folder, name, chunks, cure, count=None):
             if chunks is None:
                 size = source.count * source.height * source.width
                 check_memory(size, 12, f"all of {file.name}", "leave chunks out, which reads it by parts")
-        plain = stored_cells(file, crs, chunks)
+        plain = stored_cells(file, crs, {"y": CHUNK, "x": CHUNK} if chunks == "auto" else chunks)
     layer = xr.DataArray(plain.data, dims=("band", "y", "x"), name=path.name)
     layer = layer if count else layer.isel(band=0)
     return grids.place(layer, grids.geobox(plain))

@@ -267,33 +267,15 @@ def product_gain_offset(gain, offset, solar_irradiance, mu_s, earth_sun_distance
 
 @dataclass(frozen=True)
 class ProductBand:
-    """
-    Band of a product.
+    """Band of a product."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the instrument's band, such as ``"TM3"``.
-    file : str
-        Path below the folder of the metadata.
-    gain, offset : float
-        Reflectance of one count and of digital number 0. [1]
-    largest : int
-        Digital number of saturation.
-    solar_irradiance : float or None
-        Extraterrestrial, at one astronomical unit, by which the product is scaled; None where it is not said.
-        [W m-2 um-1]
-    flag : int, optional
-        Bit of the raster of saturation that stands for the band; 0 where it has none.
-    """
-
-    name: str
-    file: str
-    gain: float
-    offset: float
-    largest: int
-    solar_irradiance: float | None
-    flag: int = 0
+    name: str  # of the band of the instrument, such as "TM3"
+    file: str  # path below the folder of the metadata
+    gain: float  # reflectance of one count [1]
+    offset: float  # reflectance of digital number 0 [1]
+    largest: int  # digital number of saturation
+    solar_irradiance: float | None  # behind the scale, at one astronomical unit; None if unknown [W m-2 um-1]
+    flag: int = 0  # bit of the band in the raster of saturation; 0 where it has none
 
 
 def product_reflectance(dn, gain, offset, largest, flag=0, flags=0, mu_s=1.0):

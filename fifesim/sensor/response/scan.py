@@ -1,5 +1,5 @@
 """
-Scans across the track: geometry on a sphere, sweeps of several lines, and footprints turned against the ground's grid.
+Scans across the track: geometry on a sphere, sweeps of several lines, orbits, and footprints turned against the grid.
 
 The track is a great circle, and a ground point is seen when the instrument is abeam of it. Scan angles are positive to
 the right of the flight direction. Geodetic latitudes are used as latitudes on the sphere, with an error of 0.3 % of a
@@ -253,21 +253,12 @@ class ScanPattern:
     Lines and samples that an instrument takes in one sweep across the track.
 
     Samples count from nadir, to the left with negative numbers; sample n has its centre at position n + 1/2.
-
-    Parameters
-    ----------
-    track_interval, scan_interval : float
-        Angles between lines along the track and between elementary samples across it. [rad]
-    lines : int, optional
-        Number of lines that are swept together.
-    zones : tuple of Zone, optional
-        From nadir outward on either side; by default each sample is elementary and no line is deleted.
     """
 
-    track_interval: float
-    scan_interval: float
-    lines: int = 1
-    zones: tuple[Zone, ...] = ()
+    track_interval: float  # angle between lines along the track [rad]
+    scan_interval: float  # angle between elementary samples across it [rad]
+    lines: int = 1  # that are swept together
+    zones: tuple[Zone, ...] = ()  # from nadir outward on either side; by default each sample is elementary
 
     def track_angle(self):
         """Angles of the lines forward of the plane of the scan, shape (lines,). [degree]"""
@@ -387,6 +378,167 @@ def frame(latitude, longitude):
     return up, east, np.cross(up, east)
 
 
+# Orbit of Landsat 4 to 9: inclination [degree], altitude [m], and the rows of the Worldwide Reference System 2, counted
+# along the orbit so that row 60 lies where it crosses the equator southward.
+_INCLINATION, _ALTITUDE = 98.2, 705e3
+ROWS, _EQUATOR = 248, 60
+
+
+def view_of_roll(roll, row):
+    r"""
+    View of a Landsat scene that was acquired off nadir.
+
+    Row r of the Worldwide Reference System 2 lies at the angle u along the orbit, at the latitude :math:`\varphi`:
+
+    .. math:: u = 360 \frac{r - 60}{248}, \qquad \sin \varphi = -\sin i \, \sin u
+
+    Parameters
+    ----------
+    roll : float
+        ROLL_ANGLE of the metadata, about the direction of the ground track by the right-hand rule: positive looks to
+        the left of the track, negative to the right. [degree]
+    row : int
+        WRS_ROW of the metadata, 1 to 248; rows 123 to 245 are ascending.
+
+    Returns
+    -------
+    vza, vaa : float
+        View zenith and azimuth angles at the scene centre; the azimuth points toward the sensor. [degree]
+
+    Notes
+    -----
+    The orbit is circular and the Earth is a sphere, which costs 0.1 degree of the zenith angle. The azimuth is accurate
+    within 1 degree between 60 degrees south and north.
+
+    References
+    ----------
+    USGS, Landsat 8-9 Collection 2 Level-2 data format control book (LSDS-1328), ROLL_ANGLE: the description that Google
+    Earth Engine repeats for the collection LANDSAT/LC08/C02/T1_L2. Scene LC08_L2SP_017036_20130419 agrees: at a roll of
+    -11.7 degrees on the descending path 17, its centre lies 148 km west of the track, near path 18.
+    """
+    turn = np.radians(360.0 * (row - _EQUATOR) / ROWS)
+    latitude = np.degrees(np.arcsin(-np.sin(np.radians(_INCLINATION)) * np.sin(turn)))
+    # At its turning points the orbit touches the highest latitude, where the track has no second solution.
+    highest = 180.0 - _INCLINATION - 1e-6
+    track = Track.from_inclination(
+        float(np.clip(latitude, -highest, highest)), 0.0, _INCLINATION, _ALTITUDE, ascending=bool(np.cos(turn) < 0)
+    )
+    # Scan angles are positive to the right, rolls to the left.
+    _, central_angle = view_from_scan(-roll, _ALTITUDE)
+    east, north = view_components(track, *place_of(track, 0.0, central_angle), _ALTITUDE)
+    vza = np.degrees(np.arcsin(np.hypot(east, north)))
+    return float(vza), float(np.degrees(np.arctan2(east, north)) % 360.0)
+
+
+DAY = 86400.0  # [s]
+
+
+class Orbit(NamedTuple):
+    """Nominal circular orbit whose plane follows the mean sun."""
+
+    per_day: float  # revolutions [1]
+    crossing: float  # mean local solar time of the stated node [h]
+    ascending: bool  # whether this node is the ascending one
+    inclination: float  # [degree]
+    altitude: float  # [m]
+
+
+def ground_track(orbit, seconds):
+    r"""
+    Place below a satellite at times since a passage of its ascending node over the prime meridian.
+
+    .. math::
+
+        \sin \varphi = \sin i \sin u, \qquad
+        \lambda = \mathrm{atan2}(\cos i \sin u, \cos u) - 360° \, t / 1\,\mathrm{d}
+
+    Parameters
+    ----------
+    orbit : Orbit
+    seconds : array
+        :math:`t`, with the argument of latitude :math:`u = 360° \, n t`. [s]
+
+    Returns
+    -------
+    latitude, longitude : array, shape of seconds
+        On a sphere. [degree]
+
+    Notes
+    -----
+    Seen from the plane of a sun-synchronous orbit, the Earth turns once in a mean solar day.
+
+    References
+    ----------
+    [Capderou2014]_, chapter 5
+    """
+    argument, inclination = 2 * np.pi * orbit.per_day * np.asarray(seconds, float) / DAY, np.radians(orbit.inclination)
+    latitude = np.arcsin(np.sin(inclination) * np.sin(argument))
+    turned = np.arctan2(np.cos(inclination) * np.sin(argument), np.cos(argument))
+    longitude = np.degrees(turned) - 360 * np.asarray(seconds, float) / DAY
+    return np.degrees(latitude), (longitude + 180) % 360 - 180
+
+
+def passes(orbit, first, last, latitude, longitude, max_angle):
+    """
+    Closest approaches of a satellite to a place, within the swath.
+
+    Parameters
+    ----------
+    orbit : Orbit
+    first, last : float
+        Time span, since a midnight in UTC at which a revolution begins. [s]
+    latitude, longitude : float
+        Place. [degree]
+    max_angle : float
+        Largest scan angle. [degree]
+
+    Returns
+    -------
+    seconds, vza, vaa : array, shape (passes,)
+        Times since this midnight [s], and view zenith and azimuth toward the satellite, clockwise from north [degree].
+    ascending : array of bool, shape (passes,)
+
+    Notes
+    -----
+    At the midnight the satellite is at its ascending node, at the longitude of the node's mean solar time.
+
+    References
+    ----------
+    [Capderou2014]_, chapter 5
+    """
+    node = (orbit.crossing + (0 if orbit.ascending else 12)) * 15  # solar time of the ascending node [degree]
+    samples = np.arange(first - 20.0, last + 40.0, 20.0)
+    near = _closeness(orbit, node, samples, latitude, longitude)
+    peak = np.flatnonzero((near[1:-1] >= near[:-2]) & (near[1:-1] > near[2:])) + 1
+    # The cosine of the distance is a parabola at its maximum.
+    left, middle, right = near[peak - 1], near[peak], near[peak + 1]
+    seconds = samples[peak] + 20 * 0.5 * (left - right) / (left - 2 * middle + right)
+    below = _below(orbit, node, seconds)
+    toward = np.radians(np.array([latitude, longitude]))
+    angle = np.arccos(np.clip(_closeness(orbit, node, seconds, latitude, longitude), -1, 1))
+    scan = np.arctan2(EARTH_RADIUS * np.sin(angle), EARTH_RADIUS * (1 - np.cos(angle)) + orbit.altitude)
+    lat, lon = np.radians(below)
+    east = np.sin(lon - toward[1]) * np.cos(lat)
+    north = np.cos(toward[0]) * np.sin(lat) - np.sin(toward[0]) * np.cos(lat) * np.cos(lon - toward[1])
+    visible = (scan <= np.radians(max_angle)) & (angle < np.pi / 2) & (seconds >= first) & (seconds <= last)
+    rising = np.cos(2 * np.pi * orbit.per_day * seconds / DAY) > 0
+    found = seconds, np.degrees(scan + angle), np.degrees(np.arctan2(east, north)) % 360, rising
+    return tuple(each[visible] for each in found)
+
+
+def _below(orbit, node, seconds):
+    """Latitude and longitude below the satellite, whose plane has the node at a solar time [degree]."""
+    latitude, longitude = ground_track(orbit, seconds)
+    return latitude, longitude + node
+
+
+def _closeness(orbit, node, seconds, latitude, longitude):
+    """Cosine of the distance of a place from the point below the satellite. [1]"""
+    lat, lon = np.radians(_below(orbit, node, seconds))
+    place = np.radians([latitude, longitude])
+    return np.sin(place[0]) * np.sin(lat) + np.cos(place[0]) * np.cos(lat) * np.cos(lon - place[1])
+
+
 # A cell is cut until its pieces are this share of the narrower response.
 _PIECE = 1 / 16
 
@@ -396,24 +548,13 @@ _NODES = 4097
 
 @dataclass(frozen=True, eq=False)
 class Footprints:
-    """
-    Pixels on a grid of cells: centres, and the steps of a cell in the frame of each.
+    """Pixels on a grid of cells: centres, and the steps of a cell in the frame of each."""
 
-    Parameters
-    ----------
-    row, column : array, shape (..., n_pixels)
-        Centre, counted from the upper left corner of the grid. [cell]
-    frame : array, shape (..., n_pixels, 2, 2)
-        A step of a row and of a column (last axis) along and across the track, as it would be at nadir: divided by the
-        growth of the footprint. [m]
-    along, across : line spread function
-        At nadir, as `fifesim.base.footprints` takes them.
-    """
-
-    row: np.ndarray
+    row: np.ndarray  # of the centre, from the upper left corner of the grid, shape (..., n_pixels) [cell]
     column: np.ndarray
-    frame: np.ndarray
-    along: object
+    # A step of a row and of a column (last axis) along and across the track, divided by the growth of the footprint.
+    frame: np.ndarray  # shape (..., n_pixels, 2, 2) [m]
+    along: object  # line spread functions at nadir
     across: object
 
     def reach(self):

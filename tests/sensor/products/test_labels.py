@@ -10,7 +10,7 @@ from lazy import check_place, check_raster_function, in_chunks
 import fifesim
 from fifesim.base.geometry import Geometry
 from fifesim.grids import grid as grids
-from fifesim.sensor.products.labels import layer_chunk_sizes, open_layer, reflectance
+from fifesim.sensor.products.labels import open_layer, reflectance
 from fifesim.sensor.response.calibration import ProductBand
 
 SUN = Geometry(35.0, 130.0, earth_sun_distance=1.0148)
@@ -199,15 +199,13 @@ def written(folder, name="a.tif", shape=(6, 9), dtype=np.uint16, **place):
     return products.write(folder / name, np.arange(np.prod(shape), dtype=dtype).reshape(shape), **(PLACE | place))
 
 
-@pytest.mark.parametrize("chunks", [None, {"y": 4, "x": 5}, 3])
+@pytest.mark.parametrize("chunks", [None, {"y": 4, "x": 5}, "auto"])
 def test_a_layer_is_as_it_is_stored(tmp_path, chunks):
     values = written(tmp_path)
     layer = open_layer(tmp_path, "a.tif", chunks, "")
     assert (layer.chunks is None) == (chunks is None) and layer.dtype == np.uint16
     np.testing.assert_array_equal(layer, values)
     check_place(layer, "EPSG:32609")
-    # Automatic chunks are whole blocks of the agencies' files.
-    assert layer_chunk_sizes("auto") == {"y": 2048, "x": 2048} and layer_chunk_sizes(chunks) == chunks
 
 
 def test_what_is_no_layer_is_refused(tmp_path):

@@ -12,8 +12,8 @@ import products
 import pytest
 
 import fifesim
-from fifesim.sensor.products.landsat import read_scene
-from fifesim.sensor.products.sentinel2 import sentinel2_product
+from fifesim.sensor.products.landsat_labels import read_scene
+from fifesim.sensor.products.sentinel2_labels import sentinel2_product
 
 DATA = Path(__file__).parents[2] / "data" / "real_products"
 # The rasters lie anywhere: neither scale nor sun depends on their place.
