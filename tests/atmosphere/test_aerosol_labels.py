@@ -53,21 +53,14 @@ def test_wavelengths_may_be_in_other_units(totals, unit, micrometre):
     np.testing.assert_allclose(read_aerosol(other).wavelength, [0.44, 0.55, 0.67, 0.87, 1.02], rtol=1e-12)
 
 
-def test_tables_of_the_continental_model_give_5s_what_it_gives(tables):
-    """In all TM bands, by components that meet at angles between those of the tables."""
-    mine = fifesim.Atmosphere(aerosol=read_aerosol(tables), aot=0.3)
-    found, expected = (band_terms(air, TM, 50.0, 20.0, 40.0) for air in (mine, fifesim.Atmosphere(aot=0.3)))
-    np.testing.assert_allclose(found, expected, rtol=1e-10)
-
-
-def test_tables_of_the_continental_model_give_successive_orders_what_it_gives(tables):
-    """At wavelengths of the bands, over which their means are taken."""
-    at = np.array([0.47, 0.67, 2.25]), 50.0, np.array([20.0]), np.array([40.0])
-    airs = [
-        fifesim.Atmosphere(aerosol=each, aot=0.3, engine="successive-orders")
-        for each in (read_aerosol(tables), "continental")
-    ]
-    for found, expected in zip(*(scattering(air, *at) for air in airs), strict=True):
+def test_tables_of_the_continental_model_give_what_it_gives(tables):
+    """By components that meet at angles between those of the tables, in all TM bands and at a wavelength."""
+    mine = read_aerosol(tables)
+    airs = fifesim.Atmosphere(aerosol=mine, aot=0.3), fifesim.Atmosphere(aot=0.3)
+    np.testing.assert_allclose(*(band_terms(air, TM, 50.0, 20.0, 40.0) for air in airs), rtol=1e-10)
+    airs = (fifesim.Atmosphere(aerosol=each, aot=0.3, engine="successive-orders") for each in (mine, "continental"))
+    views = 50.0, np.array([20.0]), np.array([40.0])
+    for found, expected in zip(*(scattering(air, np.array([0.67]), *views) for air in airs), strict=True):
         np.testing.assert_allclose(found, expected, rtol=1e-10)
 
 
@@ -128,11 +121,12 @@ def test_where_it_floats_is_an_argument_or_an_attribute(tables):
 def test_aerosol_aloft_hides_molecules_from_successive_orders_and_5s_does_not_know(tables):
     """Absorbing particles above the molecules take their light twice."""
     dark = tables.assign(single_scattering_albedo=0 * tables["single_scattering_albedo"] + 0.2)
-    low, high = (read_aerosol(dark, layer=layer) for layer in ((0, 1), (20, 30)))
+    at = np.array([0.66]), 40.0, np.zeros(1), np.zeros(1)
     path = {}
     for engine in ("5S", "successive-orders"):
-        airs = [fifesim.Atmosphere(aerosol=each, aot=0.5, engine=engine) for each in (low, high)]
-        path[engine] = [float(band_terms(air, TM[2:3], 40.0, 0.0, 0.0).path_reflectance[0]) for air in airs]
+        layers = (read_aerosol(dark, layer=layer) for layer in ((0, 1), (20, 30)))
+        airs = [fifesim.Atmosphere(aerosol=each, aot=0.5, engine=engine) for each in layers]
+        path[engine] = [scattering(air, *at).reflectance.item() for air in airs]
     assert path["5S"][0] == path["5S"][1]
     below, above = path["successive-orders"]
     assert above < 0.8 * below

@@ -68,13 +68,6 @@ def test_factors_of_the_fife_case_agree_with_6s():
         assert terms.diffuse_fraction == pytest.approx(diffuse, abs=2e-3)
 
 
-def test_terms_are_fractions_and_the_blue_sky_is_the_most_diffuse():
-    terms = band_terms(Atmosphere(), BANDS, 30.0, 0.0, 0.0)
-    for values in terms._replace(optical_depth=terms.spherical_albedo):
-        assert np.all((values > 0) & (values < 1))
-    assert np.all(np.diff(terms.diffuse_fraction[:4]) < 0)
-
-
 @pytest.mark.parametrize("angles, name", [((76.0, 0.0), "sza"), ((30.0, 80.0), "vza"), ((float("nan"), 0.0), "sza")])
 def test_low_sun_and_view_are_refused(angles, name):
     with pytest.raises(ValueError, match=f"{name} must be from 0 to 75 degrees"):
@@ -123,14 +116,6 @@ def test_gauss_points_are_those_of_a_full_matrix():
         assert np.sum(found[1] * found[0] ** power) == pytest.approx(2 / (power + 1), rel=1e-13)
 
 
-def test_light_that_is_not_scattered_falls_off_with_the_depth_of_both(hazy):
-    """It decides the share of skylight in canopy, terrain and adjacency."""
-    depth = HAZE.rayleigh_optical_depth(WAVELENGTH) + HAZE.aerosol_optical_depth(WAVELENGTH)
-    np.testing.assert_allclose(hazy.optical_depth, depth, rtol=1e-14)
-    np.testing.assert_allclose(hazy.direct_transmittance_down, np.exp(-depth / MU_S), rtol=1e-14)
-    np.testing.assert_allclose(hazy.direct_transmittance_up, np.exp(-depth / MU_V), rtol=1e-14)
-
-
 def test_light_goes_straight_or_is_scattered(hazy):
     """What comes through is more than the beam and less than all; of the molecules alone it is as without aerosol."""
     assert np.all(hazy.direct_transmittance_up < hazy.transmittance_up) and np.all(hazy.transmittance_up < 1)
@@ -141,13 +126,6 @@ def test_light_goes_straight_or_is_scattered(hazy):
     np.testing.assert_allclose(clear.diffuse_up_molecules, hazy.diffuse_up_molecules, rtol=1e-12)
     np.testing.assert_allclose(clear.molecules_reflectance, hazy.molecules_reflectance, rtol=1e-12)
     np.testing.assert_allclose(clear.diffuse_up_aerosol, 0, atol=1e-11)
-
-
-def test_light_that_is_polarized_is_another(hazy):
-    """By some percent of the path, and nothing of the beam."""
-    scalar = mixed_scattering(HAZE, WAVELENGTH, SZA, VZA, RAA, polarized=False)
-    assert 0.003 < np.abs(scalar.reflectance / hazy.reflectance - 1).max() < 0.1
-    np.testing.assert_array_equal(scalar.direct_transmittance_up, hazy.direct_transmittance_up)
 
 
 def test_polarized_light_is_that_of_the_terms():

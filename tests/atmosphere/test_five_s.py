@@ -73,22 +73,6 @@ def test_conservative_spherical_albedo_is_the_mean_plane_albedo():
     np.testing.assert_allclose(spherical_albedo(tau, 1.0, 0.0), mean, atol=2e-6)
 
 
-def test_thin_layer_scatters_once():
-    """The reflectance of a thin layer is omega P tau / (4 mu_s mu_v), whatever the second order."""
-    tau = 1e-6
-    single = 0.9 * 1.3 * tau / (4 * MU_S * MU_V)
-    np.testing.assert_allclose(sobolev_reflectance(tau, 0.9, 0.6, 1.3, MU_S, MU_V), single, rtol=1e-5)
-    np.testing.assert_allclose(
-        sobolev_conservative_reflectance(tau, 1.3, MU_S, MU_V), 1.3 * tau / (4 * MU_S * MU_V), rtol=1e-5
-    )
-
-
-def test_black_particles_only_extinguish():
-    albedo, transmittance = delta_eddington(0.4, 0.0, 0.0, 0.7)
-    assert albedo == pytest.approx(0, abs=1e-15)
-    assert transmittance == pytest.approx(np.exp(-0.4 / 0.7), rel=1e-12)
-
-
 def test_removable_pole_is_smooth():
     """At k mu = 1 the two-stream solution is 0/0; neighbours agree through it."""
     mu_s = 1 / np.sqrt((1 - 0.5) * 3)
@@ -130,14 +114,6 @@ HAZE = Atmosphere(visibility=8.0)
 
 def scattering(atmosphere):
     return five_s_scattering(atmosphere, SPECTRUM, SZA, VZA, RAA)
-
-
-def test_light_that_is_not_scattered_falls_off_with_the_depth():
-    light = scattering(HAZE)
-    depth = HAZE.rayleigh_optical_depth(SPECTRUM) + HAZE.aerosol_optical_depth(SPECTRUM)
-    np.testing.assert_allclose(light.optical_depth, depth, rtol=1e-14)
-    np.testing.assert_allclose(light.direct_transmittance_down, np.exp(-depth / COS_S), rtol=1e-14)
-    np.testing.assert_allclose(light.direct_transmittance_up, np.exp(-depth / COS_V), rtol=1e-14)
 
 
 def test_air_without_aerosol_has_the_molecules_alone():

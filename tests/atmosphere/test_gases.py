@@ -83,37 +83,6 @@ def test_a_column_of_the_user_acts_as_a_longer_path_through_water_alone():
     )
 
 
-def test_gas_between_the_wavelengths_of_the_table_is_linear():
-    between = gas_transmittance([0.76125, 0.93875], Atmosphere(), 2.0)
-    ends = gas_transmittance([0.76, 0.7625, 0.9375, 0.94], Atmosphere(), 2.0)
-    np.testing.assert_allclose(between, [ends[:2].mean(), ends[2:].mean()], rtol=1e-9)
-
-
-def test_transmittance_of_all_gases_is_the_product():
-    wavelength, atmosphere = table_wavelengths(), Atmosphere()
-    product = np.prod([gas_transmittance(wavelength, atmosphere, 2.0, gases=(gas,)) for gas in GASES], axis=0)
-    np.testing.assert_allclose(gas_transmittance(wavelength, atmosphere, 2.0), product, rtol=1e-12, atol=1e-300)
-
-
-def test_no_path_absorbs_nothing():
-    assert np.all(gas_transmittance(table_wavelengths(), Atmosphere(), 0.0) == 1)
-
-
-def test_a_longer_path_absorbs_more_but_less_than_in_proportion():
-    once, twice = gas_transmittance(table_wavelengths(), Atmosphere(), [1.5, 3.0])
-    absorbing = (once < 0.999) & (once > 1e-3)
-    assert np.all(twice[absorbing] < once[absorbing])
-    assert np.all(twice[absorbing] >= once[absorbing] ** 2 * (1 - 1e-12))
-
-
-def test_oxygen_and_water_bands_lie_where_they_lie():
-    atmosphere = Atmosphere()
-    oxygen = gas_transmittance(table_wavelengths(), atmosphere, 1.0, gases=("o2",))
-    assert table_wavelengths()[oxygen.argmin()] == pytest.approx(0.7605, abs=0.0026)
-    assert gas_transmittance(1.38, atmosphere, 1.0)[0] < 0.05
-    assert gas_transmittance(0.865, atmosphere, 1.0)[0] > 0.98
-
-
 @pytest.mark.parametrize("band_model", [goody, malkmus])
 def test_band_models_have_their_limits(band_model):
     """Weak lines absorb by the amount, strong ones by its square root."""
@@ -121,10 +90,6 @@ def test_band_models_have_their_limits(band_model):
     assert band_model(amount, 1e-12 * amount) == pytest.approx(amount, rel=1e-9)
     strong = band_model(amount, 1e12 * amount)
     assert strong[1] / strong[0] == pytest.approx(2, rel=1e-5)
-
-
-def test_air_masses_lead_and_wavelengths_trail():
-    assert gas_transmittance([0.5, 0.6, 0.7], Atmosphere(), np.ones((2, 4))).shape == (2, 4, 3)
 
 
 def test_thermal_wavelength_is_refused():
@@ -155,12 +120,6 @@ def test_light_at_right_angles_is_half_that_straight_on_but_for_depolarization()
 def test_air_at_the_sodium_lines_has_the_index_of_the_handbooks():
     """1.000277 at 15 degrees."""
     assert refractive_index(0.5893) - 1 == pytest.approx(2.77e-4, abs=5e-7)
-
-
-def test_cross_section_falls_with_the_fourth_power_times_that_of_the_index():
-    ratio = rayleigh_cross_section(0.4) / rayleigh_cross_section(0.8)
-    slope = ((refractive_index(0.4) - 1) / (refractive_index(0.8) - 1)) ** 2
-    assert ratio == pytest.approx(16 * slope, rel=1e-4)
 
 
 def test_depolarization_of_zero_is_that_of_dipoles():

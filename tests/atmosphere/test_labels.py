@@ -137,12 +137,6 @@ def test_relief_is_altitude_by_cell(ground):
         np.testing.assert_allclose(toa[..., column], own[..., column], rtol=0, atol=3e-5)
 
 
-def test_even_ground_has_no_adjacency(ground):
-    even = ground.copy(data=np.full(ground.shape, 0.2))
-    there = toa_from_surface(even, AIR, BANDS, SUN, adjacency=True)
-    np.testing.assert_allclose(there, toa_from_surface(even, AIR, BANDS, SUN), rtol=0, atol=1e-9)
-
-
 def test_adjacency_keeps_its_word_and_leads_back(ground):
     def upward(array):
         return toa_from_surface(array, AIR, BANDS, SUN, adjacency=True)
@@ -190,14 +184,6 @@ def test_spectrum_is_what_narrow_bands_see():
         at = spectrum.sel(wavelength=centre, method="nearest")
         for name in ("transmittance_down", "transmittance_up", "spherical_albedo", "direct_transmittance_up"):
             assert float(at[name]) == pytest.approx(getattr(terms, name)[0], rel=1e-4)
-
-
-def test_depths_add_up():
-    spectrum = fifesim.atmosphere.spectrum(geometry=SUN)
-    depth = spectrum["molecules_optical_depth"] + spectrum["aerosol_optical_depth"]
-    # Interpolated between the aerosol's wavelengths in one and not in the other.
-    np.testing.assert_allclose(spectrum["direct_transmittance_up"], np.exp(-depth / SUN.mu_v), rtol=2e-3)
-    np.testing.assert_allclose(spectrum["gas_transmittance"], spectrum["transmittance_of_gas"].prod("gas"), rtol=1e-12)
 
 
 def test_everything_has_a_name_and_a_unit():

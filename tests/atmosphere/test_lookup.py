@@ -147,21 +147,9 @@ def test_closed_forms_know_of_no_molecules_above():
     assert above == pytest.approx(Atmosphere(altitude=0.0).rayleigh_optical_depth(RED.center))
 
 
-def test_thick_aerosol_scatters_once_what_it_stops():
-    r""":math:`\omega P / 4 (\mu_s + \mu_v)`, all of which is stopped."""
-    once = Once(np.full(1, 0.9), np.full(1, 100.0), np.zeros(1), np.full((1, 721), 1.3))
-    expected = 0.9 * 1.3 / (4 * (np.cos(np.radians(35.0)) + np.cos(np.radians(10.0))))
-    assert once_reflectance(35.0, 10.0, 90.0, once, 0) == pytest.approx(expected, rel=1e-12)
-
-
 def test_nodes_are_single_places():
     once = scattered_once(Atmosphere(), (RED, NIR))
     sza, vza, raa = np.array([10.0, 50.0]), np.array([0.0, 20.0, 60.0]), np.array([0.0, 120.0])
     found = once_on_nodes(sza, vza, raa, once)
     for s, v, r, band in np.ndindex(found.shape):
         assert found[s, v, r, band] == once_reflectance(sza[s], vza[v], raa[r], once, band)
-
-
-def test_air_without_aerosol_scatters_nothing():
-    once = scattered_once(Atmosphere(aerosol="none"), (RED,))
-    assert once_reflectance(30.0, 0.0, 0.0, once, 0) == 0

@@ -5,7 +5,6 @@ import pytest
 
 from fifesim.atmosphere.mixtures import (
     COMPONENTS,
-    MODELS,
     canonical,
     cross_sections,
     mixture,
@@ -86,13 +85,6 @@ def test_a_mistake_in_a_mixture_is_named(aerosol, message):
 def test_an_aerosol_of_the_wrong_kind_is_refused(aerosol):
     with pytest.raises(TypeError, match="aerosol"):
         canonical(aerosol)
-
-
-def test_giving_a_mapping_leaves_it_untouched():
-    given = {"soot": 0.0, "dust": 1.0}
-    mixture(given)["dust"] = 7
-    mixture("urban")["dust"] = 7
-    assert given == {"soot": 0.0, "dust": 1.0} and MODELS["urban"]["dust"] == 0.17
 
 
 def test_a_name_is_suggested_only_where_the_spelling_is_close():

@@ -80,24 +80,6 @@ def test_fife_case_is_that_of_a_build_with_more_digits(band):
     assert terms.diffuse_fraction == pytest.approx(skylight, abs=1e-3)
 
 
-def test_fife_case_from_published_responses_is_that_of_the_engine_s_own_filters():
-    """
-    All of it, to 5e-4: the engine's copies of the responses of Landsat-5 TM are others.
-
-    Its TM7 is 0.4 % narrower than the published one.
-    """
-    for altitude, rows in FIFE.groupby("altitude"):
-        names = sorted(set(rows["band"]))
-        first = next(rows.itertuples())
-        atmosphere = Atmosphere(visibility=first.visibility, altitude=altitude)
-        bands = [Band(name, *RESPONSES[name[2:]].T) for name in names]
-        terms = six_s.sixs_band_terms(atmosphere, bands, first.sza, first.vza, first.raa)
-        index = [names.index(name) for name in rows["band"]]
-        of_rows = {name: values[index] for name, values in terms.uniform.items()}
-        ours = apparent_reflectance(rows["surface_reflectance"].to_numpy(), **of_rows)
-        np.testing.assert_allclose(ours, rows["toa_reflectance"], atol=5e-4)
-
-
 @pytest.mark.parametrize("row", list(GRID.sample(3, random_state=0).itertuples()), ids=lambda row: row.band)
 def test_other_angles_are_those_of_a_build_with_more_digits(row):
     ours = apparent_reflectance(0.3, **terms_with_own_filter(row, 0.0).uniform)
@@ -173,14 +155,6 @@ def test_other_mixtures_go_in_by_volume():
     model = with_wavelength(Atmosphere(aerosol=sooty))
     assert [float(part) for part in model.aero_profile.splitlines()[1].split(",")] == [0.2, 0.3, 0.1, 0.4]
     assert six_s.run(model).apparent_reflectance < six_s.run(with_wavelength(Atmosphere())).apparent_reflectance
-
-
-def test_air_without_aerosol_has_the_molecules_alone():
-    atmosphere = Atmosphere(aerosol="none")
-    terms = six_s.sixs_band_terms(atmosphere, [RED], 30.0, 0.0, 0.0)
-    assert terms.diffuse_up_aerosol[0] == 0
-    rayleigh = RED.mean(atmosphere.rayleigh_optical_depth(np.array(RED.wavelength)), RED.wavelength)
-    assert terms.optical_depth[0] == pytest.approx(rayleigh, rel=0.02)
 
 
 def test_band_is_run_once(monkeypatch):

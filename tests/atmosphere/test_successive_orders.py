@@ -9,17 +9,11 @@ from numpy.polynomial.legendre import leggauss, legval
 from oracles_atmosphere import SIEWERT
 
 from fifesim.atmosphere.aerosols import aerosol_phase, aerosol_polarization
-from fifesim.atmosphere.column import matrix_moments, mixed_column, rayleigh_expansion
+from fifesim.atmosphere.column import matrix_moments, rayleigh_expansion
 from fifesim.atmosphere.gases import rayleigh_phase
 from fifesim.atmosphere.successive_orders import (
     flux_transmittance,
-    fluxes,
-    leaving_light,
-    lit_from_below,
-    once_scattered,
     path_reflectance,
-    quadrature,
-    rescattered_light,
     stokes_reflectance,
 )
 from fifesim.base.geometry import scattering_angle_cosine
@@ -166,29 +160,6 @@ def test_thin_layer_scatters_once():
     np.testing.assert_allclose(found, once, rtol=3e-4)
 
 
-def test_nothing_scatters_in_nothing():
-    views = 30.0, [0.0, 40.0], [0.0, 90.0]
-    assert path_reflectance(0.0, 0.0, 0.9, [1.0], np.ones((2, 2)), *views) == pytest.approx(0, abs=1e-11)
-    transmittance, albedo = flux_transmittance(0.0, 0.0, 0.9, [1.0], [0.0, 70.0])
-    assert transmittance == pytest.approx(1, abs=1e-11)
-    assert albedo == pytest.approx(0, abs=1e-11)
-
-
-def test_unknown_sun_gives_unknown_reflectance():
-    assert np.isnan(path_reflectance(0.1, 0.2, 0.9, [1.0], np.ones((2, 1)), np.nan, [0.0, 30.0], [0.0])).all()
-
-
-def test_a_view_does_not_depend_on_the_others():
-    sza, vza, raa = 50.0, np.array([0.0, 25.0, 60.0]), np.array([0.0, 100.0])
-    air = 0.2, 0.4, 0.9, 0.6 ** np.arange(64)
-    phase = henyey_greenstein(0.6, cosine(sza, vza, raa))
-    together = path_reflectance(*air, phase, sza, vza, raa)
-    alone = [
-        [path_reflectance(*air, phase[[i]][:, [j]], sza, [vza[i]], [raa[j]])[0, 0] for j in (0, 1)] for i in range(3)
-    ]
-    np.testing.assert_allclose(together, alone, rtol=1e-13)
-
-
 def test_forward_peak_may_be_left_to_the_beam():
     """Of .8 to the 32nd with 16 directions, to the 64th with 32: the reflectance is the same."""
     sza, vza, raa = 40.0, [0.0, 30.0, 55.0], [0.0, 90.0, 180.0]
@@ -240,20 +211,6 @@ def test_scalar_atmosphere_is_that_of_6s():
     reflectance, flux = relative_difference(0, ["continental", "urban"])
     assert np.abs(reflectance).max() < 0.008
     assert np.abs(flux).max() < 0.004
-
-
-def test_light_that_is_not_polarized_is_another():
-    """Molecules in the blue: 6S says by how much."""
-    blue = SIXS[(SIXS["wavelength"] == 0.4) & (SIXS["aerosol"] == "continental")].set_index("polarized")
-    expected = blue["rayleigh_reflectance"]
-    sza, vza, raa = (float(blue[name].iloc[0]) for name in ("sza", "vza", "raa"))
-    tau = float(blue["rayleigh_optical_depth"].iloc[0])
-    scalar, vector = (
-        path_reflectance(tau, 0.0, 1.0, [1.0], [[0.0]], sza, [vza], [raa], polarized=flag)[0, 0]
-        for flag in (False, True)
-    )
-    assert abs(expected[1] / expected[0] - 1) > 0.01
-    assert vector / scalar == pytest.approx(expected[1] / expected[0], abs=5e-4)
 
 
 # ------------------------------------------------------------------------------------------ polarization
@@ -347,42 +304,3 @@ def test_light_of_the_sky_below_the_sun_is_finite():
 
 
 # ------------------------------------------------------------------------------------------ orders
-
-
-ACCURACY = {"streams": 8, "tolerance": 1e-9}
-MU = np.array([0.3, 0.9])
-
-
-def column(terms=16, tau=0.3):
-    return mixed_column(tau, 0.0, 0.0, [1.0], terms, 40)
-
-
-def test_directions_of_a_hemisphere_carry_the_flux_of_an_even_sky():
-    nodes, weights = quadrature(8)
-    assert 2 * (nodes * weights)[:8].sum() == pytest.approx(1, rel=1e-12)
-    np.testing.assert_array_equal(nodes[8:], -nodes[:8])
-
-
-def test_terms_beyond_those_of_the_molecules_change_nothing():
-    few, many = (list(rescattered_light(column(terms), 0.6, MU, stokes=True, **ACCURACY)) for terms in (3, 16))
-    for (mode, radiance), (same, expected) in zip(few, many, strict=False):
-        assert mode == same
-        np.testing.assert_allclose(radiance, expected, atol=1e-9)
-
-
-def test_even_air_looks_the_same_from_both_sides():
-    """Light that a layer of one kind of scatterer sends up from below is what it sends down from above."""
-    air = column()
-    source = lit_from_below(air, **ACCURACY)
-    (up,), (down,) = (leaving_light(air, 0, MU, source, at_ground=at_ground) for at_ground in (False, True))
-    transmittance, albedo = fluxes(air, source, MU, 8)
-    np.testing.assert_allclose(transmittance, np.exp(-0.3 / MU) + up, rtol=1e-12)
-    assert (down > 0).all() and 0 < albedo < 0.3
-
-
-def test_light_scattered_once_is_lost_nowhere():
-    """Of a thin layer as much goes up as down, at the same angles."""
-    air = column(tau=1e-6)
-    up, down = (once_scattered(air, np.ones((2, 1)), np.ones((2, 1)), 0.6, MU, at_ground=g) for g in (False, True))
-    np.testing.assert_allclose(up[:, 0], 1e-6 / (4 * 0.6 * MU), rtol=1e-5)
-    np.testing.assert_allclose(down, up, rtol=1e-5)

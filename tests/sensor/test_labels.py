@@ -6,7 +6,7 @@ import numpy as np
 import products
 import pytest
 import xarray as xr
-from lazy import ODD_CHUNKS, check_place, check_raster_function, in_chunks, no_compute
+from lazy import ODD_CHUNKS, check_raster_function, in_chunks, no_compute
 
 import fifesim
 from fifesim.base.footprints import axis_operator, regularize
@@ -165,22 +165,6 @@ def test_geometry_given_wins(toa):
     image = fifesim.sense(toa, "TM", geometry=low)
     assert directions.geometry_of(image) == low
     assert image.astype(int).sum() < fifesim.sense(toa, "TM").astype(int).sum()
-
-
-def test_a_part_of_a_lazy_image_has_the_same_bits(toa):
-    with no_compute():
-        image = fifesim.sense(in_chunks(toa, ODD_CHUNKS), "TM")
-        check_place(image, grids.geobox(toa).crs)
-    xr.testing.assert_identical(image[:, :3].compute(), fifesim.sense(toa, "TM")[:, :3])
-
-
-@pytest.mark.parametrize("crs", ["EPSG:26915", "+proj=tmerc +lon_0=-96.3 +x_0=500000 +datum=NAD83 +units=m"])
-def test_pixels_in_another_crs_are_one_line(toa, crs):
-    box = toa.odc.geobox.boundingbox
-    said = r"onto must be in the CRS of the scene, EPSG:26914, got .*: make it there"
-    with pytest.raises(ValueError, match=said) as error:
-        fifesim.sense(toa, "TM", onto=fifesim.grid_at(crs, box.left, box.top, 90, 90, 30))
-    assert "\n" not in str(error.value) and len(str(error.value)) < 300
 
 
 # ------------------------------------------------------------------------------------------ several resolutions
@@ -413,20 +397,6 @@ SILENT = replace(PAPER, bands=tuple(replace(band, noise=None) for band in TM.ban
 def test_noise_that_is_not_described_is_refused(name, noise, models, said):
     with pytest.raises(ValueError, match=said):
         fifesim.sense(uniform((90, 99)), name, noise=noise, noise_models=models)
-
-
-def test_each_requested_kind_must_exist_in_every_band():
-    """The noise of L4TM is the same at any radiance; the other verbs refuse shot noise as `sense` does."""
-    lai = fifesim.lai_scene(fifesim.fife_site(cell=10, window=((0, 60), (0, 60))), "burned-grazed", seed=7)
-    said = "L4TM has no shot noise for TM3, only thermal; type noise='all'"
-    with pytest.raises(ValueError, match=said):
-        fifesim.compare(lai, ["MSI", "L4TM"], fifesim.Setup(noise=("shot", "thermal")))
-    with pytest.raises(ValueError, match=said):
-        fifesim.Scenario(sensor={"instrument": "L4TM", "noise": ["shot", "thermal"]})
-    with pytest.raises(ValueError, match="TM has no fixed-pattern noise for TM3, only thermal"):
-        fifesim.Scenario(sensor={"noise": ["thermal", "fixed-pattern"], "noise_model": {"thermal": 0.4}})
-    images = fifesim.compare(lai, ["MSI", "L4TM"], fifesim.Setup(noise="all"))
-    assert images["L4TM"]["dn"].attrs["history"].endswith("noise all, seed 0")
 
 
 def test_all_noise_is_every_kind_that_a_band_has_and_models_may_be_given():

@@ -17,7 +17,7 @@ from fifesim.grids import grid as grids
 from fifesim.sensor.description.instrument_file import Noise, Scan
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response.scan import growth, place_beside, view_components, view_from_ground
-from fifesim.sensor.scan_labels import at_pixels, latitude_longitude, seen_alike
+from fifesim.sensor.scan_labels import latitude_longitude, seen_alike
 
 # ------------------------------------------------------------------------------------------ view angles
 
@@ -117,14 +117,6 @@ def test_the_message_says_what_makes_it_right(site):
     assert float(image["vza"].mean()) == pytest.approx(float(view["vza"].mean()), abs=1e-3)
 
 
-def test_light_from_the_other_side_is_refused(site):
-    """Its zenith angle is right, and its azimuth is not."""
-    west = fifesim.scan_geometry("TM", site, **AWAY)
-    wrong = Geometry(30.0, 120.0, float(west["vza"].mean()), (float(west["vaa"].mean()) + 180) % 360)
-    with pytest.raises(ValueError, match=r"10\.[78] degrees apart"):
-        light(site, wrong).fifesim.sense_swath("TM", **AWAY)
-
-
 def test_lazy_angles_are_looked_at_when_it_computes(site):
     view = fifesim.scan_geometry("TM", site, **AWAY, chunks=20).assign(sza=30.0, saa=120.0)
     with no_compute():
@@ -134,19 +126,6 @@ def test_lazy_angles_are_looked_at_when_it_computes(site):
     xr.testing.assert_identical(right.compute(), eager)
     with pytest.raises(ValueError, match="another view"):
         wrong.compute()
-
-
-def test_pixels_have_the_angles_of_the_cells_in_which_they_lie():
-    values = np.arange(12.0).reshape(3, 4)
-    row, column = np.array([[-0.2, 0.9], [2.0, 3.7]]), np.array([[0.0, 1.5], [3.99, 9.0]])
-    for data in (values, da.from_array(values, chunks=(2, 3))):
-        geometry = xr.Dataset(
-            {"sza": (("x", "y"), data.T), "saa": 120.0, "vza": 0.0, "vaa": 0.0, "earth_sun_distance": 1.0}
-        )
-        found = at_pixels(geometry, row, column)
-        np.testing.assert_array_equal(found["sza"], [[0, 1], [11, 11]])
-        assert found["sza"].dims == ("line", "sample") and float(found["saa"]) == 120
-    assert at_pixels(Geometry(30.0, 120.0), row, column) == Geometry(30.0, 120.0)
 
 
 def test_no_data_are_seen_from_anywhere():
@@ -502,12 +481,3 @@ def test_zones_and_sweeps_are_the_same_in_any_chunks(chunks, monkeypatch):
     with no_compute():
         lazy = fifesim.sense_swath(in_chunks(rough, chunks), "VIIRS", **view)
     xr.testing.assert_identical(lazy.compute(), whole)
-
-
-def test_indices_of_a_sweep_keep_what_a_map_needs():
-    view = {"nadir_offset": OFFSETS["VIIRS"][55], "view_tolerance": 180, "min_valid": 0.0}
-    pair = xr.concat(
-        [wide_scene("VIIRS"), 2 * wide_scene("VIIRS").assign_coords(band=["I2"])], "band", combine_attrs="override"
-    )
-    ndvi = fifesim.sense_swath(pair.assign_attrs(units="W m-2 sr-1 um-1"), "VIIRS", **view).fifesim.ndvi()
-    assert {"sweep", "deleted"} <= set(ndvi.coords)

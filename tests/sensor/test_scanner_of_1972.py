@@ -11,7 +11,6 @@ from fifesim.grids import directions
 from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response.calibration import radiance_to_dn
-from fifesim.sensor.response.noise import NoiseModel
 
 MSS = instrument("MSS")
 NAMES = [band.name for band in MSS.bands]
@@ -66,24 +65,6 @@ def test_file_brings_the_scale_back_and_tells_a_gis_no_linear_one(image, tmp_pat
     rasterio = pytest.importorskip("rasterio")
     with rasterio.open(path) as file:
         assert set(file.scales) == {1.0} and set(file.offsets) == {0.0}
-
-
-def test_own_lines_are_79_m_and_samples_57_m(radiance):
-    native = fifesim.sense(radiance, "MSS", interval="native")
-    np.testing.assert_allclose(grids.cell_size(grids.geobox(native)), (79.0, 57.0), rtol=1e-4)
-
-
-def test_six_detectors_stripe_every_sixth_line():
-    grid = fifesim.fife_site(20.0, window=((0, 120), (0, 12)))
-    array = xr.DataArray(np.full((1, *grid.shape), 90.0), dims=("band", "y", "x"), coords={"band": ["MSS5"]})
-    array.attrs["units"] = "W m-2 sr-1 um-1"
-    flat = directions.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
-    model = NoiseModel(thermal=0.0, shot=0.0, detectors=6, gain_spread=0.02)
-    seen = fifesim.sense(flat, "MSS", noise="fixed-pattern", seed=1, noise_models=model, quantise=False)
-    inside = seen.values[0, 1:-1, 1:-1]
-    np.testing.assert_allclose(inside, np.broadcast_to(inside[:, :1], inside.shape), rtol=1e-12)
-    assert len(np.unique(inside[:, 0].round(6))) == 6
-    np.testing.assert_allclose(inside[6:], inside[:-6], rtol=1e-12)
 
 
 def test_fourth_band_of_the_first_scanner_is_not_that_of_the_last(image):

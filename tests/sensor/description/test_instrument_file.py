@@ -4,11 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
+import fifesim
+from fifesim.base.bands import GREEN
+from fifesim.sensor.description.fields import Count, Name, Number, Positive, Share, band_called, false_colour_bands
 from fifesim.sensor.description.instrument_file import Gain, Noise, Scan
-from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.instruments import instrument, instrument_names
 
-SOURCE = ('\n[sources]\nproduct = "Chander2009"', "\n[sources]")
 PRODUCT = "[product]\ngain = 2e-5\noffset = -0.1\nbits = 16\nsun_corrected = false\n\n[lsf]"
 
 
@@ -106,36 +109,8 @@ def test_gain_states_change_places():
         dataclasses.replace(own, limits=(0.69, 0.63))
 
 
-FIRST = 'name = "TM1"'
-MISTAKES = [
-    (("interval = 43.0e-6", "interval = { along = 43.0e-6 }"), "the key interval.across is missing"),
-    (("interval = 43.0e-6", "interval = '43 urad'"), "interval = '43 urad': .*number"),
-    ((FIRST, FIRST + "\ngains.nominal = { full_scale_radiance = 1.0, min_radiance = 0.0 }"), "own gain"),
-    ((FIRST, FIRST + "\nnoise = { radiance = 50.0 }"), "bands.1.noise: give either snr or nedl"),
-    ((FIRST, FIRST + "\nnoise = { radiance = 50.0, snr = 100.0 }"), "sources.noise: must be one of"),
-    (("max_angle = 7.47", "max_angle = 90.0"), "scan.max_angle = 90.0: must be below 75"),
-    (('kind = "whiskbroom"', 'kind = "frame"'), "scan.kind = 'frame': .*'whiskbroom' or 'pushbroom'"),
-    (("[lsf]", PRODUCT), r"sources\.product: must be one of"),
-]
-MISTAKES += [
-    (("[lsf]", PRODUCT.replace(old, new), *SOURCE[::-1]), said)
-    for old, new, said in (
-        ("2e-5", "-2e-5", r"product\.gain = -2e-05: must be above 0"),
-        ("bits = 16\nsun", "bits = 32\nsun", r"product\.bits = 32: must be at most 16"),
-        ("false", '"no"', r"product\.sun_corrected = 'no'"),
-        ("\noffset = -0.1", "", r"the key product\.offset is missing"),
-    )
-]
-
-
-@pytest.mark.parametrize(("replacements", "message"), MISTAKES, ids=lambda each: each if isinstance(each, str) else "")
-def test_mistakes_in_parts_of_a_file_name_key_and_remedy(changed, replacements, message):
-    with pytest.raises(ValueError, match=f"mine.toml: .*{message}"):
-        changed(*replacements)
-
-
 def test_the_scale_of_a_product_is_read(changed):
-    product = changed("[lsf]", PRODUCT, *SOURCE[::-1]).product
+    product = changed("[lsf]", PRODUCT, "\n[sources]", '\n[sources]\nproduct = "Chander2009"').product
     assert (product.gain, product.offset, product.bits, product.sun_corrected) == (2e-5, -0.1, 16, False)
 
 
@@ -164,3 +139,86 @@ def test_noise_by_its_ratio_and_by_its_radiance_is_the_same():
 def test_second_point_of_the_noise_is_complete_and_higher(keys, message):
     with pytest.raises(ValueError, match=message):
         Noise(radiance=22.0, snr=230.0, **keys)
+
+
+# ------------------------------------------------------------------------------------------- fields and names
+
+
+@pytest.mark.parametrize(
+    ("field", "right", "wrong"),
+    [
+        (Number, (-1.5, 0, 3), ("1.5", True, float("nan"), float("inf"))),
+        (Positive, (1e-9, 2), (0, -1.0, "1", float("inf"))),
+        (Count, (1, 16), (0, 1.0, "1", True)),
+        (Share, (0.5, 1e-3), (0.0, 1.0, 30.0)),
+        (Name, ("TM", "B 3", "röd"), ("", 5, "B\x1b[31m", "B\n", "B" * 201)),
+    ],
+)
+def test_a_field_takes_its_own_kind_alone(field, right, wrong):
+    adapter = TypeAdapter(field)
+    assert [adapter.validate_python(value) for value in right] == list(right)
+    for value in wrong:
+        with pytest.raises(ValidationError):
+            adapter.validate_python(value)
+
+
+def test_names_of_no_band_have_none():
+    """Numbers behind another word, and what the instrument lacks; VIIRS counts two kinds of bands."""
+    for name in ("nir1", "NIR_2", "re1", "tir1", "pan1", "vis06", "wvp2"):
+        assert all(band_called(name, instrument(each)) is None for each in ("OLI", "MSI", "MODIS", "TM")), name
+    for name in ("B6", "QA_PIXEL", "pan", "cirrus", "", "TM33"):
+        assert band_called(name, instrument("TM")) is None, name
+    viirs = instrument("VIIRS")
+    assert [band_called(name, viirs).name for name in ("M03", "i3", "red", "M11", 11)] == [
+        "M3",
+        "I3",
+        "M5",
+        "M11",
+        "M11",
+    ]
+    assert band_called("B3", viirs) is None and band_called("Landsat-5", viirs) is None
+    assert band_called(7, instrument("TM")).name == "TM7"
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_false_colours_share_a_grid(name):
+    own = instrument(name)
+    *green, red, near_infrared = false_colour_bands(own)
+    assert (red, near_infrared) == tuple(own.red_and_near_infrared())
+    for band in green:
+        assert GREEN.low <= band.wavelength <= GREEN.high
+        assert own.pixel(band) == own.pixel(red) == own.pixel(near_infrared)
+    known = {"TM": "TM2", "OLI": "OLI3", "MSI": "MSI3"}
+    assert name not in known or green[0].name == known[name]
+
+
+def _numbers(**changes):
+    tm = instrument("TM")
+    names = ("name", "title", "altitude", "gsd", "interval", "bits", "lsf", "bands", "sources", "references", "ifov")
+    return {name: getattr(tm, name) for name in names} | changes
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"altitude": -1.0}, "Instrument: altitude = -1.0: must be above 0"),
+        ({"bits": 40}, "Instrument: bits = 40: must be at most 16"),
+        ({"altitdue": 1.0}, "Instrument: unknown argument altitdue, did you mean 'altitude'"),
+        ({"references": {}}, "Instrument: sources.altitude: must be one of"),
+    ],
+)
+def test_an_instrument_made_in_python_refuses_in_own_words(changes, said):
+    with pytest.raises(ValueError) as caught:
+        fifesim.Instrument(**_numbers(**changes))
+    assert str(caught.value).startswith(said)
+    assert "pydantic" not in str(caught.value) and len(str(caught.value)) <= 500
+
+
+def test_an_instrument_made_in_python_needs_its_arguments_and_is_made_of_right_ones():
+    assert fifesim.Instrument(**_numbers(altitude=800e3)).altitude == 800e3
+    numbers = _numbers()
+    del numbers["gsd"]
+    with pytest.raises(ValueError, match=r"^Instrument: the argument gsd is missing$"):
+        fifesim.Instrument(**numbers)
+    with pytest.raises(ValueError, match=r"^Instrument: gsd = 'wide': must be a number$"):
+        dataclasses.replace(instrument("TM"), gsd="wide")

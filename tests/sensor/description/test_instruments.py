@@ -1,4 +1,4 @@
-"""Instruments by name and from files of one's own, and what is said of mistakes in them."""
+"""Instruments by name and from files: mistakes with key, value and remedy, units, short files and tables."""
 
 import os
 import shutil
@@ -7,10 +7,13 @@ import sys
 
 import numpy as np
 import pytest
+from paper_file import paper_text
 
+import fifesim
 from fifesim.base import files
+from fifesim.base.bands import solar_irradiance
 from fifesim.sensor.description.instrument_file import Instrument
-from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.instruments import instrument, read_instrument
 
 TM_FILE = files.path("instruments/tm.toml")
 
@@ -42,29 +45,94 @@ def test_a_file_of_ones_own_is_read(changed):
     np.testing.assert_allclose(mine.ground_interval, 0.129, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("bits = 8 ", "bitz = 8 ", "mine.toml: .*bits is missing; unknown key bitz, did you mean 'bits'"),
-        ("bits = 8 ", "bits = 8.5 ", "mine.toml: bits = 8.5: must be a whole number"),
-        ("bits = 8 ", "bits = 32 ", "mine.toml: bits = 32: .*16"),
-        ("= 705000.0", "= '705 km'", "mine.toml: altitude = '705 km': .*number"),
-        ("= 705000.0", "= -705000.0", "mine.toml: altitude = -705000.0: must be above 0"),
-        ('"cosine"', '"sinc"', "mine.toml: lsf.kind = 'sinc': it must be one of 'cosine', 'boxcar'"),
-        ('kind = "cosine"', "", "mine.toml: the key lsf.kind is missing"),
-        ("count = 9", "count = 0", "mine.toml: lsf.count = 0: must be above 0"),
-        ('kind = "cosine"', 'kind = "boxcar"', "mine.toml: unknown key lsf.step; unknown key lsf.count"),
-        ("= -1.5  ", "= 300.0  ", "bands.4: full_scale_radiance must be above min_radiance, got 206.2 and 300"),
-        ("= 83.44", "= nan", "bands.6.solar_irradiance = nan: .*finite"),
-        ('altitude = "Friedl1995"', 'altitude = "nobody"', "sources.altitude: must be one of .* got 'nobody'"),
-        ('solar_irradiance = "Chander2009"', "", "sources.solar_irradiance: must be one of"),
-        ('name = "TM2"', 'name = "TM1"', "each name may occur once"),
-        ("gsd = 30.0", "gsd = ", "mine.toml is not valid TOML"),
-    ],
-)
-def test_mistakes_in_a_file_name_the_key_and_the_value(changed, old, new, message):
-    with pytest.raises(ValueError, match=message):
-        changed(old, new)
+FIRST = 'name = "TM1"'
+BITS = 'bits = "Friedl1995"'
+PYRSR = 'srf = { satellite = "Landsat-5", sensor = "TM", band = "3" }'
+LSF = paper_text()[paper_text().index('kind = "cosine"') : paper_text().index("[scan]")]
+PRODUCT = "[product]\ngain = 2e-5\noffset = -0.1\nbits = 16\nsun_corrected = false\n\n[lsf]"
+SOURCE = ("\n[sources]", '\n[sources]\nproduct = "Chander2009"')
+
+
+def srf(text):
+    """Another response of the third band, between whose limits it must be."""
+    return PYRSR, f"srf = {{ {text} }}\nlimits = [0.63, 0.69]", BITS, f'{BITS}\nlimits = "NASA2013"'
+
+
+MISTAKES = [
+    # Keys and kinds of values.
+    (("bits = 8 ", "bitz = 8 "), "bits is missing; unknown key bitz, did you mean 'bits'"),
+    (("bits = 8 ", "bits = 8.5 "), "bits = 8.5: must be a whole number"),
+    (("bits = 8 ", "bits = 32 "), "bits = 32: .*16"),
+    (("= 705000.0", "= '705 km'"), "altitude = '705 km': .*number"),
+    (("= 705000.0", "= -705000.0"), "altitude = -705000.0: must be above 0"),
+    (("interval = 43.0e-6", "interval = { along = 43.0e-6 }"), "the key interval.across is missing"),
+    (("interval = 43.0e-6", "interval = '43 urad'"), "interval = '43 urad': .*number"),
+    (("= -1.5  ", "= 300.0  "), "bands.4: full_scale_radiance must be above min_radiance, got 206.2 and 300"),
+    (("= 83.44", "= nan"), "bands.6.solar_irradiance = nan: .*finite"),
+    (('altitude = "Friedl1995"', 'altitude = "nobody"'), "sources.altitude: must be one of .* got 'nobody'"),
+    (('solar_irradiance = "Chander2009"', ""), "sources.solar_irradiance: must be one of"),
+    (('name = "TM2"', FIRST), "each name may occur once"),
+    (("gsd = 30.0", "gsd = "), "is not valid TOML"),
+    ((FIRST, FIRST + "\ngains.nominal = { full_scale_radiance = 1.0, min_radiance = 0.0 }"), "own gain"),
+    ((FIRST, FIRST + "\nnoise = { radiance = 50.0 }"), "bands.1.noise: give either snr or nedl"),
+    ((FIRST, FIRST + "\nnoise = { radiance = 50.0, snr = 100.0 }"), "sources.noise: must be one of"),
+    (("max_angle = 7.47", "max_angle = 90.0"), "scan.max_angle = 90.0: must be below 75"),
+    (('kind = "whiskbroom"', 'kind = "frame"'), "scan.kind = 'frame': .*'whiskbroom' or 'pushbroom'"),
+    (("[lsf]", PRODUCT), r"sources\.product: must be one of"),
+    (("[lsf]", PRODUCT.replace("2e-5", "-2e-5"), *SOURCE), r"product\.gain = -2e-05: must be above 0"),
+    (("[lsf]", PRODUCT.replace("false", '"no"'), *SOURCE), r"product\.sun_corrected = 'no'"),
+    (("[lsf]", PRODUCT.replace("\noffset = -0.1", ""), *SOURCE), r"the key product\.offset is missing"),
+    # Spatial responses.
+    (('"cosine"', '"sinc"'), "lsf.kind = 'sinc': it must be one of 'cosine', 'boxcar'"),
+    (('kind = "cosine"', ""), "the key lsf.kind is missing"),
+    (("count = 9", "count = 0"), "lsf.count = 0: must be above 0"),
+    (('kind = "cosine"', 'kind = "boxcar"'), "unknown key lsf.step; unknown key lsf.count"),
+    ((LSF, 'kind = "boxcar"\n'), "bands.1.lsf: kind 'boxcar' needs the instantaneous field of view: add ifov"),
+    ((LSF, 'kind = "gaussian"\n'), "lsf: give one of fwhm, mtf_at_nyquist and eifov, got none"),
+    ((LSF, 'kind = "gaussian"\nmtf_at_nyquist = 30.0\n'), "lsf.mtf_at_nyquist = 30.0: must be below 1"),
+    ((LSF, 'kind = "table"\nangles = [0.0, 1e-5]\nvalues = [1.0]\n'), "lsf.values = .*needs 2 of them or more"),
+    (("[lsf] ", "#", LSF, '[lsf.along]\nkind = "boxcar"\n'), "the key lsf.across is missing"),
+    # Spectral responses.
+    (srf("wavelength = [620, 630, 690, 700], response = [0, 1, 1, 0]"), "wavelengths are in um.*nm: divide by 1000"),
+    (srf("wavelength = [0.62, 0.63, 0.69], response = [0, 1, 0.9]"), "does not cover the band: at 0.69 um, where its"),
+    (srf("wavelength = [0.64, 0.65, 0.66], response = [0, 1, 0]"), "does not cover the band from 0.63 to 0.69 um"),
+    (srf("wavelength = [0.62, 0.61, 0.69], response = [0, 1, 0]"), "bands.3.*wavelengths must increase"),
+    (srf("wavelength = [0.62, 0.69], response = [0, -1]"), "bands.3.*must not be negative"),
+    (srf("wavelength = [0.62, 0.69]"), "the key bands.3.srf.response is missing"),
+    (srf("response = [0, 1]"), "the key bands.3.srf.wavelength is missing"),
+    (srf('table = "none.csv", satellite = "A", band = "1"'), "srf.table = 'none.csv': no such file beside"),
+    (srf('table = "avhrr_response.csv", satellite = "NOAA-9", band = "3"'), "has no NOAA-9 3: it has .*NOAA-11 2"),
+    (
+        ('sensor = "TM", band = "7"', 'sensor = "TM", band = "9"'),
+        "bands.6.srf: pyrsr has no .* Landsat-5 TM 9",
+    ),
+    # Numbers in another unit than that of their key.
+    (("altitude = 705000.0", "altitude = 705.0"), "altitude = 705: it is in metres.*multiply by 1000"),
+    (("interval = 43.0e-6", "interval = 43.0e-3"), "interval = 0.043: angles are in radians"),
+    (("interval = 43.0e-6", "interval = 0.0024637"), "interval = 0.0024637: it is in radians.*degrees, so multiply"),
+    (("= 1536.0", "= 153.6"), "bands.3.solar_irradiance = 153.6: it is in W m-2 um-1.*1550.7.*times 10"),
+    (("= 1536.0", "= 1.536"), "bands.3.solar_irradiance = 1.536: .*W m-2 nm-1 times 1000"),
+    (("= 206.2 ", "= 2000.0 "), "bands.4.full_scale_radiance = 2000: it is in W m-2 sr-1 um-1"),
+    (("max_angle = 7.47", "max_angle = 0.13"), "scan: max_angle = 0.13 degrees gives a swath of 3 km.*in degrees"),
+    (("swath = 185000.0", "swath = 185.0"), "scan: .*swath = 185 m; .*swath in metres"),
+    (("gsd = 30.0", "gsd = 0.03"), "interval = 4.3e-05: .*unless gsd is in kilometres"),
+    (("step = 4.778e-6", "step = 4.778e-3"), "bands.1.lsf: its angles are in radians.*milliradians times 1e-3"),
+    (("step = 4.778e-6", "step = 4.778e-8"), "bands.1.lsf: its angles are in radians"),
+    (
+        ("bits = 8 ", "ifov = 2.4351e-3\nbits = 8 ", BITS, f'{BITS}\nifov = "Friedl1995"'),
+        "bands.1.ifov = 0.0024351: it is in radians, and 56.6 times the interval; degrees times pi / 180",
+    ),
+    (
+        (FIRST, FIRST + "\nnoise = { radiance = 500.0, snr = 100.0 }", BITS, f'{BITS}\nnoise = "Friedl1995"'),
+        "noise.radiance = 500: it is in W m-2 sr-1 um-1 and must lie between",
+    ),
+]
+
+
+@pytest.mark.parametrize(("replacements", "message"), MISTAKES, ids=[message for _, message in MISTAKES])
+def test_mistakes_in_a_file_name_key_value_and_remedy(changed, replacements, message):
+    with pytest.raises(ValueError, match=f"mine.toml.*{message}"):
+        changed(*replacements)
 
 
 def test_a_file_that_would_wait_or_break_is_refused(tmp_path):
@@ -98,3 +166,227 @@ def test_an_instrument_called_as_its_file_is_found_without_reading_the_others():
     code = "import fifesim.sensor.description.instruments as i; tm = i.instrument('Tm'); count = i._listed.cache_info()"
     code += ".currsize; assert count == 1, count; assert i.instrument('Landsat 5') is tm"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+# ------------------------------------------------------------------------------------------- units
+
+
+def test_every_radiance_in_milliwatts_is_found_out(changed):
+    """The tables of Markham and Barker (1986) are in mW cm-2 sr-1 um-1: a tenth of the numbers here."""
+    tenths = []
+    for text in ("152.10", "296.81", "204.3", "206.2", "27.19", "14.38"):
+        tenths += [f"full_scale_radiance = {text}", f"full_scale_radiance = {float(text) / 10}"]
+    with pytest.raises(ValueError, match=r"mine.toml: bands.full_scale_radiance: .*no band records more than 6%"):
+        changed(*tenths)
+
+
+@pytest.mark.parametrize(
+    ("angle", "message"),
+    [
+        ("0.9669", "scan: .*2048 x 0.00095 radians, reach 55.7 degrees to either side, and max_angle = 0.9669 degrees"),
+        ("60.0", "scan: .*reach 55.7 degrees to either side, and max_angle = 60 degrees"),
+        ("70.0", "scan.max_angle = 70: .*misses the earth"),
+    ],
+)
+def test_a_scan_without_a_swath_is_compared_with_its_samples_and_the_horizon(tmp_path, angle, message):
+    """2048 samples of 0.95 mrad are 55.7 degrees to either side; the horizon from 833 km is at 62.2."""
+    text = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
+    path = tmp_path / "mine.toml"
+    path.write_text(text.replace("max_angle = 55.4", f"max_angle = {angle}"), encoding="utf-8")
+    with pytest.raises(ValueError, match=f"mine.toml: {message}"):
+        read_instrument(path)
+
+
+def test_sums_of_samples_are_counted_as_what_they_are_made_of(tmp_path):
+    """6400 equal samples as wide as the sums at nadir would reach 86 degrees; the zones of VIIRS reach 56."""
+    text = files.path("instruments/viirs.toml").read_text(encoding="utf-8")
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    assert read_instrument(path).scan.elementary_samples() == 12608
+    start, end = text.index("[[scan.zones]]"), text.index("[origin]")
+    path.write_text((text[:start] + text[end:]).replace("0.00015582", "0.00046746"), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"6400 x 0.00046746 radians, reach 85.7 degrees.*\[\[scan.zones\]\]"):
+        read_instrument(path)
+    for old, new, message in (
+        ("samples = 736", "samples = 737", "half of samples = 6400, got 3201"),
+        ("deleted = 4", "deleted = 16", "deleted = 16 at each end leaves none of lines = 32"),
+        ("aggregation = 2", "aggregation = 0", "scan.zones.2.aggregation = 0"),
+    ):
+        path.write_text(text.replace(old, new), encoding="utf-8")
+        with pytest.raises(ValueError, match=message):
+            read_instrument(path)
+
+
+@pytest.mark.parametrize(("angle", "fits"), [(30.0, True), (33.08, True), (36.0, False), (27.0, False)])
+def test_a_flat_row_of_detectors_has_equal_steps_of_the_tangent(tmp_path, angle, fits):
+    """1000 pixels of 0.1 m from 86.6 m: half of the row is 50 / 86.6, the tangent of 30 degrees, or 33.08 degrees."""
+    bands = '[{ name = "red", center = 0.668, width = 0.010 }]'
+    scan = f'{{ kind = "pushbroom", max_angle = {angle}, samples = 1000 }}'
+    path = tmp_path / "camera.toml"
+    text = f'name = "Camera"\naltitude = 86.6\ngsd = 0.1\nbits = 12\nscan = {scan}\nbands = {bands}\n'
+    path.write_text(text, encoding="utf-8")
+    if fits:
+        assert read_instrument(path).scan.samples == 1000
+        return
+    with pytest.raises(ValueError, match="samples of red times interval, 1000 x 0\\.00115473 radians"):
+        read_instrument(path)
+
+
+@pytest.mark.parametrize("table", ["pipe.csv", "folder.csv", "/dev/zero", "a" * 5000, "loop.csv"])
+def test_a_table_that_is_no_file_is_refused_at_once(changed, tmp_path, table):
+    """A pipe would be waited for."""
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "folder.csv").mkdir()
+    (tmp_path / "loop.csv").symlink_to("loop.csv")
+    table = str(tmp_path / table) if table == "pipe.csv" else table
+    with pytest.raises(ValueError, match="srf"):
+        changed(PYRSR, f'srf = {{ table = "{table}", satellite = "X", band = "1" }}')
+
+
+# ------------------------------------------------------------------------------------------- short files
+
+
+CAMERA = """
+name = "Camera"
+altitude = 120.0
+gsd = 0.1
+bits = 12
+bands = [
+    { name = "red", center = 0.668, width = 0.010, snr = 200.0, snr_radiance = 100.0 },
+    { name = "nir", center = 0.840, width = 0.040, shape = "boxcar", full_scale_radiance = 300.0 },
+]
+"""
+TABLE = """name,center,width,snr,snr_radiance
+red,0.668,0.010,200,100
+nir,0.840,0.040,,
+"""
+
+
+def read(folder, text):
+    path = folder / "camera.toml"
+    path.write_text(text, encoding="utf-8")
+    return fifesim.read_instrument(path)
+
+
+def test_ten_lines_make_an_instrument(tmp_path):
+    camera = read(tmp_path, CAMERA)
+    red, nir = camera.bands
+    assert len(CAMERA.split()) and len(CAMERA.strip().splitlines()) < 10
+    assert (red.wavelength, nir.wavelength) == (pytest.approx(0.668, abs=1e-9), pytest.approx(0.840, abs=1e-9))
+    assert camera.ground_interval == pytest.approx(0.1, rel=1e-12)
+    assert camera.line_spread.width == pytest.approx(0.1, rel=1e-12)
+    assert red.noise.equivalent_radiance == 0.5 and nir.noise is None
+    assert (nir.full_scale_radiance, nir.min_radiance, red.min_radiance) == (300.0, 0.0, 0.0)
+
+
+def test_response_has_its_width_at_half_of_its_maximum(tmp_path):
+    red, nir = (band.response for band in read(tmp_path, CAMERA).bands)
+    half = np.interp([0.663, 0.668, 0.673], red.wavelength, red.response)
+    np.testing.assert_allclose(half, [0.5, 1.0, 0.5], rtol=0, atol=1e-9)
+    assert np.interp([0.8201, 0.8599, 0.8199, 0.8601], nir.wavelength, nir.response).tolist() == [1, 1, 0, 0]
+    # A Gaussian's area is its width times sqrt(pi / ln 2) / 2, but for its cut ends.
+    area = np.trapezoid(red.response, red.wavelength)
+    assert area == pytest.approx(0.010 * np.sqrt(np.pi / np.log(2)) / 2, rel=1e-3)
+
+
+def test_sun_and_range_are_those_of_the_reference_spectrum_and_say_so(tmp_path):
+    camera = read(tmp_path, CAMERA)
+    red, nir = camera.bands
+    assert red.solar_irradiance == solar_irradiance(red.response)
+    assert red.full_scale_radiance == pytest.approx(red.solar_irradiance / np.pi, rel=1e-15)
+    assert camera.source("solar_irradiance", red).startswith("ASTM G173-03")
+    assert camera.source("full_scale_radiance", red).startswith("taken for a white surface")
+    assert camera.source("full_scale_radiance", nir) == "as camera.toml says"
+    assert camera.source("interval").startswith("taken for gsd over altitude")
+    assert camera.source("noise", red) == "as camera.toml says"
+
+
+def test_bands_may_stand_in_a_table_beside_the_file(tmp_path):
+    (tmp_path / "bands.csv").write_text(TABLE)
+    camera = read(tmp_path, 'name = "Camera"\naltitude = 120.0\ngsd = 0.1\nbits = 12\nbands = "bands.csv"\n')
+    red, nir = camera.bands
+    assert red == read(tmp_path, CAMERA).bands[0] and nir.noise is None
+    assert nir.wavelength == pytest.approx(0.840, abs=1e-9)
+
+
+def test_a_table_that_changed_is_read_again(tmp_path):
+    (tmp_path / "bands.csv").write_text(TABLE)
+    path = tmp_path / "camera.toml"
+    path.write_text('name = "Camera"\naltitude = 120.0\ngsd = 0.1\nbits = 12\nbands = "bands.csv"\n')
+    assert fifesim.instrument(path) is fifesim.instrument(path)
+    (tmp_path / "bands.csv").write_text(TABLE.replace("0.668", "0.6500"))
+    assert fifesim.instrument(path).bands[0].wavelength == pytest.approx(0.65, abs=1e-9)
+
+
+def test_share_of_shot_noise_stands_beside_the_ratio(tmp_path):
+    red, _ = read(tmp_path, CAMERA.replace("snr_radiance = 100.0", "snr_radiance = 100.0, snr_shot = 0.75")).bands
+    assert (red.noise.equivalent_radiance, red.noise.shot) == (0.5, 0.75)
+
+
+def test_two_ratios_determine_the_noise_at_every_radiance(tmp_path):
+    second = "snr_radiance = 100.0, high_snr = 350.0, high_snr_radiance = 250.0"
+    camera = read(tmp_path, CAMERA.replace("snr_radiance = 100.0", second))
+    model = camera.noise_model(camera.bands[0])
+    assert model.snr([100.0, 250.0]).tolist() == pytest.approx([200.0, 350.0], rel=1e-12)
+
+
+def test_blur_is_stated_by_the_transfer_at_the_nyquist_frequency(tmp_path):
+    def transfer(camera, number):
+        spreads, steps = camera.line_spreads(camera.bands[number]), camera.ground_intervals(camera.bands[number])
+        return [float(spread.mtf(0.5 / step)) for spread, step in zip(spreads, steps, strict=True)]
+
+    own = 'bits = 12\nmtf_at_nyquist = { along = 0.2, across = 0.3 }\norigin = { blur = { kind = "required" } }'
+    text = CAMERA.replace("bits = 12", own)
+    camera = read(tmp_path, text.replace('name = "nir"', 'name = "nir", mtf_at_nyquist = 0.15'))
+    np.testing.assert_allclose(transfer(camera, 0), [0.2, 0.3], rtol=1e-9)
+    np.testing.assert_allclose(transfer(camera, 1), 0.15, rtol=1e-9)
+    blur, noise, lacking, place = camera.provenance
+    assert (blur.quantity, blur.bands, blur.origin) == ("blur", ("red", "nir"), "required")
+    assert (noise.bands, noise.origin, lacking.bands, lacking.origin) == (("red",), "assumed", ("nir",), "unknown")
+    assert (place.quantity, place.origin) == ("geolocation", "unknown")
+    with pytest.raises(ValueError, match="mtf_at_nyquist and lsf both state the blur"):
+        read(tmp_path, text.replace("bits = 12", 'bits = 12\nlsf = { kind = "boxcar" }'))
+    with pytest.raises(ValueError, match=r"lsf\.across\.mtf_at_nyquist = 1.3: must be below 1"):
+        read(tmp_path, text.replace("0.3", "1.3"))
+    with pytest.raises(ValueError, match=r"origin\.blur\.kind = 'guessed': .*'in-flight', 'pre-launch'"):
+        read(tmp_path, text.replace("required", "guessed"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("center = 0.668", "center = 668.0", "camera.toml: .*center = 668: .*nm: divide by 1000"),
+        ("width = 0.010", "width = 10.0", "bands.1.srf: width = 10: it is in um, and too wide"),
+        ("width = 0.010, ", "", "bands.1.srf.width is missing"),
+        ('"boxcar"', '"triangle"', "bands.2.srf.shape = 'triangle'"),
+        (", snr_radiance = 100.0", "", "bands.1.noise.radiance is missing"),
+        ("gsd = 0.1", "gzd = 0.1", "gsd is missing"),
+        ("altitude = 120.0", "altitude = 0.12", "altitude = 0.12|interval = 0.8"),
+    ],
+)
+def test_mistake_in_a_short_file_is_one_line(tmp_path, old, new, said):
+    assert old in CAMERA
+    with pytest.raises(ValueError, match=said) as caught:
+        read(tmp_path, CAMERA.replace(old, new))
+    assert "\n" not in str(caught.value) and len(str(caught.value)) <= 500
+
+
+@pytest.mark.parametrize("name", ["../bands.csv", "/bands.csv", "bands.csv/"])
+def test_table_lies_beside_its_file(tmp_path, name):
+    (tmp_path / "bands.csv").write_text(TABLE)
+    folder = tmp_path / "own"
+    folder.mkdir()
+    name = str(tmp_path) + name if name.startswith("/") else name
+    with pytest.raises(ValueError, match="no such file beside it; type a CSV file of bands"):
+        read(folder, f'name = "Camera"\naltitude = 120.0\ngsd = 0.1\nbits = 12\nbands = "{name}"\n')
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [(None, "bands = 'bands.csv': no such file beside it"), ("name,center\nred,0.6\n", "lacks the columns width")],
+)
+def test_table_that_is_none_is_told(tmp_path, table, said):
+    if table:
+        (tmp_path / "bands.csv").write_text(table)
+    with pytest.raises(ValueError, match=f"camera.toml: .*{said}"):
+        read(tmp_path, 'name = "Camera"\naltitude = 120.0\ngsd = 0.1\nbits = 12\nbands = "bands.csv"\n')

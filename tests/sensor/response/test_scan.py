@@ -73,21 +73,6 @@ def test_directions_agree_with_vectors_in_space(place, altitude):
     assert float(across) == pytest.approx(distance / altitude / np.cos(np.radians(vza)), rel=1e-5)
 
 
-def test_growth_is_how_the_ground_turns_with_the_scan():
-    """Across the track: the derivative of the way over the ground by the scan angle, over the altitude."""
-    theta, step = np.array([0.0, 10.0, 30.0, 55.0]), 1e-3
-    ground = np.radians(view_from_scan(theta + step, 833e3)[1] - view_from_scan(theta - step, 833e3)[1])
-    expected = EARTH_RADIUS * ground / np.radians(2 * step) / 833e3
-    np.testing.assert_allclose(growth(theta, 833e3)[1], expected, rtol=1e-6)
-
-
-def test_places_come_back():
-    distance, aside = np.array([-3e5, 0.0, 4e5]), np.array([-8.0, 0.0, 5.0])
-    back = place_beside(TRACK, *place_of(TRACK, distance, aside))
-    np.testing.assert_allclose(back[0], distance, rtol=0, atol=1e-6)
-    np.testing.assert_allclose(back[1], aside, rtol=0, atol=1e-12)
-
-
 def test_what_lies_beyond_the_horizon_is_missing():
     assert np.isnan(view_from_scan(70.0, 833e3)[0])
     assert np.isnan(view_from_ground(30.0, 833e3)).all()
@@ -114,15 +99,6 @@ def test_tracks_that_cannot_be_are_refused():
         Track(0.0, np.nan, 0.0)
     with pytest.raises(ValueError, match="does not reach latitude 85"):
         Track.from_inclination(85.0, 0.0, 98.2, 705e3)
-
-
-@pytest.mark.parametrize("angle", [0.5, 7.5, 30.0, 55.4])
-def test_swath_is_an_arc_whose_chord_closes_the_triangle(angle):
-    """Law of sines in the triangle of satellite, ground and earth's centre."""
-    half = swath_width(833e3, angle) / 2 / EARTH_RADIUS
-    vza = np.radians(angle) + half
-    assert (EARTH_RADIUS + 833e3) * np.sin(np.radians(angle)) == pytest.approx(EARTH_RADIUS * np.sin(vza), rel=1e-12)
-    assert half > 0
 
 
 # ------------------------------------------------------------------------------------------ sweeps
@@ -179,21 +155,6 @@ def test_pixels_of_viirs_are_as_published(band, scan_angle, published):
     np.testing.assert_allclose(pixel_size("VIIRS", band, scan_angle), published, rtol=0.02)
 
 
-@pytest.mark.parametrize(
-    ("scan_angle", "area"),
-    [(0.01, 0.1384), (30.0, 0.2341), (31.5, 0.2483), (31.8, 0.1676), (44.6, 0.3443), (44.9, 0.1759), (55.0, 0.5230)],
-)
-def test_areas_of_viirs_follow_its_zones(scan_angle, area):
-    """
-    Areas of I pixels by W. Schroeder (NOAA), in km2, within 3 % of a side.
-
-    A fit of degree 5 in NASA's fire emission code is evaluated at the samples that have these angles by design, with
-    0.1552 mrad between two elementary samples.
-    """
-    along, across = pixel_size("VIIRS", "I1", scan_angle)
-    assert np.sqrt(along * across * 1e-6) == pytest.approx(np.sqrt(area), rel=0.03)
-
-
 def test_a_sweep_of_viirs_grows_as_published():
     """ATBD: from 11.87 km at nadir to 25.60 km at 56.063 degrees."""
     pattern, altitude = pattern_of("VIIRS", "M5")
@@ -223,10 +184,6 @@ def test_places_of_detectors_agree_with_rays_in_space():
         found = place_of(track, distance + ahead, aside)
         expected = np.degrees(np.arcsin(z)), np.degrees(np.arctan2(y, x))
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
-
-
-def test_a_line_of_sight_beside_the_earth_has_no_place():
-    assert np.isnan(ground_of_detector(0.1, 70.0, 833e3)).all()
 
 
 @pytest.mark.parametrize("band", ["I1", "M5"])

@@ -42,24 +42,6 @@ def test_mean_is_the_integral_of_the_straight_spectrum(spectrum, sun):
         assert found.weights @ values == pytest.approx(by_quadrature(band, wavelength, values, sun), rel=1e-9)
 
 
-def test_mean_is_near_that_of_the_band_itself():
-    """`Band.mean` is the trapezoidal rule at 1 nm: it differs from the integral by its error alone."""
-    wavelength, values, _ = leaf_spectrum(Leaf())
-    sun = np.interp(wavelength, *solar_spectrum())
-    for band in BANDS:
-        found = band_weights(band, wavelength, covered_steps(wavelength)).weights @ values
-        assert found == pytest.approx(band.mean(values, wavelength, sun), abs=1e-4)
-
-
-def test_the_sun_draws_a_mean_to_where_it_is_strong():
-    """Between 0.5 and 0.7 um the sun falls with wavelength, so that a rising spectrum has a lower mean below it."""
-    rising = np.array([0.0, 0.5, 1.0])
-    wavelength = np.array([0.4, 0.6, 0.8])
-    with_sun, without = (band_weights(TRIANGLE, wavelength, [True, True], sun=sun).weights @ rising for sun in (1, 0))
-    assert without == pytest.approx(0.5, abs=1e-12)
-    assert 0.48 < with_sun < 0.4999
-
-
 def test_flat_spectrum_stays_flat_and_a_band_elsewhere_has_no_weights(spectrum):
     wavelength, _ = spectrum
     sums = [band_weights(band, wavelength, covered_steps(wavelength)).weights.sum() for band in BANDS]
@@ -118,24 +100,6 @@ def test_means_agree_with_spectral_python():
 # ------------------------------------------------------------------------------------------ other bands
 
 
-@pytest.fixture
-def library():
-    """Spectra of 500 leaves, 8 of each, in 6 bands."""
-    return np.random.Generator(np.random.Philox(2)).uniform(0.05, 0.5, (500, 8, 6))
-
-
-def test_estimate_is_least_squares_with_noisy_bands(library):
-    """With as many noisy copies of the library as one likes, ordinary least squares finds the same weights."""
-    truth = library @ np.array([0.5, 0.2, 0.0, 0.3, 0.0, -0.1])
-    noise = 0.05 * np.random.Generator(np.random.Philox(3)).standard_normal(library.shape)
-    found = best_linear(library, truth[..., None], 0.05)
-    noisy = (library + noise).reshape(-1, 6)
-    by_squares, *_ = np.linalg.lstsq(noisy, truth.ravel(), rcond=None)
-    np.testing.assert_allclose(found.weights[0], by_squares, atol=0.02)
-    left = np.sqrt(np.mean((truth.ravel() - noisy @ found.weights[0]) ** 2))
-    assert found.error[0] == pytest.approx(left, rel=0.03)
-
-
 def test_error_is_that_of_fits_without_each_leaf():
     """Few leaves of few library, so that each has much influence, fitted again without each of them."""
     random = np.random.Generator(np.random.Philox(5))
@@ -154,12 +118,6 @@ def test_error_is_that_of_fits_without_each_leaf():
     errors = [target[leaf] - source[leaf] @ fitted(leaves[leaves != leaf]).T for leaf in leaves]
     expected = np.mean(np.square(errors), axis=(0, 1)) + uncertainty**2 * np.sum(found.weights**2, axis=1)
     np.testing.assert_allclose(found.error**2, expected, rtol=1e-10)
-
-
-def test_a_band_that_is_there_is_itself(library):
-    found = best_linear(library, library, 1e-6)
-    np.testing.assert_allclose(found.weights, np.eye(6), atol=1e-6)
-    assert np.all(found.error < 1e-5)
 
 
 def test_line_is_that_of_a_fit():

@@ -1,14 +1,17 @@
-"""Spatial responses of instrument files: the transfer that each says it has."""
+"""Spatial responses of instrument files have the stated transfer; spectral responses in a list, a table and pyrsr."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from paper_file import paper_text
+from pyrsr.rsr import RSR_reader
 
+from fifesim.base.bands import Band
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.provenance import band_provenance
 from fifesim.sensor.description.spatial_response import knows_blur, with_response
+from fifesim.sensor.description.spectral_response import PyrsrResponse, ResponseList, half_peak
 
 TM_TEXT = paper_text()
 LSF = TM_TEXT[TM_TEXT.index('kind = "cosine"') : TM_TEXT.index("[scan]")]
@@ -57,21 +60,6 @@ def test_responses_may_differ_by_axis_and_by_band(changed):
     wider = changed('name = "TM1"', 'name = "TM1"\nlsf = { kind = "boxcar", width = 86.0e-6 }')
     np.testing.assert_allclose(nyquist(wider), np.sinc(1.0), atol=1e-12)
     np.testing.assert_allclose(wider.line_spreads(wider.bands[1]).along.width, 30.31641, rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("replacements", "message"),
-    [
-        ((LSF, 'kind = "boxcar"\n'), "bands.1.lsf: kind 'boxcar' needs the instantaneous field of view: add ifov"),
-        ((LSF, 'kind = "gaussian"\n'), "lsf: give one of fwhm, mtf_at_nyquist and eifov, got none"),
-        ((LSF, 'kind = "gaussian"\nmtf_at_nyquist = 30.0\n'), "lsf.mtf_at_nyquist = 30.0: must be below 1"),
-        ((LSF, 'kind = "table"\nangles = [0.0, 1e-5]\nvalues = [1.0]\n'), "lsf.values = .*needs 2 of them or more"),
-        (("[lsf] ", "#", LSF, '[lsf.along]\nkind = "boxcar"\n'), "the key lsf.across is missing"),
-    ],
-)
-def test_mistakes_in_a_response_name_key_and_remedy(changed, replacements, message):
-    with pytest.raises(ValueError, match=f"mine.toml: .*{message}"):
-        changed(*replacements)
 
 
 def test_blur_and_smear_are_parts_of_the_system(changed):
@@ -131,3 +119,34 @@ def test_ends_of_the_uncertainty_are_that_far_from_the_best_transfer(name):
 def test_responses_that_no_file_has(name, response, said):
     with pytest.raises(ValueError, match=said):
         instrument(name, response)
+
+
+# ------------------------------------------------------------------------------------------- spectral responses
+
+
+PYRSR = '{ satellite = "Landsat-5", sensor = "TM", band = "3" }'
+
+
+def test_a_response_written_out_or_in_a_table_beside_the_file_is_read(changed, tmp_path):
+    rows = "wavelength = [0.60, 0.63, 0.69, 0.72], response = [0.0, 1.0, 1.0, 0.0]"
+    mine = changed(f"srf = {PYRSR}", f"srf = {{ {rows} }}")
+    # A trapezoid is centred on its middle.
+    np.testing.assert_allclose(mine.select("TM3")[0].wavelength, 0.66, rtol=1e-12)
+    table = "satellite,band,wavelength,response\nX,1,0.60,0\nX,1,0.63,1\nX,1,0.69,1\nX,1,0.72,0\n"
+    (tmp_path / "own.csv").write_text("# columns\n" + table, encoding="utf-8")
+    other = changed(f"srf = {PYRSR}", 'srf = { table = "own.csv", satellite = "X", band = "1" }')
+    assert other.select("TM3")[0].response == mine.select("TM3")[0].response
+
+
+def test_response_of_pyrsr_is_in_micrometres_and_not_negative():
+    """It holds TM in nanometres or micrometres; noise below zero is none."""
+    found = PyrsrResponse("Landsat-5", "TM", "3").read("TM3")
+    theirs = RSR_reader("Landsat-5", "TM", LayerBandsAssignment=["3"])["3"]
+    assert 0.5 < found.wavelength[0] < 0.66 < found.wavelength[-1] < 0.8 and min(found.response) >= 0
+    np.testing.assert_allclose(found.response, np.maximum(theirs[:, 1], 0))
+
+
+def test_limits_lie_at_half_of_the_maximum():
+    found = ResponseList((0.5, 0.6, 0.7, 0.8, 0.9), (0.0, 1.0, 2.0, 1.0, 0.9)).read("a")
+    assert found == Band("a", (0.5, 0.6, 0.7, 0.8, 0.9), (0.0, 1.0, 2.0, 1.0, 0.9))
+    assert half_peak(found) == (0.6, 0.8)
