@@ -16,7 +16,7 @@ import prosail
 WAVELENGTH = np.arange(400, 2501) / 1000
 STEP = 0.01  # of the dead grass as distributed [um]
 DEAD_GRASS = {"dead_grass": "deadgras", "golden_grass": "goldgras"}
-# Spectra of the library of `fifesim.ground.canopy.library`, and spectra to check it with.
+# Spectra of the library of `fifesim.ground.canopy.spectra`, and spectra to check it with.
 SOILS, LITTER, HELD_OUT = 60, 12, 40
 SEED = 5
 

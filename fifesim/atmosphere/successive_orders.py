@@ -7,7 +7,7 @@ import numpy as np
 from fifesim.atmosphere.aerosols import SCALE_HEIGHT
 from fifesim.atmosphere.column import mixed_column, stokes_basis, wigner
 from fifesim.atmosphere.gases import DEPOLARIZATION, rayleigh_anisotropy, rayleigh_phase
-from fifesim.base.arrays import compiled, jitable
+from fifesim.base.arrays import compiled
 from fifesim.base.caches import cached
 from fifesim.base.geometry import scattering_angle_cosine
 
@@ -191,23 +191,16 @@ def _by_layers(light, matrix):
     return np.concatenate([light[first : first + step] @ matrix for first in range(0, len(light), step)])
 
 
-@compiled
 def _scattered(weighted, basis, mixing):
     """Coefficients of the source that a weighted field generates by scattering, shape (layers, basis)."""
-    incident = np.dot(weighted, basis)
-    source = np.empty(incident.shape)
     layers, degrees, components, _ = mixing.shape
-    for k in range(layers):
-        for i in range(source.shape[1]):
-            source[k, i] = 0.0
-        for to in range(components):
-            for of in range(components):
-                for degree in range(degrees):
-                    source[k, to * degrees + degree] += mixing[k, degree, to, of] * incident[k, of * degrees + degree]
-    return source
+    incident, source = (weighted @ basis).reshape(layers, components, degrees), np.zeros((layers, components, degrees))
+    for of in range(components):
+        source += np.moveaxis(mixing[..., of], 1, 2) * incident[:, None, of]
+    return source.reshape(layers, -1)
 
 
-@jitable
+@compiled
 def _travel(source, through, averaged, field):
     """Fill in the mean over each layer of the light from homogeneous sources in all layers, without incident light."""
     layers, size = source.shape
@@ -224,15 +217,7 @@ def _travel(source, through, averaged, field):
                 rising = source[under, up] + (rising - source[under, up]) * through[j]
 
 
-@jitable
-def _add(field, share, total):
-    """Add a share of a field to a total."""
-    for k in range(field.shape[0]):
-        for i in range(field.shape[1]):
-            total[k, i] += field[k, i] * share
-
-
-@jitable
+@compiled
 def _weighted(field, weights, out):
     """Fill in a weighted field; return the sum of its magnitude."""
     strength = 0.0
@@ -251,25 +236,24 @@ def _sum_orders(source, mode, least, tolerance):
     return total, _add_orders(source, mode, np.ascontiguousarray(mode.basis.T), least, tolerance, total)
 
 
-@compiled
 def _add_orders(source, mode, backward, least, tolerance, total):
     field, weighted = np.empty(source.shape), np.empty(source.shape)
     size, last, last_ratio = 0.0, 0.0, 2.0
     for _ in range(MOST_ORDERS):
         _travel(source, mode.through, mode.averaged, field)
-        _add(field, 1.0, total)
+        total += field
         strength = _weighted(field, mode.weights, weighted)
         size += strength
         ratio = strength / last if last > 0 else 0.0
         if last > 0 and ratio < 1:
             left = strength * abs(ratio - last_ratio) / ((1 - ratio) * (1 - ratio))
             if left <= tolerance * (size if size > least else least):
-                _add(field, ratio / (1 - ratio), total)
+                total += field * (ratio / (1 - ratio))
                 return size
         if not strength > 0:
             break
         last, last_ratio = strength, ratio
-        source = np.dot(_scattered(weighted, mode.basis, mode.mixing), backward)
+        source = _scattered(weighted, mode.basis, mode.mixing) @ backward
     return size
 
 

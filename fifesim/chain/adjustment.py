@@ -24,7 +24,7 @@ from fifesim.grids.dates import by_date
 from fifesim.grids.directions import Directions
 from fifesim.grids.inputs import Image, RasterOrDataset
 from fifesim.grids.reductions import combined
-from fifesim.ground.canopy.library import library_spectra
+from fifesim.ground.canopy.spectra import library_spectra
 from fifesim.sensor import labels as sensor
 from fifesim.sensor.band_labels import MIN_COVERAGE
 from fifesim.sensor.description.fields import AlongAcross
@@ -91,7 +91,7 @@ def adjust_bands(
 
     See Also
     --------
-    fifesim.sensor.response.spectral.best_linear, fifesim.ground.canopy.library.library_spectra
+    fifesim.sensor.response.spectral.best_linear, fifesim.ground.canopy.spectra.library_spectra
 
     Examples
     --------

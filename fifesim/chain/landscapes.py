@@ -32,7 +32,7 @@ from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS, check_map
 from fifesim.ground.canopy.optics import DEAD_LEAF
 from fifesim.ground.canopy.properties import NUMERIC_PROPERTIES, PROPERTIES
 from fifesim.ground.canopy.reflectance_table import scene_reflectance, surface_table
-from fifesim.ground.canopy.upright import upright_reflectance
+from fifesim.ground.canopy.sail_model import upright_reflectance
 from fifesim.ground.landscape.classes import CoverClass
 from fifesim.ground.landscape.labels import classes_of
 from fifesim.ground.terrain import labels as terrain_labels

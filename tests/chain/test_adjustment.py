@@ -12,7 +12,7 @@ from fifesim.chain import adjustment
 from fifesim.chain.adjustment import UNCERTAINTY, _beside
 from fifesim.grids import directions
 from fifesim.grids import grid as grids
-from fifesim.ground.canopy.library import library_spectra
+from fifesim.ground.canopy.spectra import library_spectra
 
 # Bands of the MSI nearest to those of the TM.
 NEAREST = {"TM1": "MSI2", "TM2": "MSI3", "TM3": "MSI4", "TM4": "MSI8", "TM5": "MSI11", "TM7": "MSI12"}

@@ -9,25 +9,18 @@ from fifesim.ground.canopy.leaf_angles import RADIANS_PER_DEGREE
 from fifesim.ground.canopy.leaf_area import LARGEST_LAI, check_share
 from fifesim.ground.canopy.sail_model import direction_distance, over_background
 
-SHAPE = 1.0
-"""Crown diameter over height of round crowns [1]."""
+SHAPE = 1.0  # crown diameter over height of round crowns [1]
 
 
 class CrownShares(NamedTuple):
     """Shares of the ground covered by crowns, each 1 for full cover. [1]"""
 
-    cover: np.ndarray
-    """Below crowns, by the vertical: Cv."""
-    sun: np.ndarray
-    """Whose sunbeam goes through a crown: Cs."""
-    view: np.ndarray
-    """Whose view does: Co."""
-    both: np.ndarray
-    """Of which both do: Cso."""
-    apart: np.ndarray
-    """What both share beyond chance: Cso - Cs Co."""
-    lit: np.ndarray
-    """Weight of the crowns in sunlight that an observer sees."""
+    cover: np.ndarray  # below crowns, by the vertical: Cv
+    sun: np.ndarray  # whose sunbeam goes through a crown: Cs
+    view: np.ndarray  # whose view does: Co
+    both: np.ndarray  # of which both do: Cso
+    apart: np.ndarray  # what both share beyond chance: Cso - Cs Co
+    lit: np.ndarray  # weight of the crowns in sunlight that an observer sees
 
 
 def crown_shares(crown_cover, crown_shape, sza, vza, raa):
@@ -62,11 +55,6 @@ def crown_shares(crown_cover, crown_shape, sza, vza, raa):
     References
     ----------
     [VerhoefBach2007]_; [Nilson1971]_
-
-    Examples
-    --------
-    >>> float(crown_shares(1.0, 1.0, 60.0, 0.0, 0.0).both)
-    1.0
     """
     gap = 1 - numbers(crown_cover)
     sun_path, view_path = (1 / np.cos(numbers(angle) * RADIANS_PER_DEGREE) for angle in (sza, vza))
@@ -103,15 +91,6 @@ def clumped(canopy, shares):
     References
     ----------
     [VerhoefBach2007]_; its errors in scenes of [Widlowski2007]_ are in the physics page
-
-    Examples
-    --------
-    Crowns that cover the ground are the canopy itself:
-
-    >>> from fifesim.ground.canopy.sail_model import sail
-    >>> canopy = sail(2.0, 0.45, 0.42, sza=30)
-    >>> bool(clumped(canopy, crown_shares(1.0, 1.0, 30, 0, 0)).rso == canopy.rso)
-    True
     """
     c, s = canopy, shares
     return c._replace(
@@ -132,21 +111,15 @@ def clumped(canopy, shares):
 class CrownTerms(NamedTuple):
     """Terms of the leaves within crowns that `crowns_over_background` needs, 0 without leaves. [1]"""
 
-    seen: np.ndarray
-    """Sunlight's share times rso."""
-    seen_in_skylight: np.ndarray
-    """Skylight's share times rdo."""
-    kept: np.ndarray
-    """Sunlight's share times that which does not come through, 1 - tss - tsd."""
-    kept_of_skylight: np.ndarray
-    """Skylight's share times 1 - tdd."""
-    hidden: np.ndarray
-    """Of the ground's light, 1 - too - tdo."""
+    seen: np.ndarray  # sunlight's share times rso
+    seen_in_skylight: np.ndarray  # skylight's share times rdo
+    kept: np.ndarray  # sunlight's share times that which does not come through, 1 - tss - tsd
+    kept_of_skylight: np.ndarray  # skylight's share times 1 - tdd
+    hidden: np.ndarray  # of the ground's light, 1 - too - tdo
     rdd_below: np.ndarray
+    # Sunlight's share times what sun and observer see together of the ground beyond chance, tsstoo - tss too.
     hot: np.ndarray
-    """Sunlight's share times what sun and observer see together of the ground beyond chance, tsstoo - tss too."""
-    missed: np.ndarray
-    """Sunlight's share times (1 - tss) (1 - too)."""
+    missed: np.ndarray  # sunlight's share times (1 - tss) (1 - too)
 
 
 def crown_terms(canopy, sky):
@@ -166,31 +139,10 @@ def crown_terms(canopy, sky):
 
 @jitable
 def crowns_over_background(terms, shares, background):
-    r"""
-    Reflectance factor of crowns and gaps over a background, from terms of the crowns.
-
-    Parameters
-    ----------
-    terms : sequence of 8 arrays
-        Those of `CrownTerms`. [1]
-    shares : sequence of 5 arrays
-        Fields ``cover``, ``sun``, ``view``, ``direction_distance`` and ``lit`` of `CrownShares`. [1]
-    background : array
-        [1]
-
-    Returns
-    -------
-    reflectance : array
-        That of `clumped` `with_background` to rounding, mixed by `reflectance_factor`. [1]
-
-    References
-    ----------
-    [VerhoefBach2007]_
-
-    Examples
-    --------
-    >>> crowns_over_background((0.0,) * 8, (0.5, 0.5, 0.5, 0.0, 0.5), 0.15)
-    0.15
+    """
+    Reflectance factor of crowns and gaps over a background, from `CrownTerms` and the shares of `CrownShares`. [1]
+    Shares are ``cover``, ``sun``, ``view``, ``apart`` and ``lit``. Equals `clumped` `with_background` to rounding,
+    mixed by `reflectance_factor`. [VerhoefBach2007]_
     """
     seen, seen_in_skylight, kept, kept_of_skylight, hidden, rdd, gaps, missed = terms
     cover, sun, view, apart, lit = shares

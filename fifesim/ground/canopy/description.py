@@ -51,8 +51,7 @@ NumberByCell: TypeAlias = Annotated[
 ]
 
 
-MODELS_OF_LEAVES = ("sail", "discrete-ordinates")
-"""Models of radiative transfer in leaves."""
+MODELS_OF_LEAVES = ("sail", "discrete-ordinates")  # models of radiative transfer in leaves
 
 # A smaller hot spot is narrower than the solar disc. [1]
 LEAST_HOTSPOT = 1e-6
@@ -218,8 +217,7 @@ class Canopy:
 
 PARTS["canopy"] = "fifesim.Canopy", tuple(PROPERTIES)
 
-TALLGRASS = Canopy()
-"""The default canopy: green tallgrass of the FIFE site."""
+TALLGRASS = Canopy()  # the default canopy: green tallgrass of the FIFE site
 
 
 def is_raster(value):

@@ -10,11 +10,9 @@ from fifesim.ground.canopy.crowns import crown_shares, crowns_over_background
 from fifesim.ground.canopy.leaf_area import LARGEST_LAI
 from fifesim.ground.canopy.sail_model import over_background
 
-LARGEST_TABLE_LAI = LARGEST_LAI
-"""Largest leaf area index in a table."""
+LARGEST_TABLE_LAI = LARGEST_LAI  # largest leaf area index in a table
 
-RUN = 1024
-"""Cells whose places in a table are found together: they stay in the nearest cache."""
+RUN = 1024  # cells whose places in a table are found together: they stay in the nearest cache
 
 _COARSEST = 32
 _FINEST = 2**16
@@ -24,10 +22,8 @@ class LaiTable(NamedTuple):
     """Cubic splines of functions of leaf area index, on nodes that are equidistant in rate LAI / (1 + rate LAI)."""
 
     rate: float
-    step: float
-    """Intervals per unit of rate LAI / (1 + rate LAI)."""
-    coefficients: np.ndarray
-    """Of polynomials over the unit interval, constant term first, shape (interval, column, 4)."""
+    step: float  # intervals per unit of rate LAI / (1 + rate LAI)
+    coefficients: np.ndarray  # of polynomials over the unit interval, constant term first, shape (interval, column, 4)
 
 
 def tabulate(function, rate, combine=None, tolerance=1e-6):
@@ -129,19 +125,16 @@ def _interpolate_over(lai, background, table, values):
                 out[k] = over_background(alone, hot, through, rdd, below[k])
 
 
-LARGEST_FOLIAGE_LAI = 50.0
-"""Largest leaf area index in a table [m2 m-2]; canopies beyond are evaluated one by one."""
+LARGEST_FOLIAGE_LAI = 50.0  # largest leaf area index in a table [m2 m-2]; canopies beyond are evaluated one by one
 
-FOLIAGE_TOLERANCE = 4e-7
-"""Of each of two axes; together, and with the rounding of single precision, within 1e-6 [1]."""
+FOLIAGE_TOLERANCE = 4e-7  # of each of two axes; together, and with the rounding of single precision, within 1e-6 [1]
 
 _COARSEST_FOLIAGE = 33, 33
 _FINEST_FOLIAGE = 2**20  # nodes in all
 
 _LINE = 64  # of a processor's cache [byte]
 
-TERMS = 8
-"""Columns of `FoliageTable` for each band where crowns differ from cell to cell."""
+TERMS = 8  # columns of `FoliageTable` for each band where crowns differ from cell to cell
 
 
 class FoliageTable(NamedTuple):
@@ -154,10 +147,8 @@ class FoliageTable(NamedTuple):
     """
 
     rate: float
-    steps: np.ndarray
-    """Intervals per unit of each axis."""
-    coefficients: np.ndarray
-    """Shape (L, fB, column), in single precision."""
+    steps: np.ndarray  # intervals per unit of each axis
+    coefficients: np.ndarray  # shape (L, fB, column), in single precision
 
 
 def tabulate_foliage(function, rate, by_brown=True, combine=None):

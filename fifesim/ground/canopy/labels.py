@@ -17,7 +17,6 @@ from fifesim.grids.grid import north_up, with_crs_of
 from fifesim.grids.inputs import unpacked
 from fifesim.grids.windows import made_of
 from fifesim.ground.canopy import layers
-from fifesim.ground.canopy.absorption import scene_light
 from fifesim.ground.canopy.crowns import SHAPE, check_crowns, crown_shares, lai_in_crowns
 from fifesim.ground.canopy.description import Canopy
 from fifesim.ground.canopy.leaf_area import check_map, warn_of_large
@@ -25,27 +24,23 @@ from fifesim.ground.canopy.properties import NUMERIC_PROPERTIES
 from fifesim.ground.canopy.reflectance_table import (
     Scene,
     directional_reflectance,
+    scene_light,
     scene_reflectance,
     uniform_scene,
     with_shares,
 )
 
-CELL_SHARES = ("brown", "dissociation", "crown_cover")
-"""Properties that may vary by cell in SAIL."""
+CELL_SHARES = ("brown", "dissociation", "crown_cover")  # properties that may vary by cell in SAIL
 
 
 class BandCanopy(NamedTuple):
     """Canopy with its optics in each band."""
 
     canopy: Canopy
-    leaf: tuple
-    """Reflectance and transmittance, shape (band,), or rasters over (band, y, x). [1]"""
-    dead: tuple | None
-    """The same of dead leaves; None without any."""
-    background: np.ndarray | xr.DataArray
-    """Shape (band,), or a raster over ([band], y, x). [1]"""
-    soil_changes: tuple | None = None
-    """Kernel that makes the background of each cell from a dry one, and its rasters."""
+    leaf: tuple  # reflectance and transmittance, shape (band,), or rasters over (band, y, x). [1]
+    dead: tuple | None  # the same of dead leaves; None without any
+    background: np.ndarray | xr.DataArray  # shape (band,), or a raster over ([band], y, x). [1]
+    soil_changes: tuple | None = None  # kernel that makes the background of each cell from a dry one, and its rasters
 
 
 class Light(NamedTuple):
@@ -199,8 +194,7 @@ def _background_bands(background, bands):
     return background if known == list(bands) else background.sel(band=list(bands))
 
 
-ABSORBING = ("leaf_angles", *CELL_SHARES)
-"""Properties of the canopy that the light absorbed by its leaves depends on."""
+ABSORBING = ("leaf_angles", *CELL_SHARES)  # properties of the canopy that the light absorbed by its leaves depends on
 
 
 def level_reflectance(lai, bands, stand, light, exact=False, attrs=MappingProxyType({})):
@@ -251,8 +245,7 @@ def _same(one, other):
     return isinstance(one, str | float | int) and isinstance(other, str | float | int) and one == other
 
 
-_NAMES = {"sail": "SAIL", "discrete-ordinates": "discrete ordinates"}
-"""Names of the models in a history."""
+_NAMES = {"sail": "SAIL", "discrete-ordinates": "discrete ordinates"}  # names of the models in a history
 
 
 def _labelled(reflectance, lai, bands, geometry, angles, shares, attrs, model):

@@ -21,49 +21,17 @@ from fifesim.ground.canopy.sail_model import (
 class Layers(NamedTuple):
     """Leaf areas and dead shares of two layers; fields broadcast against each other."""
 
-    lai: np.ndarray
-    """Leaf area of the upper layer. [m2 m-2]"""
-    lai_below: np.ndarray
-    """And of the lower one. [m2 m-2]"""
-    brown: np.ndarray
-    """Dead share of the leaf area in the upper layer. [1]"""
-    brown_below: np.ndarray
-    """And in the lower one. [1]"""
+    lai: np.ndarray  # leaf area of the upper layer. [m2 m-2]
+    lai_below: np.ndarray  # and of the lower one. [m2 m-2]
+    brown: np.ndarray  # dead share of the leaf area in the upper layer. [1]
+    brown_below: np.ndarray  # and in the lower one. [1]
 
 
 def leaf_layers(lai, brown, dissociation):
     r"""
-    Leaf areas of two layers, and their dead shares.
-
-    .. math::
-
-        L_1 &= (1 - f_B) \, L, \quad & b_1 &= (1 - D) \, f_B \\
-        L_2 &= f_B \, L, & b_2 &= 1 - (1 - D) (1 - f_B)
-
-    Parameters
-    ----------
-    lai : array
-        Leaf area of the canopy, :math:`L`. [m2 m-2]
-    brown : array
-        Dead share of it, :math:`f_B`. [1]
-    dissociation : array
-        :math:`D`: 0 where all leaves are mixed, 1 where the dead ones lie below. [1]
-
-    Returns
-    -------
-    layers : Layers
-
-    References
-    ----------
-    [VerhoefBach2007]_
-
-    Examples
-    --------
-    The dead leaf areas of both layers add up to the total:
-
-    >>> layers = leaf_layers(3.0, 0.4, 0.5)
-    >>> round(float(layers.lai * layers.brown + layers.lai_below * layers.brown_below), 12)
-    1.2
+    Leaf areas of two layers, and their dead shares, [VerhoefBach2007]_. :math:`L_1 = (1 - f_B) \, L, \quad b_1 = (1 -
+    D) \, f_B \quad L_2 = f_B \, L, b_2 = 1 - (1 - D) (1 - f_B)` with the leaf area L [m2 m-2], its dead share
+    :math:`f_B` and the dissociation D: 0 where all leaves are mixed, 1 where the dead ones lie below.
     """
     lai, brown, mixed = numbers(lai), numbers(brown), 1 - numbers(dissociation)
     return Layers((1 - brown) * lai, brown * lai, mixed * brown, 1 - mixed * (1 - brown))
@@ -112,15 +80,6 @@ def two_layers(
     References
     ----------
     [VerhoefBach2007]_; [Kuusk1991]_
-
-    Examples
-    --------
-    Leaves that are alike are one canopy, wherever they lie:
-
-    >>> from fifesim.ground.canopy.sail_model import sail
-    >>> both = two_layers(3.0, 0.45, 0.42, 0.45, 0.42, brown=0.4, dissociation=0.7, sza=30, hotspot=0.1)
-    >>> bool(abs(both.rso - sail(3.0, 0.45, 0.42, sza=30, hotspot=0.1).rso) < 1e-14)
-    True
     """
     raa = folded(raa)
     green, dead = (leaf_reflectance, leaf_transmittance), (brown_reflectance, brown_transmittance)
@@ -170,15 +129,6 @@ def added(top, bottom):
     References
     ----------
     [Verhoef1985]_
-
-    Examples
-    --------
-    Half a canopy over the other half:
-
-    >>> from fifesim.ground.canopy.sail_model import sail
-    >>> half, whole = (sail(lai, 0.45, 0.42, sza=30) for lai in (1.0, 2.0))
-    >>> bool(abs(added(half, half).rso - whole.rso) < 1e-14)
-    True
     """
     back_and_forth = 1 / (1 - top.rdd_below * bottom.rdd)
     up = (top.tss * bottom.rsd + top.tsd * bottom.rdd) * back_and_forth
@@ -202,8 +152,7 @@ def added(top, bottom):
     )
 
 
-FPAR_INF = 0.94
-"""FPAR of an infinitely thick canopy [1]; Friedl et al. (1995), below Eq. 6."""
+FPAR_INF = 0.94  # FPAR of an infinitely thick canopy [1]; Friedl et al. (1995), below Eq. 6.
 
 
 def extinction_coefficient(sza, leaf_angles="spherical"):
@@ -228,13 +177,6 @@ def extinction_coefficient(sza, leaf_angles="spherical"):
     References
     ----------
     [Monteith1990]_
-
-    Examples
-    --------
-    The projection of horizontal leaves is their area for any position of the sun:
-
-    >>> float(round(extinction_coefficient(60.0, "0: 1"), 12))
-    1.0
     """
     leaf_angles = leaf_angle_classes(leaf_angles)
     mu_s = np.cos(np.radians(np.asarray(sza, float)))
@@ -246,34 +188,9 @@ def extinction_coefficient(sza, leaf_angles="spherical"):
 
 def beer_fpar(lai, extinction, fpar_inf=FPAR_INF):
     r"""
-    Fraction of photosynthetically active radiation absorbed by a canopy, by Beer's law.
-
-    .. math:: \mathrm{FPAR} = \mathrm{FPAR}_\infty \left[ 1 - e^{-K \, \mathrm{LAI}} \right]
-
-    Parameters
-    ----------
-    lai : array
-        Leaf area index. NaN gives NaN. [m2 m-2]
-    extinction : array
-        Extinction coefficient :math:`K`; `extinction_coefficient` gives it. [1]
-    fpar_inf : array, optional
-        FPAR of an infinitely thick canopy. [1]
-
-    Returns
-    -------
-    fpar : array, shape of the broadcast inputs
-        [1]
-
-    References
-    ----------
-    [Friedl1995]_, Eq. 6
-
-    Examples
-    --------
-    Bare ground absorbs nothing:
-
-    >>> float(beer_fpar(0.0, 0.57))
-    0.0
+    Fraction of photosynthetically active radiation absorbed by a canopy, by Beer's law, [Friedl1995]_, Eq. 6. [1]
+    :math:`\mathrm{FPAR} = \mathrm{FPAR}_\infty \left[ 1 - e^{-K \, \mathrm{LAI}} \right]` with the leaf area index [m2
+    m-2] and the `extinction_coefficient` K [1]. NaN gives NaN.
     """
     return -fpar_inf * np.expm1(-np.asarray(extinction, float) * np.asarray(lai, float))
 
@@ -309,11 +226,6 @@ def green_fpar(lai, extinction, brown, dissociation=0.0, fpar_inf=FPAR_INF):
     References
     ----------
     [Friedl1995]_, Eq. 6; [Hall1992]_
-
-    Examples
-    --------
-    >>> bool(np.isclose(green_fpar(2.0, 0.57, 0.25), 0.75 * beer_fpar(2.0, 0.57)))
-    True
     """
     if not np.ndim(dissociation) and dissociation == 0:
         return (1 - np.asarray(brown, float)) * beer_fpar(lai, extinction, fpar_inf)
@@ -381,12 +293,6 @@ def light_budget(
     References
     ----------
     [VerhoefBach2007]_
-
-    Examples
-    --------
-    >>> budget = light_budget(3.0, 0.07, 0.04, 0.28, 0.12, 0.15, brown=0.3, dissociation=0.5, sza=30)
-    >>> round(float(sum(budget)), 12)
-    1.0
     """
     optics = (leaf_reflectance, leaf_transmittance), (brown_reflectance, brown_transmittance)
     terms, canopy = light_terms(
@@ -408,18 +314,12 @@ def light_budget(
 class LightTerms(NamedTuple):
     """Light of a canopy over black ground, and of a canopy lit from below. [1]"""
 
-    green: np.ndarray
-    """Absorbed by green leaves over black ground."""
-    brown: np.ndarray
-    """And by dead leaves."""
-    down: np.ndarray
-    """Reaches black ground."""
-    green_below: np.ndarray
-    """Absorbed by green leaves from diffuse light of 1 from below."""
-    brown_below: np.ndarray
-    """And by dead leaves."""
-    rdd_below: np.ndarray
-    """Reflected back to the ground from diffuse light of 1."""
+    green: np.ndarray  # absorbed by green leaves over black ground
+    brown: np.ndarray  # and by dead leaves
+    down: np.ndarray  # reaches black ground
+    green_below: np.ndarray  # absorbed by green leaves from diffuse light of 1 from below
+    brown_below: np.ndarray  # and by dead leaves
+    rdd_below: np.ndarray  # reflected back to the ground from diffuse light of 1
 
 
 def light_terms(lai, green, dead, *, brown, dissociation, sza, leaf_angles, diffuse_fraction, crown_cover):

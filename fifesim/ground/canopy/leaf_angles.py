@@ -13,30 +13,15 @@ from fifesim.base.arguments import described
 from fifesim.base.caches import cached
 from fifesim.base.messages import closest
 
-RADIANS_PER_DEGREE = math.pi / 180
-"""Unlike numpy.radians, it serves complex angles, for derivatives."""
+RADIANS_PER_DEGREE = math.pi / 180  # unlike numpy.radians, it serves complex angles, for derivatives
 
 
 @dataclass(frozen=True)
 class LeafAngles:
     """
-    Leaf angle distribution: share of the leaf area in each class of inclination.
+    Share of the leaf area (`fraction` [1], sum 1) in classes of inclination between leaf normal and vertical [degree].
 
     ``str`` gives a text from which `leaf_angle_classes` makes the same distribution.
-
-    Parameters
-    ----------
-    inclination : sequence of float, shape (n,)
-        Angle between leaf normal and vertical at the class centres; 0 is a horizontal leaf. [degree]
-    fraction : sequence of float, shape (n,)
-        Share of the leaf area. They sum to 1; rounding is normalised away. [1]
-    name : str, optional
-        Text that `leaf_angle_classes` turns into this distribution, by default inclinations and fractions.
-
-    Raises
-    ------
-    ValueError
-        If an inclination is outside 0 to 90, a fraction is negative, or they do not sum to 1.
     """
 
     inclination: tuple
@@ -113,13 +98,6 @@ def leaf_angle_classes(distribution="spherical", classes=90):
     References
     ----------
     [deWit1965]_; [Verhoef1998]_; [Campbell1990]_
-
-    Examples
-    --------
-    Half of the leaf area of a spherical canopy is steeper than 60 degrees:
-
-    >>> float(round(sum(leaf_angle_classes("spherical").fraction[60:]), 12))
-    0.5
     """
     if isinstance(distribution, str):
         distribution = _parsed(distribution)
@@ -252,37 +230,15 @@ def leaf_projection(inclination, zenith):
     References
     ----------
     [Verhoef1984]_
-
-    Examples
-    --------
-    A horizontal leaf shows its area times the cosine of the zenith angle:
-
-    >>> float(round(leaf_projection(0.0, 60.0), 12))
-    0.5
     """
     beta, cosines, sines = azimuth_limit(inclination, zenith)
     return 2 / np.pi * ((beta - np.pi / 2) * cosines + np.sin(beta) * sines)
 
 
 def azimuth_limit(inclination, zenith):
-    r"""
-    Azimuth at which a leaf turns its other side to a direction.
-
-    Parameters
-    ----------
-    inclination, zenith : array
-        [degree]
-
-    Returns
-    -------
-    beta : array
-        :math:`\beta`; pi where every azimuth shows the same side. [radian]
-    cosines, sines : array
-        :math:`\cos\theta_l \cos\theta` and :math:`\sin\theta_l \sin\theta`. [1]
-
-    References
-    ----------
-    [Verhoef1984]_
+    """
+    Azimuth [radian] at which a leaf turns its other side to a direction; pi where every azimuth shows the same side.
+    Returned with the products of the cosines and of the sines of inclination and zenith [degree], [Verhoef1984]_.
     """
     tilt, slant = np.multiply(inclination, RADIANS_PER_DEGREE), np.multiply(zenith, RADIANS_PER_DEGREE)
     cosines = np.cos(tilt) * np.cos(slant)

@@ -41,14 +41,12 @@ def check_share(name, values):
     return values
 
 
-LARGEST_LAI = 100.0
-"""Largest accepted leaf area index [m2 m-2]; the densest canopies have about 20."""
+LARGEST_LAI = 100.0  # largest accepted leaf area index [m2 m-2]; the densest canopies have about 20
 
+# Largest accepted leaf area index of maps, just above measured canopies; larger values indicate scaling [m2 m-2].
 LARGEST_OF_MAPS = 20.0
-"""Largest accepted leaf area index of maps, just above measured canopies; larger values indicate scaling [m2 m-2]."""
 
-LARGEST_MEAN = 8.0
-"""Mean leaf area index of the densest scenes; a larger mean is a warning [m2 m-2]."""
+LARGEST_MEAN = 8.0  # mean leaf area index of the densest scenes; a larger mean is a warning [m2 m-2]
 
 # Hardly a cell of a map has more. [m2 m-2]
 _COMMON = 10.0

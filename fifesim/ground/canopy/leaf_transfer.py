@@ -67,18 +67,6 @@ def discrete_ordinates(
     References
     ----------
     [Verhoef1984]_, area scattering; [Kuusk1991]_, hot spot
-
-    Examples
-    --------
-    Leaves without absorption conserve energy, and green leaves are 5 % brighter at nadir than by SAIL:
-
-    >>> from fifesim.ground.canopy.sail_model import sail
-    >>> canopy = discrete_ordinates(2.0, 0.5, 0.5, sza=30)
-    >>> float(round(canopy.rsd + canopy.tsd + canopy.tss, 8))
-    1.0
-    >>> green = 2.0, 0.45, 0.42
-    >>> float(round(discrete_ordinates(*green, sza=30).rso / sail(*green, sza=30).rso, 2))
-    1.05
     """
     shape = np.broadcast_shapes(np.shape(lai), np.shape(leaf_reflectance), np.shape(leaf_transmittance))
     given = lai, leaf_reflectance, leaf_transmittance

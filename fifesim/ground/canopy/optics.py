@@ -25,8 +25,8 @@ from fifesim.ground.canopy.spectra import (
     read_spectrum,
 )
 
+# Dead tallgrass: the default leaf without green pigments and with little water; see ``data/README.md``.
 DEAD_LEAF = Leaf(chlorophyll=0.0, carotenoids=0.0, brown=1.0, water=0.001)
-"""Dead tallgrass: the default leaf without green pigments and with little water; see ``data/README.md``."""
 
 # Mixture from which the tables of the TM bands were modelled; see data/README.md.
 _DEFAULT_BACKGROUND = {"soil_dry": 0.475, "shade": 0.525}
@@ -177,8 +177,7 @@ def check_background(reflectance):
     check_share("background reflectance", reflectance)
 
 
-LEAF_TOLERANCE = 1e-8
-"""Of leaf reflectance and transmittance from a table [1]."""
+LEAF_TOLERANCE = 1e-8  # of leaf reflectance and transmittance from a table [1]
 
 _COARSEST, _FINEST = 64, 2**12
 

@@ -8,16 +8,14 @@ class Property(NamedTuple):
 
     default: Any
     meaning: str
-    unit: str = ""
-    """Empty for a property that is not a number."""
+    unit: str = ""  # empty for a property that is not a number
     lowest: float = 0.0
     highest: float = 1.0
-    by_cell: bool = False
-    """Whether it may be a raster over (y, x)."""
-    effect: str = ""
-    """Name of its variation in a budget; a property with an effect may be a random field."""
+    by_cell: bool = False  # whether it may be a raster over (y, x)
+    effect: str = ""  # name of its variation in a budget; a property with an effect may be a random field
 
 
+# Properties by the names of the fields of `fifesim.Canopy`. The module imports no physics, for scenarios as text.
 PROPERTIES = {
     "leaf_optics": Property(None, "optics of green leaves"),
     "leaf_angles": Property("spherical", "leaf angle distribution"),
@@ -32,10 +30,8 @@ PROPERTIES = {
     "soil": Property(0.0, "change of soil reflectance at 0.55 um along the soil line", "1", -1, 1, True, "soil"),
     "moisture": Property(0.0, "moisture of the soil, 0 dry to 1 saturated", "1", by_cell=True, effect="soil"),
 }
-"""Properties by the names of the fields of `fifesim.Canopy`. The module imports no physics, for scenarios as text."""
 
-NUMERIC_PROPERTIES = {name: each for name, each in PROPERTIES.items() if each.unit}
-"""Properties that are numbers."""
+NUMERIC_PROPERTIES = {name: each for name, each in PROPERTIES.items() if each.unit}  # properties that are numbers
 
+# Properties that may be random fields of a landscape.
 DRAWN = {name: each for name, each in PROPERTIES.items() if each.effect}
-"""Properties that may be random fields of a landscape."""

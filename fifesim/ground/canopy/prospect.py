@@ -12,6 +12,7 @@ from fifesim.base.arguments import Array, NumberOrArray, described
 from fifesim.base.arrays import as_rows, compiled, jitable, numbers
 from fifesim.base.caches import cached
 
+# Absorbing constituents of a leaf: unit and largest plausible content.
 CONTENTS = {
     "chlorophyll": ("ug cm-2", 200.0),
     "carotenoids": ("ug cm-2", 100.0),
@@ -20,10 +21,8 @@ CONTENTS = {
     "water": ("cm", 0.2),
     "dry_matter": ("g cm-2", 0.1),
 }
-"""Absorbing constituents of a leaf: unit and largest plausible content."""
 
-LARGEST_STRUCTURE = 10.0
-"""Most layers of a leaf [1]; measured leaves have 1 to 3.5."""
+LARGEST_STRUCTURE = 10.0  # most layers of a leaf [1]; measured leaves have 1 to 3.5
 
 # Half opening of the cone of incident light around the normal of the rough surface. [degree]
 _INCIDENCE = 40.0
@@ -128,14 +127,6 @@ def leaf_spectrum(leaf, limits=(0.4, 2.5)):
     References
     ----------
     [Jacquemoud1990]_; [Feret2017]_
-
-    Examples
-    --------
-    Light that is neither reflected nor transmitted is absorbed, which is most of it in the red:
-
-    >>> wavelength, reflectance, transmittance = leaf_spectrum(Leaf(chlorophyll=40))
-    >>> bool(1 - (reflectance + transmittance)[wavelength == 0.67][0] > 0.8)
-    True
     """
     table = files.table("prospect_d.csv")
     first, last = np.searchsorted(table["wavelength"].to_numpy(), limits)
@@ -149,23 +140,9 @@ def leaf_spectrum(leaf, limits=(0.4, 2.5)):
 
 def leaf_band_means(contents, weights):
     """
-    Means of leaf reflectance and transmittance over bands, without keeping spectra.
-
-    Parameters
-    ----------
-    contents : sequence of 7 arrays
-        Structure and contents, in the order and units of `Leaf`, of shapes (...) that broadcast; NaN gives NaN.
-    weights : array, shape (2101, band)
-        Weight of each wavelength of ``prospect_d.csv``, 0.4 to 2.5 um. [1]
-
-    Returns
-    -------
-    means : array, shape (2, band, ...)
-        Reflectance and transmittance. [1]
-
-    References
-    ----------
-    [Jacquemoud1990]_; [Feret2017]_
+    Means of leaf reflectance and transmittance over bands, shape (2, band, ...), without keeping spectra. [1]
+    `contents` are arrays in the order and units of `Leaf`; `weights` [1] are those of each wavelength of
+    ``prospect_d.csv``, shape (2101, band). NaN gives NaN.
     """
     shape, rows = as_rows(*contents)
     used = np.flatnonzero(weights.any(axis=1))
@@ -227,30 +204,8 @@ def _number(name, value):
 
 def layer_transmissivity(absorption):
     r"""
-    Isotropic transmittance of an absorbing layer, without its surfaces.
-
-    .. math:: \tau = (1 - k) \, e^{-k} + k^2 E_1(k)
-
-    with :math:`E_1` the exponential integral.
-
-    Parameters
-    ----------
-    absorption : array
-        k, absorption coefficient times thickness, not negative. [1]
-
-    Returns
-    -------
-    tau : array
-        [1]
-
-    References
-    ----------
-    [Jacquemoud1990]_
-
-    Examples
-    --------
-    >>> float(layer_transmissivity(0.0))
-    1.0
+    Isotropic transmittance of an absorbing layer without its surfaces [1], from its absorption k [1]. :math:`\tau = (1
+    - k) \, e^{-k} + k^2 E_1(k)` with :math:`E_1` the exponential integral, [Jacquemoud1990]_.
     """
     shape, rows = as_rows(numbers(absorption))
     tau = np.empty_like(rows[0])
@@ -309,11 +264,6 @@ def interface_transmissivity(refractive_index, angle):
     References
     ----------
     [Stern1964]_; [Allen1973]_
-
-    Examples
-    --------
-    >>> interface_transmissivity(1.5, 0.001).round(9).item(), 1 - ((1.5 - 1) / (1.5 + 1)) ** 2
-    (0.96, 0.96)
     """
     n = np.asarray(refractive_index, float)[..., None]
     # Between cos(angle) and 1, as 1 - d: a narrow cone loses no digits.
@@ -328,32 +278,8 @@ def interface_transmissivity(refractive_index, angle):
 
 def plate(refractive_index, tau, angle):
     """
-    Reflectance and transmittance of one layer with two surfaces.
-
-    Parameters
-    ----------
-    refractive_index : array
-        n. [1]
-    tau : array
-        Transmissivity inside, `layer_transmissivity`. [1]
-    angle : float
-        Half opening of the cone of the light upon it. [degree]
-
-    Returns
-    -------
-    reflectance, transmittance : array
-        [1]
-
-    References
-    ----------
+    Reflectance and transmittance of a layer of refractive index n and inner transmissivity `tau`, in a cone of light.
     [Allen1969]_; [Jacquemoud1990]_
-
-    Examples
-    --------
-    A plate without absorption conserves energy:
-
-    >>> bool(abs(sum(plate(1.4, 1.0, 40.0)) - 1) < 1e-14)
-    True
     """
     n = np.asarray(refractive_index, float)
     return _plate(interface_transmissivity(n, angle), interface_transmissivity(n, 90.0) / n**2, tau)
@@ -369,31 +295,8 @@ def _plate(entering, leaving, tau):
 
 def pile(reflectance, transmittance, layers):
     """
-    Reflectance and transmittance of a pile of equal layers under isotropic light.
-
-    Parameters
-    ----------
-    reflectance, transmittance : array
-        Reflectance r, above 0, and transmittance of one layer. [1]
-    layers : float
-        Number of layers, not negative; it need not be whole.
-
-    Returns
-    -------
-    reflectance, transmittance : array
-        Reflectance and transmittance of the pile. [1]
-
-    References
-    ----------
+    Reflectance and transmittance of a pile of equal layers under isotropic light; their number need not be whole. [1]
     [Stokes1862]_
-
-    Examples
-    --------
-    No layer reflects nothing:
-
-    >>> reflectance, transmittance = pile(0.3, 0.6, 0.0)
-    >>> float(reflectance), float(transmittance)
-    (0.0, 1.0)
     """
     shape, rows = as_rows(reflectance, transmittance, layers)
     found = np.empty_like(rows[:2])

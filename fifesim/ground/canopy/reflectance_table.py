@@ -1,9 +1,9 @@
 """
-Reflectance of a canopy in many cells: by the models, or interpolated in tables of the properties that cells share.
+Reflectance of a canopy and absorbed light in many cells: by the models, or interpolated in tables of what cells share.
 """
 
 from functools import partial
-from typing import NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from fifesim.ground.canopy.crowns import (
     crowns_over_background,
     lai_in_crowns,
 )
-from fifesim.ground.canopy.layers import extinction_coefficient, two_layers
+from fifesim.ground.canopy.layers import extinction_coefficient, light_budget, light_terms, two_layers
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
 from fifesim.ground.canopy.leaf_area import check_lai, check_share
 from fifesim.ground.canopy.leaf_transfer import discrete_ordinates
@@ -101,13 +101,6 @@ def canopy_reflectance(
     References
     ----------
     [Verhoef2007]_; [VerhoefBach2007]_
-
-    Examples
-    --------
-    Without leaves the background is seen as it is:
-
-    >>> float(canopy_reflectance(0.0, [0.07], [0.04], 0.15, sza=30)[0])
-    0.15
     """
     lai, background = np.asarray(lai, float), np.asarray(background, float)
     leaf = leaf_reflectance, leaf_transmittance
@@ -176,38 +169,9 @@ def directional_reflectance(
     lai, leaf, background, sky, directions, leaf_angles, hotspot, dead=None, crown_shape=SHAPE, shares=(0.0, 0.0, 1.0)
 ):
     """
-    Reflectance factor of a canopy where the directions of sun and view, or the leaves, vary from cell to cell.
-
-    Parameters
-    ----------
-    lai : array, shape (...)
-        NaN gives NaN. [m2 m-2]
-    leaf : pair of arrays, shape (band,) or (..., band)
-        Reflectance and transmittance of leaves. NaN gives NaN. [1]
-    background, sky : array, broadcastable to (..., band)
-        Reflectance of the background, and share of skylight. [1]
-    directions : three arrays, broadcastable to (...)
-        Solar zenith, view zenith and relative azimuth. NaN gives NaN. [degree]
-    leaf_angles, hotspot, crown_shape
-        As in `canopy_reflectance`.
-    dead : pair of arrays, shape (band,) or (..., band), optional
-        Reflectance and transmittance of dead leaves. [1]
-    shares : three numbers or arrays, broadcastable to (...), optional
-        Brown share, dissociation and crown cover, as in `canopy_reflectance`. [1]
-
-    Returns
-    -------
-    reflectance : array, shape (band, ...)
-        SAIL at every cell. [1]
-
-    Raises
-    ------
-    ValueError
-        As `canopy_reflectance`, or if a zenith angle is not below 90 degrees.
-
-    References
-    ----------
-    [Verhoef2007]_
+    Reflectance factor where directions or leaves vary from cell to cell, SAIL at every cell, shape (band, ...). [1]
+    Leaves are pairs of shape (band,) or (..., band), background and sky broadcast to (..., band); the three directions
+    (sza, vza, raa) [degree] and the three shares (brown, dissociation, crown cover) broadcast to (...). NaN gives NaN.
     """
     leaf, (sza, vza, raa) = _leaves_by_cell(*leaf, np.shape(lai)), directions
     for name, angle in (("sza", np.asarray(sza, float)), ("vza", np.asarray(vza, float))):
@@ -449,3 +413,98 @@ def _crown_terms_table(scene, by_brown):
         return np.concatenate([values, *over])
 
     return interpolation.tabulate_foliage(terms, decay(scene), by_brown, reflectances)
+
+
+# Absorbed by all or by green leaves, or the four parts of the light budget.
+Part: TypeAlias = Literal["all", "green", "light"]
+
+_LIGHT_BLOCK = 2**11  # cells at a time, so that intermediate results of all bands stay in the cache of the processor
+
+
+def scene_light(lai, background, scene, weights, part):
+    """Light budget of cells averaged over bands, shape (1, ...) or (4, ...), within 1e-6 of the model. [1]"""
+    uniform = background.ndim < 2
+    if uniform and not scene.varies():
+        check_cells(lai, background, scene)
+        return interpolation.interpolate(_light_table(tuple(background.tolist()), scene, weights, part), lai)
+    cells, lai = lai.shape, lai.reshape(-1)
+    ground = np.broadcast_to(background[:, None] if uniform else background.reshape(len(weights), -1),
+                             (len(weights), lai.size))  # fmt: skip
+    # Tables have no axis for dissociation or crown cover, and no column for the ground.
+    if part == "light" or isinstance(scene.dissociation, np.ndarray) or isinstance(scene.crown_cover, np.ndarray):
+        check_cells(lai, ground, scene)
+        return _light_by_model(lai, ground, scene, weights, part).reshape(-1, *cells)
+    if isinstance(scene.brown, np.ndarray):
+        table = _light_foliage_table(scene._replace(brown=-1.0), part)
+        by_band, wrong = interpolation.interpolate_foliage(table, lai, scene.brown, ground)
+        if wrong:
+            check_cells(lai, ground, scene)
+    else:
+        check_cells(lai, ground, scene)
+        by_band = interpolation.interpolate_over(_light_terms_table(scene, part), lai, ground)
+    return (np.array(weights) @ by_band).reshape(1, *cells)
+
+
+def _light_by_model(lai, ground, scene, weights, part):
+    """Light of cells by the model, shape (1, n) or (4, n), one block of cells at a time."""
+    blocks = [slice(start, start + _LIGHT_BLOCK) for start in range(0, lai.size, _LIGHT_BLOCK)]
+    found = [_model_light(lai[each], ground[:, each], scene.part(each), weights, part) for each in blocks]
+    return np.concatenate(found or [np.empty((4 if part == "light" else 1, 0))], axis=1)
+
+
+def _model_light(lai, ground, scene, weights, part):
+    """Light of cells, shape (1, n) or (4, n)."""
+    own = scene
+    budget = light_budget(
+        lai, *(each for pair in _optics(own) for each in pair), ground, brown=own.brown, dissociation=own.dissociation,
+        sza=own.sza, leaf_angles=own.leaf_angles, diffuse_fraction=sky_of(own), crown_cover=own.crown_cover,
+    )  # fmt: skip
+    by_part = {"all": [budget.green + budget.brown], "green": [budget.green], "light": budget}
+    shape = len(weights), lai.size
+    return np.stack([np.array(weights) @ np.broadcast_to(each, shape) for each in by_part[part]])
+
+
+def _optics(scene):
+    """Reflectance and transmittance of green and of dead leaves, shape (band, 1)."""
+    pairs = [(scene.leaf_reflectance, scene.leaf_transmittance), (scene.brown_reflectance, scene.brown_transmittance)]
+    green, dead = (None if None in pair else tuple(np.reshape(each, (-1, 1)) for each in pair) for pair in pairs)
+    return green, green if dead is None else dead
+
+
+@cached(32, "tables of absorbed light over one background")
+def _light_table(background, scene, weights, part):
+    """Table of the light of cells that differ only in leaf area."""
+    ground = np.array(background)[:, None]
+    return interpolation.tabulate(lambda lai: _model_light(lai, ground, scene, weights, part), _rate(scene))
+
+
+@cached(8, "tables of absorbed light over any background")
+def _light_terms_table(scene, part):
+    """Table of terms that `over_background` combines to the light absorbed in each band."""
+    return interpolation.tabulate(lambda lai: _light_terms(lai, scene.brown, scene, part), _rate(scene), over_grounds)
+
+
+@cached(8, "tables of absorbed light by dead share over any background")
+def _light_foliage_table(scene, part):
+    """As `_light_terms_table`, over leaf area and dead share."""
+    return interpolation.tabulate_foliage(
+        lambda lai, brown: _light_terms(lai, brown, scene, part), _rate(scene), combine=over_grounds
+    )
+
+
+def _rate(scene):
+    """Fastest decay of light with leaf area."""
+    return decay(scene) / (scene.crown_cover or 1.0)
+
+
+def _light_terms(lai, brown, scene, part):
+    """Terms of `over_background` for the light absorbed in each band, shape (4 bands, n)."""
+    found, _ = light_terms(
+        lai, *_optics(scene), brown=brown, dissociation=scene.dissociation, sza=scene.sza,
+        leaf_angles=scene.leaf_angles, diffuse_fraction=sky_of(scene), crown_cover=scene.crown_cover,
+    )  # fmt: skip
+    kinds = ("green",) if part == "green" else ("green", "brown")
+    alone = sum(getattr(found, kind) for kind in kinds)
+    through = found.down * sum(getattr(found, f"{kind}_below") for kind in kinds)
+    columns = np.broadcast_arrays(alone, 0.0, through, found.rdd_below)
+    return np.stack(columns, axis=1).reshape(-1, columns[0].shape[-1])

@@ -1,4 +1,4 @@
-"""SAIL: four-stream radiative transfer in a homogeneous leaf canopy with hot spot over a background."""
+"""SAIL: four-stream radiative transfer in a homogeneous leaf canopy with hot spot over a background, also on slopes."""
 
 import math
 from typing import NamedTuple
@@ -44,14 +44,6 @@ def with_background(canopy, background):
     References
     ----------
     [Verhoef2007]_
-
-    Examples
-    --------
-    Without leaves the background is seen as it is:
-
-    >>> from fifesim.ground.canopy.sail_model import sail
-    >>> float(with_background(sail(0.0, 0.1, 0.1, sza=30), 0.15).rso)
-    0.15
     """
     c, r = canopy, numbers(background)
     returned = r / (1 - r * c.rdd_below)
@@ -67,66 +59,18 @@ def with_background(canopy, background):
 @jitable
 def over_background(alone, hot, through, rdd, background):
     r"""
-    Reflectance factor of a canopy over a background, from terms of its layer.
-
-    .. math:: \rho = A + r \left( B + \frac{C}{1 - r \, r_{dd}} \right)
-
-    Parameters
-    ----------
-    alone : array
-        A, of the canopy over black ground. [1]
-    hot : array
-        B, of the ground in the gaps that sun and observer share beyond chance. [1]
-    through : array
-        C, by the transmittance down and up. [1]
-    rdd : array
-        Reflectance of the canopy from below. [1]
-    background : array
-        r. [1]
-
-    Returns
-    -------
-    reflectance : array
-        That of `with_background` to rounding, mixed by `reflectance_factor`. [1]
-
-    References
-    ----------
-    [Verhoef2007]_
-
-    Examples
-    --------
-    >>> over_background(0.0, 0.0, 1.0, 0.0, 0.15)
-    0.15
+    Reflectance factor of a canopy over a background r, from terms of its layer. [1] :math:`\rho = A + r \left( B +
+    \frac{C}{1 - r \, r_{dd}} \right)` with A the canopy over black ground, B the ground in the gaps that sun and
+    observer share beyond chance, C the transmittance down and up, and the reflectance from below; `with_background` to
+    rounding, mixed by `reflectance_factor`. [Verhoef2007]_
     """
     return alone + background * (hot + through / (1 - background * rdd))
 
 
 def reflectance_factor(rso, rdo, diffuse_fraction):
     r"""
-    Reflectance factor under a mixture of sunlight and isotropic skylight.
-
-    .. math:: \rho = (1 - f) \, r_{so} + f \, r_{do}
-
-    Parameters
-    ----------
-    rso, rdo : array
-        Bidirectional and hemispherical-directional reflectance factors. [1]
-    diffuse_fraction : array
-        Share :math:`f` of skylight in the irradiance; 0 is sunlight alone. [1]
-
-    Returns
-    -------
-    reflectance : array, shape of the broadcast inputs
-        [1]
-
-    References
-    ----------
-    [SchaepmanStrub2006]_
-
-    Examples
-    --------
-    >>> reflectance_factor(0.5, 0.25, 0.5)
-    0.375
+    Reflectance factor under sunlight and a share f of isotropic skylight, [SchaepmanStrub2006]_. [1] :math:`\rho = (1 -
+    f) \, r_{so} + f \, r_{do}`
     """
     return (1 - diffuse_fraction) * rso + diffuse_fraction * rdo
 
@@ -142,25 +86,8 @@ def direction_distance(sza, vza, raa):
 
 def hotspot_decay(sza, vza, raa, extinction, hotspot):
     """
-    Decay of the correlation between the gaps of sun and observer with the relative depth of the canopy.
-
-    Parameters
-    ----------
-    sza, vza, raa : array
-        [degree]
-    extinction : array
-        Extinction of direct beam and view together, ks + ko. [1]
-    hotspot : array
-        Ratio of leaf size to canopy height. [1]
-
-    Returns
-    -------
-    alpha : array
-        Infinite without a hot spot. The factor 2 / (ks + ko) is Breon's, as in Verhoef et al. (2007). [1]
-
-    References
-    ----------
-    [Kuusk1991]_; [Verhoef2007]_
+    Decay of the correlation between the gaps of sun and observer with the relative depth of the canopy. [1] Infinite
+    without a hot spot. The factor 2 / (ks + ko) is Breon's, as in [Verhoef2007]_; the decay is [Kuusk1991]_.
     """
     distance = direction_distance(sza, vza, raa)
     has = hotspot > 0
@@ -270,13 +197,6 @@ def exponential_chain(lai, *rates):
     References
     ----------
     [McCurdy1984]_
-
-    Examples
-    --------
-    Equal rates are no singular case:
-
-    >>> float(exponential_chain(3.0, 0.0, 0.0, 0.0))
-    4.5
     """
     shape, flat = as_rows(lai, *rates)
     chains = np.empty(flat.shape[1], flat.dtype)
@@ -361,10 +281,8 @@ class CanopyLayer(NamedTuple):
     tsd: np.ndarray
     tdo: np.ndarray
     tdd: np.ndarray
-    tsstoo: np.ndarray
-    """Probability that sun and observer both see a point of the background."""
-    rdd_below: np.ndarray
-    """As rdd, of light from below; the same where all leaves are alike."""
+    tsstoo: np.ndarray  # probability that sun and observer both see a point of the background
+    rdd_below: np.ndarray  # as rdd, of light from below; the same where all leaves are alike
 
 
 class LeafScattering(NamedTuple):
@@ -424,14 +342,6 @@ def sail(lai, leaf_reflectance, leaf_transmittance, *, sza, vza=0.0, raa=0.0, le
     References
     ----------
     [Verhoef1984]_; [Verhoef2007]_; [Kuusk1991]_
-
-    Examples
-    --------
-    Leaves without absorption conserve energy:
-
-    >>> canopy = sail(2.0, 0.5, 0.5, sza=30)
-    >>> float(round(canopy.rsd + canopy.tsd + canopy.tss, 12))
-    1.0
     """
     lai, rho, tau = numbers(lai), numbers(leaf_reflectance), numbers(leaf_transmittance)
     raa = folded(raa)
@@ -444,22 +354,8 @@ def sail(lai, leaf_reflectance, leaf_transmittance, *, sza, vza=0.0, raa=0.0, le
 
 def scattered_again(lai, c):
     """
-    Reflectances and transmittances of a layer, without the single scattering toward the observer.
-
-    Parameters
-    ----------
-    lai : array
-        [m2 m-2]
-    c : Scattering
-
-    Returns
-    -------
-    canopy : Canopy
-        Its rso is of two scatterings or more, its tsstoo without a hot spot. [1]
-
-    References
-    ----------
-    [Verhoef1984]_; [Verhoef2007]_
+    CanopyLayer of a leaf area [m2 m-2] and LeafScattering, without the single scattering toward the observer. Its rso
+    is of two scatterings or more, its tsstoo without a hot spot. [Verhoef1984]_; [Verhoef2007]_
     """
     shape, flat = as_rows(lai, c.ks, c.ko, c.a, c.sigma, c.m, c.sf, c.sb, c.vf, c.vb)
     out = np.empty((9, flat.shape[1]), flat.dtype)
@@ -480,30 +376,15 @@ def folded(raa):
 
 
 def leaf_scattering(rho, tau, sza, vza, raa, leaf_angles):
-    """
-    Coefficients of the four-stream equations, summed over leaf angle classes.
-
-    Parameters
-    ----------
-    rho, tau : array
-        Reflectance and transmittance of the leaves. [1]
-    sza, vza, raa : array
-        [degree]
-    leaf_angles : LeafAngles
-
-    Returns
-    -------
-    coefficients : Scattering
-        Per leaf area. [1]
-
-    References
-    ----------
-    [Verhoef1984]_
-    """
+    """LeafScattering of leaf optics [1] and directions [degree], summed over leaf angle classes, [Verhoef1984]_."""
     sums = leaf_angle_sums(sza, vza, raa, leaf_angles)
-    ks, ko, bf = sums.ks, sums.ko, sums.bf
-    sigma = ((1 + bf) * rho + (1 - bf) * tau) / 2
-    absorbed = 1 - rho - tau
+    return _scattering(rho, tau, sums, sums.bf, sums.bf, sums.bf)
+
+
+def _scattering(rho, tau, sums, to_sun, to_view, both, sun_path=1.0, view_path=1.0):
+    """LeafScattering for mean products of leaf normals, and for path lengths over those on level ground."""
+    ks, ko = sums.ks * sun_path, sums.ko * view_path
+    sigma, absorbed = ((1 + both) * rho + (1 - both) * tau) / 2, 1 - rho - tau
     return LeafScattering(
         ks=ks,
         ko=ko,
@@ -511,11 +392,11 @@ def leaf_scattering(rho, tau, sza, vza, raa, leaf_angles):
         sigma=sigma,
         # a^2 - sigma^2 in factors: exact for conservative leaves, where it vanishes.
         m=np.sqrt(np.maximum(absorbed, 0) * (absorbed + 2 * sigma)),
-        sf=((ks - bf) * rho + (ks + bf) * tau) / 2,
-        sb=((ks + bf) * rho + (ks - bf) * tau) / 2,
-        vf=((ko - bf) * rho + (ko + bf) * tau) / 2,
-        vb=((ko + bf) * rho + (ko - bf) * tau) / 2,
-        w=sums.reflected * rho + sums.transmitted * tau,
+        sf=((ks - to_sun) * rho + (ks + to_sun) * tau) / 2,
+        sb=((ks + to_sun) * rho + (ks - to_sun) * tau) / 2,
+        vf=((ko - to_view) * rho + (ko + to_view) * tau) / 2,
+        vb=((ko + to_view) * rho + (ko - to_view) * tau) / 2,
+        w=(sums.reflected * rho + sums.transmitted * tau) * sun_path * view_path,
     )
 
 
@@ -551,31 +432,8 @@ def leaf_angle_sums(sza, vza, raa, leaf_angles):
 
 def volume_scattering(inclination, sza, vza, raa):
     """
-    Bidirectional area scattering of leaves of one inclination and random azimuth.
-
-    Parameters
-    ----------
-    inclination : array
-        Leaf inclination. [degree]
-    sza, vza, raa : array
-        [degree]
-
-    Returns
-    -------
-    reflected, transmitted : array, shape of the broadcast inputs
-        Weights of leaf reflectance and transmittance. [sr-1]
-
-    References
-    ----------
-    [Verhoef1984]_
-
-    Examples
-    --------
-    A horizontal leaf transmits nothing to an observer above:
-
-    >>> reflected, transmitted = volume_scattering(0.0, 0.0, 60.0, 0.0)
-    >>> float(transmitted)
-    0.0
+    Bidirectional area scattering of leaves of one inclination and random azimuth, angles in degrees, [Verhoef1984]_.
+    Returns the weights of leaf reflectance and transmittance. [sr-1]
     """
     beta_s, cos_s, sin_s = azimuth_limit(inclination, sza)
     beta_o, cos_o, sin_o = azimuth_limit(inclination, vza)
@@ -707,3 +565,92 @@ def _by_chains(lai, ks, ko, a, sigma, m, sf, sb, vf, vb):
     rdo, rsd, tsd, tdo = fields
     through = np.exp(-ks * lai) * slab, np.exp(-ko * lai) * slab
     return np.stack([rso, rdo, rsd, sigma * sinh, *through, tsd, tdo, np.exp(-m * lai)]) / slab
+
+
+_LEAST_COSINE = 1e-3  # of sun and view on the slope; below, the slope is as good as parallel to the light [1]
+
+
+def upright_reflectance(
+    lai, leaf_reflectance, leaf_transmittance, background, *, sza, vza, raa, cosine, mu_s_local, mu_v_local, sky_view,
+    terrain_view, diffuse_fraction=0.0, leaf_angles="spherical", hotspot=0.0,
+):  # fmt: skip
+    r"""
+    Reflectance factor of a canopy of upright plants on a slope, relative to the irradiance of level ground.
+
+    .. math::
+
+        \rho &= E_s r_{so} + E_d r_{do}
+            + r_{do} \, C_t \frac{E_s r_{sd} + E_d r_{dd}}{1 - r_{dd} C_t} \\
+        E_s &= (1 - f) \, \mu_s' / \mu_s, \qquad E_d = f \, V_d
+
+    Along a beam, leaves of upright plants have the path length of the slope: the extinction is
+    :math:`k' = k \mu / \mu'` for the leaf area of the slope, :math:`L \cos S`.
+
+    Parameters
+    ----------
+    lai : array
+        Leaf area index, per level area. NaN gives NaN. [m2 m-2]
+    leaf_reflectance, leaf_transmittance, background : array
+        [1]
+    sza, vza, raa : float
+        On level ground. [degree]
+    cosine : array
+        Cosine of the slope, :math:`\cos S`. [1]
+    mu_s_local, mu_v_local : array
+        Cosines of the zenith angles of sun and sensor on the slope, :math:`\mu'`; 0 in shadow or hidden. [1]
+    sky_view, terrain_view : array
+        :math:`V_d` and :math:`C_t`. [1]
+    diffuse_fraction : array, optional
+        :math:`f` on level ground. [1]
+    leaf_angles : optional
+        Whatever `leaf_angle_classes` accepts; inclinations from the vertical of the plants.
+    hotspot : float, optional
+        Ratio of leaf size to canopy height. [1]
+
+    Returns
+    -------
+    reflectance : array, shape of the broadcast inputs
+        0 where the slope is hidden from the sensor. [1]
+
+    Notes
+    -----
+    The surroundings are as bright as the slope, and their light is summed over all reflections. The leaf angle
+    distribution keeps its axis in all coefficients, with the mean of the normals' outer products.
+
+    References
+    ----------
+    [Yin2017]_, path length; [Sirguey2009]_, light between slopes; [Verhoef1984]_
+    """
+    leaves, raa = leaf_angle_classes(leaf_angles), folded(raa)
+    seen = np.asarray(mu_v_local) > 0
+    sun, view = (np.maximum(each, _LEAST_COSINE) for each in (mu_s_local, mu_v_local))
+    mu_s, mu_v = np.cos(np.radians([sza, vza]))
+    sums = leaf_angle_sums(sza, vza, raa, leaves)
+    c = _on_slope(leaf_reflectance, leaf_transmittance, sums, cosine, mu_s / sun, mu_v / view)
+    depth = numbers(lai) * cosine
+    gaps, sunlit_and_seen = bidirectional_gap(depth, c.ks, c.ko, _decay(sza, vza, raa, sun, view, cosine, c, hotspot))
+    layer = scattered_again(depth, c)
+    layer = layer._replace(rso=c.w * sunlit_and_seen + layer.rso, tsstoo=gaps)
+    r = with_background(layer, background)
+    direct, sky = (1 - diffuse_fraction) * np.maximum(mu_s_local, 0) / mu_s, diffuse_fraction * sky_view
+    around = terrain_view * (direct * r.rsd + sky * r.rdd) / (1 - r.rdd * terrain_view)
+    return seen * (direct * r.rso + (sky + around) * r.rdo)
+
+
+def _on_slope(rho, tau, sums, cosine, sun_path, view_path):
+    """Coefficients of the four-stream equations along the normal of a slope, per leaf area."""
+    # The mean outer product of the leaf normals has bf along the vertical and `across` along both horizontal axes.
+    across = (1 - sums.bf) / 2
+    upright = (sums.bf - across) * cosine
+    normals = across + upright * sun_path, across + upright * view_path, across + upright * cosine
+    return _scattering(rho, tau, sums, *normals, sun_path, view_path)
+
+
+def _decay(sza, vza, raa, sun, view, cosine, c, hotspot):
+    """Decay of the correlation of the gaps with depth below the slope, as `sail_model.hotspot_decay`."""
+    if not hotspot > 0:
+        return np.inf
+    sza, vza, raa = np.radians([sza, vza, raa])
+    chord = 4 * (np.sin((sza - vza) / 2) ** 2 + np.sin(sza) * np.sin(vza) * np.sin(raa / 2) ** 2)
+    distance = np.sqrt((1 / sun - 1 / view) ** 2 + chord / (sun * view))
+    return 2 * distance * cosine / ((c.ks + c.ko) * hotspot)

@@ -14,8 +14,8 @@ from fifesim.ground.canopy.spectra import band_means
 # Reference wavelength of the soil brightness, in the middle of visible light as for aerosol and visibility. [um]
 GREEN_WAVELENGTH = 0.55
 
-# Cells that are done together, so that they stay in the nearest cache.
-_RUN = 1024
+# Cells that are done together, so that they stay in the nearest cache, and in the next.
+_RUN, _AT_ONCE = 256, 2**14
 
 
 def soil_line(bands):
@@ -33,11 +33,6 @@ def soil_line(bands):
     slope : array, shape (band,)
         [1]
 
-    Raises
-    ------
-    ValueError
-        If a band lies beyond the spectra, 0.4 to 2.45 um.
-
     Notes
     -----
     The line leads through the two soils of ``data/ground_spectra.csv``: TM4 changes by 1.20 where TM3 changes by 1.
@@ -45,12 +40,6 @@ def soil_line(bands):
     References
     ----------
     [Baret1993]_ for soil lines of many bands
-
-    Examples
-    --------
-    >>> from fifesim.base.bands import Band
-    >>> soil_line([Band("green", (0.549, 0.55, 0.551), (0, 1, 0))]).round(3).tolist()
-    [1.0]
     """
     table = files.table("ground_spectra.csv")
     wavelength, change = (each.to_numpy() for each in (table["wavelength"], table["soil_dry"] - table["soil_wet"]))
@@ -79,20 +68,14 @@ def in_cells(kernel, reflectance, change, *parameters, check):
     return np.moveaxis(out.reshape(bands, *shape), 0, -1)
 
 
-@compiled
 def _brighten(reflectance, brightness, line, out):
-    by_cell, wrong = reflectance.shape[1] > 1, 0
-    for first in range(0, brightness.size, _RUN):
-        run = slice(first, first + _RUN)
-        change = brightness[run]
-        wrong += outside(change, -1.0, 1.0)
-        for band in range(out.shape[0]):
-            before, after = reflectance[band, run] if by_cell else reflectance[band], out[band, run]
-            for i in range(change.size):
-                value = before[i if by_cell else 0] + change[i] * line[band]
-                # NaN is neither.
-                after[i] = 0.0 if value < 0.0 else 1.0 if value > 1.0 else value
-    return wrong
+    for start in range(0, brightness.size, _AT_ONCE):
+        run = slice(start, start + _AT_ONCE)
+        for before, after, slope in zip(reflectance, out, line, strict=True):
+            np.multiply(brightness[run], slope, out=after[run])
+            after[run] += before if before.size == 1 else before[run]
+            np.clip(after[run], 0.0, 1.0, out=after[run])
+    return not within(brightness, -1.0, 1.0)
 
 
 def check_brightness(brightness):
@@ -136,21 +119,14 @@ _PER_MOISTURE = (WETTEST - DRIEST) / CAPACITY
 # Less than 2 % of the wettest soil has more films; this part is treated as having this number.
 _FILMS = 6
 
-# Cells that are done together, so that they stay in the nearest cache, and in the next.
-_WATER_RUN, _AT_ONCE = 256, 2**14
-
 
 class WaterFilms(NamedTuple):
     """Optics of water films on a soil in bands."""
 
-    surface: np.ndarray
-    """Reflectance of the upper side of the water for light from the air, shape (band,). [1]"""
-    inside: np.ndarray
-    """Reflectance of the lower side for diffuse light from below, shape (band,). [1]"""
-    entrance: np.ndarray
-    """Light that enters the soil's grains from water over that from air, shape (band,). [1]"""
-    passed: np.ndarray
-    """Light that one to six films let pass down and up, shape (band, 6). [1]"""
+    surface: np.ndarray  # reflectance of the upper side of the water for light from the air, shape (band,). [1]
+    inside: np.ndarray  # reflectance of the lower side for diffuse light from below, shape (band,). [1]
+    entrance: np.ndarray  # light that enters the soil's grains from water over that from air, shape (band,). [1]
+    passed: np.ndarray  # light that one to six films let pass down and up, shape (band, 6). [1]
 
 
 @cached(64, "optics of water films")
@@ -177,30 +153,10 @@ def below_film(below, passed, inside):
 
 @jitable
 def grains_in_water(dry, entrance):
-    r"""Reflectance of a soil with grains in water, which refracts light less than air does.
-
-    .. math:: r_b = 1 - (1 - r) \, (r e + 1 - r)
-
-    Parameters
-    ----------
-    dry : array
-        Reflectance :math:`r` of the dry soil. [1]
-    entrance : array
-        Light that enters the grains from water over that from air, :math:`e`. [1]
-
-    Returns
-    -------
-    reflectance : array
-        [1]
-
-    References
-    ----------
-    [Lekner1988]_
-
-    Examples
-    --------
-    >>> round(grains_in_water(0.3, 1.0), 12)
-    0.3
+    r"""
+    Reflectance of a soil with grains in water, which refracts light less than air does. [1] :math:`r_b = 1 - (1 - r) \,
+    (r e + 1 - r)` with the reflectance r of the dry soil, and e the light that enters the grains from water over that
+    from air, [Lekner1988]_.
     """
     return 1 - (1 - dry) * (dry * entrance + 1 - dry)
 
@@ -226,11 +182,6 @@ def moistened(dry, moisture, films):
     reflectance : array, shape (..., band)
         Equal to the dry soil to the bit at moisture 0. [1]
 
-    Raises
-    ------
-    ValueError
-        If a moisture is outside 0 to 1.
-
     Notes
     -----
     Absorption uses the mean transmittance of films over a band, in which the dry soil is taken as flat. The surface of
@@ -239,13 +190,6 @@ def moistened(dry, moisture, films):
     References
     ----------
     [Yang2020]_, after [Verhoef2018]_; [HaleQuerry1973]_ and [Feret2017]_ for water
-
-    Examples
-    --------
-    >>> from fifesim.base.bands import Band
-    >>> films = water_films((Band("red", (0.63, 0.66, 0.69), (0, 1, 0)),))
-    >>> moistened(np.array([0.3]), np.array([0.0, 0.5, 1.0]), films).round(3).ravel().tolist()
-    [0.3, 0.23, 0.205]
     """
     return in_cells(_moisten, dry, moisture, *films, check=check_moisture)
 
@@ -261,9 +205,9 @@ def _moisten(dry, moisture, surface, inside, entrance, passed, out):
 # No divisor is 0; without this check the loop is vectorized.
 @compiled
 def _films(dry, moisture, start, bare, surface, inside, entrance, passed, out):
-    covered, by_cell, wrong = np.empty((_FILMS, _WATER_RUN)), dry.shape[1] > 1, 0
-    for begin in range(0, bare.size, _WATER_RUN):
-        free = bare[begin : begin + _WATER_RUN]
+    covered, by_cell, wrong = np.empty((_FILMS, _RUN)), dry.shape[1] > 1, 0
+    for begin in range(0, bare.size, _RUN):
+        free = bare[begin : begin + _RUN]
         run = slice(start + begin, start + begin + free.size)
         wrong += outside(moisture[run], 0.0, 1.0)
         _covered(moisture[run], free, covered)

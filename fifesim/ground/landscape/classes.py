@@ -17,12 +17,11 @@ from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background, Spectrum
-from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp
-from fifesim.ground.landscape.coarse_lattice import check_coarser
+from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp, check_coarser
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
 
+# Properties between 0 and 1.
 SHARES = tuple(name for name, known in DRAWN.items() if (known.lowest, known.highest) == (0, 1))
-"""Properties between 0 and 1."""
 
 
 @dataclass(frozen=True)
@@ -115,8 +114,7 @@ def _beta(mean, sd):
     return stats.beta(mean * weight, (1 - mean) * weight)
 
 
-LARGEST_CODE = 2**15 - 1
-"""Largest code of a class in a map. Codes are 16-bit integers, with -1 for no data."""
+LARGEST_CODE = 2**15 - 1  # largest code of a class in a map. Codes are 16-bit integers, with -1 for no data.
 
 
 @dataclass(frozen=True, eq=False)

@@ -103,12 +103,9 @@ class Scores(NamedTuple):
 
     values: np.ndarray
     scores: np.ndarray
-    slopes: np.ndarray
-    """Of the lines between them."""
-    starts: np.ndarray
-    """Which of the values is the last below each of evenly spaced ones, from which a search goes on."""
-    steps: int
-    """The most that a search goes on."""
+    slopes: np.ndarray  # of the lines between them
+    starts: np.ndarray  # which of the values is the last below each of evenly spaced ones, from which a search goes on
+    steps: int  # the most that a search goes on
 
 
 def score_table(sample):
@@ -187,8 +184,7 @@ class GroundPart(NamedTuple):
     covariates: tuple[str, ...]
     weights: np.ndarray
     scores: Scores
-    share: float
-    """Standard deviation of the part. [1]"""
+    share: float  # standard deviation of the part. [1]
 
 
 class Copula(NamedTuple):
@@ -196,10 +192,9 @@ class Copula(NamedTuple):
 
     covariates: dict[str, Scores]
     ground: dict[str, GroundPart]
-    noise: dict[str, dict[str, float]]
-    """For each field the weights of the noises, by the fields that they belong to."""
+    noise: dict[str, dict[str, float]]  # for each field the weights of the noises, by the fields that they belong to
+    # For each field that has part in them, the weights of independent fields on coarser lattices, by their names.
     coarse: dict[str, dict[str, float]]
-    """For each field that has part in them, the weights of independent fields on coarser lattices, by their names."""
 
 
 def field_seed(seed, name):
@@ -230,11 +225,6 @@ def cross_correlation(arp, other):
     -------
     correlation : float
         1 for equal ones; the most by which fields of these arps can correlate. [1]
-
-    Examples
-    --------
-    >>> cross_correlation(0.2, 0.2), round(cross_correlation(0.05, 0.24), 3)
-    (1.0, 0.63)
     """
     variances = field_variance(arp) * field_variance(other)
     if abs(arp - other) < 1e-7:
@@ -397,25 +387,9 @@ def _lower(matrix):
 
 def correlated(ground, noise, scores, covariates):
     r"""
-    Field as the sum of a part that follows the ground, and noise.
-
-    .. math:: z = R \, s + \sqrt{1 - R^2} \, n
-
-    Parameters
-    ----------
-    ground : Ground
-        Part of the field that follows the ground.
-    noise : array, shape (y, x)
-        Standard normal field :math:`n` of the field's own arp.
-    scores : dict of str to fifesim.ground.landscape.covariance.Scores
-        Scores of the ground.
-    covariates : dict of str to array, shape (y, x)
-        The ground.
-
-    Returns
-    -------
-    field : array, shape (y, x)
-        Standard normal over the places that the ground was sampled at; NaN where the ground is. [1]
+    Field as the sum of a part R s that follows the ground, a GroundPart, and noise n of the field's own arp. [1]
+    :math:`z = R \, s + \sqrt{1 - R^2} \, n`. Standard normal over the places that the ground was sampled at; NaN where
+    the ground is. `scores` and `covariates` are the score tables and the values of the ground by name.
     """
     shape = np.shape(noise)
     noise, field = np.ravel(noise), np.empty(np.size(noise))

@@ -13,7 +13,7 @@ from scipy import optimize, stats
 
 from fifesim.base import files
 from fifesim.base.arguments import FrozenDistribution, LaiDistribution
-from fifesim.base.arrays import compiled, jitable
+from fifesim.base.arrays import compiled, read_only
 from fifesim.base.caches import cached
 from fifesim.base.files import in_a_line, read_csv
 from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS
@@ -146,25 +146,7 @@ def _line_of(path, row):
 
 def kernel_density(samples):
     """
-    Gaussian kernel density of LAI samples, reflected at zero, so that there is no mass below it.
-
-    Parameters
-    ----------
-    samples : array, shape (n,)
-        At least five, not negative, not all the same. [m2 m-2]
-
-    Returns
-    -------
-    distribution : frozen scipy distribution
-        With Scott's bandwidth.
-
-    Raises
-    ------
-    ValueError
-        If all samples are the same.
-
-    References
-    ----------
+    Gaussian kernel density of LAI samples with Scott's bandwidth, reflected at zero, so that there is no mass below it.
     [Silverman1986]_, Section 2.10 (reflection at a boundary)
     """
     samples = np.asarray(samples, float)
@@ -266,103 +248,52 @@ def quantile_table(distribution):
 
 def quantile_map(field, table, out=None):
     """
-    Map a standard normal field to the distribution of a quantile table.
-
-    Parameters
-    ----------
-    field : array, shape (...)
-        Standard normal deviates; NaN stays NaN.
-    table : array, shape (16385,)
-        From `quantile_table`.
-    out : array of float, shape (...), optional
-        Filled in and returned; it may be the field.
-
-    Returns
-    -------
-    values : array, shape (...)
-
-    References
-    ----------
-    [Friedl1995]_, Fig. 2, step 5, for an unbounded field: ranks refer to the ensemble
+    Map a standard normal field to the distribution of a `quantile_table`; NaN stays NaN, and `out` may be the field.
+    [Friedl1995]_, Fig. 2, step 5, for an unbounded field: ranks refer to the ensemble.
     """
     cells = np.ascontiguousarray(field, float)
     out = np.empty(cells.shape) if out is None else out
-    _map(cells.reshape(-1), table, out.reshape(-1))
+    no_classes = np.empty(0, np.int16), read_only(table[None]), np.empty(0, bool)
+    _map(cells.reshape(-1), *no_classes, out.reshape(-1))
     return out
 
 
 def quantile_map_of_classes(field, numbers, tables):
     """Map a standard normal field to distributions that differ by class, shape (y, x)."""
-    same, out = tables[:, 0] == tables[:, -1], np.empty(np.shape(field))
-    _map_classes(np.ascontiguousarray(field, float).reshape(-1), numbers.reshape(-1), tables, same, out.reshape(-1))
+    cells, out = np.ascontiguousarray(field, float), np.empty(np.shape(field))
+    same = tables[:, 0] == tables[:, -1]
+    _map(cells.reshape(-1), numbers.reshape(-1), read_only(tables), same, out.reshape(-1))
     return out
 
 
-@jitable
-def _places(field, size, at, share):
-    """Fill in the nodes of a table below deviates, and the weights of the next nodes."""
-    per_deviate, last = (size - 1) / (2.0 * _REACH), np.uint32(size - 2)
-    # Without branches, so that the loop is vectorized.
-    for i in range(field.size):
-        position = (field[i] + _REACH) * per_deviate
-        known = position == position
-        inside = min(max(position, 0.0), last + 1.0) if known else 0.0
-        at[i] = min(np.uint32(inside), last)
-        share[i] = inside - at[i] if known else np.nan
-
-
 @compiled
-def _map(field, table, out):
+def _map(field, numbers, tables, same, out):
+    """Fill in quantiles from the table of the class of each cell, or from the only table."""
     at, share = np.empty(_RUN, np.uint32), np.empty(_RUN)
+    flat, size, by_class = tables.reshape(-1), tables.shape[1], numbers.size > 0
+    per_deviate, last = (size - 1) / (2.0 * _REACH), np.uint32(size - 2)
     for first in range(0, field.size, _RUN):
         cells, values = field[first : first + _RUN], out[first : first + _RUN]
-        _places(cells, table.size, at, share)
+        # Without branches, so that the loops are vectorized.
         for i in range(cells.size):
-            k = np.uint64(at[i])
-            values[i] = table[k] * (1.0 - share[i]) + table[k + np.uint64(1)] * share[i]
-
-
-@compiled
-def _map_classes(field, numbers, tables, same, out):
-    at, share = np.empty(_RUN, np.uint32), np.empty(_RUN)
-    flat, size = tables.reshape(-1), tables.shape[1]
-    for first in range(0, field.size, _RUN):
-        cells, of_cells = field[first : first + _RUN], numbers[first : first + _RUN]
-        values = out[first : first + _RUN]
-        _places(cells, size, at, share)
-        for i in range(cells.size):
-            number = np.uint32(of_cells[i])
-            share[i] = 0.0 if same[number] else share[i]
-            at[i] += number * np.uint32(size)
+            position = (cells[i] + _REACH) * per_deviate
+            known = position == position
+            inside = min(max(position, 0.0), last + 1.0) if known else 0.0
+            at[i] = min(np.uint32(inside), last)
+            share[i] = inside - at[i] if known else np.nan
+        if by_class:
+            of_cells = numbers[first : first + _RUN]
+            for i in range(cells.size):
+                number = np.uint32(of_cells[i])
+                share[i] = 0.0 if same[number] else share[i]
+                at[i] += number * np.uint32(size)
         for i in range(cells.size):
             k = np.uint64(at[i])
             values[i] = flat[k] * (1.0 - share[i]) + flat[k + np.uint64(1)] * share[i]
 
 
 def rank_map(field, distribution):
-    """
-    Map a field to a distribution exactly, by its ranks.
-
-    Parameters
-    ----------
-    field : array, any shape
-        Values without NaN.
-    distribution : frozen scipy distribution
-
-    Returns
-    -------
-    values : array, shape of the field
-        The quantiles (rank + 1/2) / n, in the order of the field.
-
-    References
-    ----------
-    [Friedl1995]_, Fig. 2, step 5
-
-    Examples
-    --------
-    >>> rank_map(np.array([3.0, -1.0]), stats.uniform()).tolist()
-    [0.75, 0.25]
-    """
+    """Map a field to quantiles (rank + 1/2) / n of a distribution, [Friedl1995]_, Fig. 2, step 5."""
     values = np.empty(field.size)
     values[np.argsort(field, axis=None, kind="stable")] = rank_quantiles(distribution, field.size)
     return values.reshape(field.shape)

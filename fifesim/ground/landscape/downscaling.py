@@ -23,7 +23,7 @@ import numpy as np
 from scipy import fft, ndimage
 
 from fifesim.base.caches import cached
-from fifesim.ground.landscape.autoregression import field_variance, response
+from fifesim.ground.landscape.autoregression import field_variance, pair_correlations, periodic_field, response
 from fifesim.ground.landscape.distribution import quantile_map, quantile_table
 
 # Offset of the squared frequency, so that the spectral density of the trend is finite at zero. [radian2 per pixel2]
@@ -187,13 +187,6 @@ def map_trend(levels, known, deviation, arp, ratio):
     -----
     The variance is from the median of the squares of normal numbers, which is robust against fences and shores. A trend
     that is a factor of 1.4 off changes semivariances by less than 1 %.
-
-    Examples
-    --------
-    A map without curvature has no trend beyond the process:
-
-    >>> map_trend(np.arange(64.0).reshape(8, 8), np.ones((8, 8), bool), 0.3, 0.15, (3, 3))
-    0.0
     """
     variance = float(np.mean(np.square(np.broadcast_to(deviation, levels.shape)[known])))
     if not variance:
@@ -369,11 +362,6 @@ def fife_variation(mean):
     Notes
     -----
     The standard deviation does not grow with the mean in the three treatments of ``lai_distributions.csv``.
-
-    Examples
-    --------
-    >>> fife_variation(np.array([0.1, 2.0])).tolist()
-    [0.6, 0.2]
     """
     return np.minimum(FIFE_DEVIATION / mean, FIFE_LARGEST_VARIATION)
 
@@ -404,15 +392,8 @@ class Marginal:
     """
     Cells of a distribution, whose standard normal deviates are the field.
 
-    Parameters
-    ----------
-    table : array, shape (16385,)
-        From `ground.landscape.distribution.quantile_table`.
-    levels, means : array, shape (n,)
-        Mean of pixels by the level of their field.
-    steep, bent : array, shape (n,)
-        First and second derivatives of leaf area, by the level of a field that is known but for three quarters of the
-        variance within pixels.
+    Means of pixels, and first and second derivatives of leaf area, are tabulated by the level of the field; derivatives
+    for a field that is known but for three quarters of the variance within pixels.
     """
 
     table: np.ndarray
@@ -529,3 +510,75 @@ def _between(values, ratio):
         upper = np.minimum(lower + 1, size - 1)
         values = np.take(values, lower, axis) * (1.0 - share) + np.take(values, upper, axis) * share
     return values
+
+
+# Largest standard deviation of the logarithm of cells.
+LARGEST_DEVIATION = 2.0
+
+_NODES = 41
+
+# Cells along a side of the sample, and pixels at least.
+_SAMPLE, _FEWEST = 504, 8
+
+
+def kept_variance(arp, ratio):
+    r"""
+    Share of the variance of cells that the means over pixels keep.
+
+    .. math:: v = \frac{1}{n^2} \sum_{ij} \rho_{ij}
+
+    Parameters
+    ----------
+    arp : float
+        [1]
+    ratio : (int, int)
+        Cells in a pixel, down and across.
+
+    Returns
+    -------
+    share : float
+        [1]
+    """
+    correlation, weight = pair_correlations(arp, ratio)
+    return float(np.sum(weight * correlation))
+
+
+def pixel_sample(arp, ratio):
+    """Standard normal cells of some pixels of the process, a fixed draw of shape (pixels, cells)."""
+    # The mean of each pixel is scaled so that their variance is exactly the one of the process.
+    size = [max(_SAMPLE // number, _FEWEST) for number in ratio]
+    field = periodic_field(0, arp, tuple(count * number for count, number in zip(size, ratio, strict=True)))
+    cells = field.reshape(size[0], ratio[0], size[1], ratio[1]).transpose(0, 2, 1, 3).reshape(size[0] * size[1], -1)
+    means = cells.mean(axis=1, keepdims=True)
+    kept = kept_variance(arp, ratio)
+    inside = (cells - means) * np.sqrt((1.0 - kept) / np.mean((cells - means) ** 2)) if cells.shape[1] > 1 else 0.0
+    means = means - np.mean(means)
+    return means * np.sqrt(kept / np.mean(means**2)) + inside
+
+
+def deviation_table(arp, ratio):
+    r"""
+    Coefficients of variation c of log-normal cells within pixels, shape (41,), and deviations s of logarithms. [1]
+    :math:`c^2 = \left\langle \frac{\overline{l^2} - \bar l^2}{\bar l^2} \right\rangle, \quad l = e^{s z}`. Both
+    increase from 0; they are those of `pixel_sample`, good to 0.5 %.
+    """
+    sample = pixel_sample(arp, ratio)
+    sample = sample - sample.mean(axis=1, keepdims=True)
+    deviations = np.linspace(0.0, LARGEST_DEVIATION, _NODES)
+    squared = []
+    for deviation in deviations:
+        cells = np.exp(deviation * sample)
+        squared.append(np.mean(np.mean(cells**2, axis=1) / np.mean(cells, axis=1) ** 2) - 1.0)
+    return np.sqrt(np.maximum.accumulate(squared)), deviations
+
+
+def level_deviations(transform, deviations, arp, ratio):
+    r"""
+    Deviations of a process whose means over pixels vary as the levels of the means of leaf area, shape (n,).
+    :math:`s_l^2 = \mathrm{var}\,g(\bar l) / v` with g the level of a mean by the ``transform``, and v the share of
+    `kept_variance`. They exceed the deviations of the field of cells where leaf area is a nonlinear function: variation
+    within a pixel changes its mean.
+    """
+    sample = pixel_sample(arp, ratio)
+    found = [np.std(transform.level(transform.cells(each * sample).mean(axis=1))) for each in deviations]
+    return np.array(found) / np.sqrt(kept_variance(arp, ratio))

@@ -25,15 +25,13 @@ from fifesim.grids.inputs import unpacked
 from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.landscape import downscaling
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp, window_field
-from fifesim.ground.landscape.coarse_lattice import deviation_table, kept_variance, level_deviations
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.lai_labels import distribution_name, one_layer
 
 # Cells along a fixed tile, and pixels at least.
 _TILE, _FEWEST_PIXELS = 504, 8
 
-PIXEL_MARGIN = 12
-"""Pixels read around a tile: the weight of one beyond them is below 3e-5."""
+PIXEL_MARGIN = 12  # pixels read around a tile: the weight of one beyond them is below 3e-5
 
 # Tolerance for the alignment of pixels with cells. [cell]
 _OFF = 1e-2
@@ -314,8 +312,8 @@ def _model(arp, distribution, cv, ratio):
             "give distribution= of the cells over the scene or cv= within pixels, not both: each determines the other"
         )
     if distribution is not None:
-        transform = downscaling.Marginal.of(lai_distribution(distribution), kept_variance(arp, ratio))
-        same = 1.0, float(level_deviations(transform, [1.0], arp, ratio)[0])
+        transform = downscaling.Marginal.of(lai_distribution(distribution), downscaling.kept_variance(arp, ratio))
+        same = 1.0, float(downscaling.level_deviations(transform, [1.0], arp, ratio)[0])
         return _Model(arp, transform, None, None, same, distribution_name(distribution))
     table = _table(arp, ratio)
     variation = downscaling.fife_variation if cv is None else cv
@@ -330,8 +328,8 @@ def _model(arp, distribution, cv, ratio):
 @cached(4, "deviations of downscaled cells")
 def _table(arp, ratio):
     """Coefficients of variation within pixels, and the deviations of log-normal cells and of levels for them."""
-    variations, deviations = deviation_table(arp, ratio)
-    return variations, deviations, level_deviations(downscaling.LogNormal(), deviations, arp, ratio)
+    variations, deviations = downscaling.deviation_table(arp, ratio)
+    return variations, deviations, downscaling.level_deviations(downscaling.LogNormal(), deviations, arp, ratio)
 
 
 def _of_variation(values, table):

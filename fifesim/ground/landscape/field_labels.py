@@ -19,9 +19,8 @@ from fifesim.grids import grid as grids
 from fifesim.grids.chunks import all_apart
 from fifesim.grids.grid import with_crs_of
 from fifesim.grids.sites import made_on_site
-from fifesim.ground.landscape.autoregression import FIELD_TILE, mixed_field
+from fifesim.ground.landscape.autoregression import FIELD_TILE, check_coarser, coarse_field, mixed_field
 from fifesim.ground.landscape.classes import SHARES
-from fifesim.ground.landscape.coarse_lattice import check_coarser, coarse_field
 from fifesim.ground.landscape.covariance import Copula, copula, correlated, field_seed, flat, pairs_of
 from fifesim.ground.landscape.distribution import quantile_map, quantile_table
 from fifesim.ground.terrain.labels import illumination, slope, wetness
@@ -84,8 +83,7 @@ _ARPS = Kind(
     lambda arps: all(isinstance(name, str) and NUMBER.fits(arp) for name, arp in arps.items()),  # type: ignore[misc]
 )
 
-OF_ELEVATION = ("elevation", "wetness", "illumination", "slope")
-"""Terrain properties that correlations may name."""
+OF_ELEVATION = ("elevation", "wetness", "illumination", "slope")  # terrain properties that correlations may name
 
 
 def correlated_fields(

@@ -95,8 +95,8 @@ GroundProperty: TypeAlias = Annotated[FilePath | xr.DataArray | Field | float, A
 Cover: TypeAlias = Annotated[Patches | FilePath | xr.DataArray, UNCHECKED]
 Classes: TypeAlias = Annotated[CoverClass | Sequence[CoverClass] | Mapping[str, CoverClass], UNCHECKED]
 
+# Pasture layout of the default landscape: rectangles of 144 ha on average, typical of ranches in the Flint Hills.
 FIFE_PASTURES = Patches("pastures", 1200.0)
-"""Pasture layout of the default landscape: rectangles of 144 ha on average, typical of ranches in the Flint Hills."""
 
 _REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
 

@@ -71,15 +71,6 @@ def horizon_zenith(dem, cell_y, cell_x, directions, reach):
     References
     ----------
     [DozierFrew1990]_
-
-    Examples
-    --------
-    The top of a wall that stands as far away as it is high, to the east, and nothing to the north:
-
-    >>> land = np.zeros((5, 5))
-    >>> land[:, 3:] = 10
-    >>> horizon_zenith(land, 10, 10, [0, 90], 10)[:, 0, 0].tolist()
-    [90.0, 45.0]
     """
     return zenith(horizon_tangent(dem, cell_y, cell_x, directions, reach))
 
@@ -89,8 +80,9 @@ def horizon_tangent(dem, cell_y, cell_x, directions, reach):
     dem = np.ascontiguousarray(dem, float)
     rows, columns = horizon_margin(cell_y, cell_x, reach)
     rays = _rays(tuple(np.asarray(directions, float).tolist()), float(cell_y), float(cell_x), float(reach))
-    out = np.zeros((rays.ends.size - 1, dem.shape[0] - 2 * rows, dem.shape[1] - 2 * columns))
-    _march(dem.reshape(-1), dem.shape[1], rays, rows, columns, out)
+    out, width = np.zeros((len(directions), dem.shape[0] - 2 * rows, dem.shape[1] - 2 * columns)), dem.shape[1]
+    before, after = (each @ (width, 1) for each in (rays.first, rays.second))
+    _march(dem.reshape(-1), rows * width + columns, width, rays.ends, before, after, rays.share, rays.per_metre, out)
     return out
 
 
@@ -145,35 +137,25 @@ def horizon_toward(tangents, directions, azimuth):
 
 
 @compiled
-def _march(cells, width, rays, top, left, out):
+def _march(cells, start, width, ends, before, after, share, per_metre, out):
+    """Fill in the horizon of the cells from ``start`` on; ``before`` and ``after`` count from a cell to its samples."""
     columns = out.shape[2]
     for direction in range(out.shape[0]):
         for i in range(out.shape[1]):
-            start = (top + i) * width + left
-            here = cells[start : start + columns]
-            for n in range(rays.ends[direction], rays.ends[direction + 1], 2):
-                a = start + rays.first[n, 0] * width + rays.first[n, 1]
-                b = start + rays.second[n, 0] * width + rays.second[n, 1]
-                c = start + rays.first[n + 1, 0] * width + rays.first[n + 1, 1]
-                d = start + rays.second[n + 1, 0] * width + rays.second[n + 1, 1]
-                _raise_horizon(
-                    (cells[a : a + columns], cells[b : b + columns], rays.share[n], rays.per_metre[n]),
-                    (cells[c : c + columns], cells[d : d + columns], rays.share[n + 1], rays.per_metre[n + 1]),
-                    here, out[direction, i],
-                )  # fmt: skip
-
-
-@jitable
-def _raise_horizon(near, far, here, line):
-    """Raise the horizon of a row of cells by two more samples of their rays."""
-    first, second, share, per_metre = near
-    far_first, far_second, far_share, far_per_metre = far
-    for j in range(line.size):
-        rise = (first[j] + share * (second[j] - first[j]) - here[j]) * per_metre
-        # False for NaN: unknown terrain is open.
-        horizon = rise if rise > line[j] else line[j]
-        rise = (far_first[j] + far_share * (far_second[j] - far_first[j]) - here[j]) * far_per_metre
-        line[j] = rise if rise > horizon else horizon
+            first, line = start + i * width, out[direction, i]
+            here = cells[first : first + columns]
+            # Two samples at a time. The comparisons are false for NaN: unknown terrain is open.
+            for n in range(ends[direction], ends[direction + 1], 2):
+                a, b = first + before[n], first + after[n]
+                c, d = first + before[n + 1], first + after[n + 1]
+                near, near_after = cells[a : a + columns], cells[b : b + columns]
+                far, far_after = cells[c : c + columns], cells[d : d + columns]
+                s, t, p, q = share[n], share[n + 1], per_metre[n], per_metre[n + 1]
+                for j in range(columns):
+                    rise = (near[j] + s * (near_after[j] - near[j]) - here[j]) * p
+                    horizon = rise if rise > line[j] else line[j]
+                    rise = (far[j] + t * (far_after[j] - far[j]) - here[j]) * q
+                    line[j] = rise if rise > horizon else horizon
 
 
 # Of Gregory's series of the arctangent of a quarter of an angle: an angle of 90 degrees is good to 2e-14 of it, one
@@ -227,30 +209,8 @@ def sky_vector(tangents, directions, east, north):
 @jitable
 def sky_factor(vector, east, north):
     r"""
-    Sky view factor: irradiance of a slope by a uniform sky relative to an open plain.
-
-    .. math:: V_d = \mathbf{n} \cdot \mathbf{F}, \qquad 0 \le V_d \le \frac{1 + \cos S}{2}
-
-    Parameters
-    ----------
-    vector : fifesim.ground.terrain.slope.Vector
-        Of `sky_vector`, of this slope or of one nearby. [1]
-    east, north : array
-        Gradient of the slope. [m m-1]
-
-    Returns
-    -------
-    sky_view : array
-        At most the sky view of an unbounded plane of this slope. [1]
-
-    References
-    ----------
-    [DozierFrew1990]_, Eq. 7b
-
-    Examples
-    --------
-    >>> float(sky_factor(Vector(0.0, 0.0, 0.75), 0.0, 0.0))
-    0.75
+    Sky view factor of a slope, at most that of an unbounded plane, from the `sky_vector` of this or a near slope. [1]
+    :math:`V_d = \mathbf{n} \cdot \mathbf{F}, \qquad 0 \le V_d \le \frac{1 + \cos S}{2}` [DozierFrew1990]_, Eq. 7b
     """
     return np.maximum(np.minimum(along_normal(vector, east, north), (1 + slope_cosine(east, north)) / 2), 0.0)
 
@@ -283,13 +243,6 @@ def horizon_sky_view(tangents, directions, east, north):
     References
     ----------
     [DozierFrew1990]_, Eq. 7b
-
-    Examples
-    --------
-    A wide plane of 60 degrees sees (1 + cos 60) / 2:
-
-    >>> round(float(horizon_sky_view(np.zeros(16), np.arange(16) * 22.5, np.sqrt(3.0), 0.0)), 12)
-    0.75
     """
     return sky_factor(Vector(*sky_vector(tangents, directions, east, north)), east, north)
 
@@ -297,30 +250,8 @@ def horizon_sky_view(tangents, directions, east, north):
 @jitable
 def horizon_terrain_view(sky_view, cosine):
     r"""
-    Terrain configuration factor: share of land in the view of a slope above its plane.
-
-    .. math:: C_t = \frac{1 + \cos S}{2} - V_d
-
-    Parameters
-    ----------
-    sky_view : array
-        [1]
-    cosine : array
-        Cosine of the slope. [1]
-
-    Returns
-    -------
-    terrain_view : array
-        0 on any wide plane. [1]
-
-    References
-    ----------
-    [DozierFrew1990]_, Eq. 9b
-
-    Examples
-    --------
-    >>> horizon_terrain_view(0.75, 1.0)
-    0.25
+    Terrain configuration factor: share of land in the view of a slope above its plane; 0 on any wide plane. [1]
+    :math:`C_t = \frac{1 + \cos S}{2} - V_d` [DozierFrew1990]_, Eq. 9b
     """
     return (1 + cosine) / 2 - sky_view
 

@@ -221,15 +221,11 @@ def _at_places(data, places):
 class Sunlight(NamedTuple):
     """Ground below one direction of sun and sensor, and the transmittance of the air above it."""
 
-    dem: xr.DataArray
-    """Elevation on the cells of a reflectance, or on more of them, dims (y, x). [m]"""
+    dem: xr.DataArray  # elevation on the cells of a reflectance, or on more of them, dims (y, x). [m]
     geometry: Geometry
-    direct_transmittance: np.ndarray
-    """Transmittance of the sunbeam down to the ground, shape (band,). [1]"""
-    transmittance_down: np.ndarray
-    """Transmittance of all light down to the ground, shape (band,). [1]"""
-    horizon: xr.DataArray | None = None
-    """As in `sky_view`. [degree]"""
+    direct_transmittance: np.ndarray  # transmittance of the sunbeam down to the ground, shape (band,). [1]
+    transmittance_down: np.ndarray  # transmittance of all light down to the ground, shape (band,). [1]
+    horizon: xr.DataArray | None = None  # as in `sky_view`. [degree]
 
 
 def kt_on_slopes(reflectance, light):

@@ -20,8 +20,8 @@ from fifesim.ground.terrain.slope import (
 class Sky(NamedTuple):
     """Sky at places, and for each row and column of cells the previous place and the weight of the next."""
 
+    # Vector of `horizon.sky_vector` and tangent of the horizon toward the sun, shape (4, places, places). [1]
     layers: np.ndarray
-    """Vector of `horizon.sky_vector` and tangent of the horizon toward the sun, shape (4, places, places). [1]"""
     row: np.ndarray
     row_share: np.ndarray
     column: np.ndarray
@@ -49,22 +49,8 @@ class _Setting(NamedTuple):
 
 def slope_light(dem, sky, cell, geometry):
     """
-    Geometric terms of the light on slopes.
-
-    Parameters
-    ----------
-    dem : array, shape (rows + 2, columns + 2)
-        Elevation, north up, with a margin of one cell, which may be NaN. [m]
-    sky : Sky
-    cell : (float, float)
-        Size of a cell, down and across. [m]
-    geometry : fifesim.base.geometry.Geometry
-        Directions of sun and sensor.
-
-    Returns
-    -------
-    light : SlopeLight
-        Fields of shape (rows, columns); NaN where elevation is. [1]
+    SlopeLight of cells, shape (rows, columns), NaN where elevation is. [1] `dem` [m] has a margin of one cell, which
+    may be NaN; `cell` is the size down and across [m].
     """
     rows, columns = dem.shape
     light = SlopeLight(*np.empty((len(SlopeLight._fields), rows - 2, columns - 2)))
@@ -74,29 +60,9 @@ def slope_light(dem, sky, cell, geometry):
 
 def slope_reflectance(reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down, upwelling=True):
     r"""
-    Reflectance factor of cells on slopes, as seen against the irradiance of level ground.
-
-    .. math:: \rho \, K_t \, \max(\mu_v, 0) / \cos \theta_v
-
-    Parameters
-    ----------
-    reflectance : array, shape (band, rows, columns)
-        Reflectance on level ground. [1]
-    dem, sky, cell, geometry
-        As in `slope_light`.
-    direct_transmittance, transmittance_down : array, shape (band,)
-        As in `topographic_factor`. [1]
-    upwelling : bool, optional
-        Whether with the factor of Eq. 5.
-
-    Returns
-    -------
-    reflectance : array, shape (band, rows, columns)
-        [1]
-
-    References
-    ----------
-    [Friedl1995]_, Eqs. 4 and 5
+    Reflectance factor of cells on slopes relative to the irradiance of level ground, shape (band, rows, columns). [1]
+    :math:`\rho \, K_t \, \max(\mu_v, 0) / \cos \theta_v` [Friedl1995]_, Eqs. 4 and 5; arguments as in `slope_light` and
+    `topographic_factor`. Without `upwelling`, Eq. 4.
     """
     out = np.empty(reflectance.shape)
     air = direct_transmittance, transmittance_down
@@ -120,10 +86,22 @@ def slope_factor_and_reflectance(
     return both
 
 
+# Cells of a strip of rows, whose light stays in the cache for all bands.
+_STRIP = 2**14
+
+
 def _pass_over(reflectance, dem, sky, cell, geometry, direct, total, upwelling, reflected, kt, out):
     """Fill in Kt and, on request, reflectance, which may share the array of Kt; the array of reflectance."""
     rho, air = np.ascontiguousarray(reflectance, float), (np.asarray(direct, float), np.asarray(total, float))
-    _slope_factors(rho, *_contiguous(dem, sky), _setting(cell, geometry), *air, upwelling, reflected, kt, out)
+    _, rows, columns = rho.shape
+    step = max(_STRIP // max(columns, 1), 1)
+    for first in range(0, rows, step):
+        part = slice(first, first + step)
+        above = sky._replace(row=sky.row[part], row_share=sky.row_share[part])
+        light = slope_light(dem[first : first + step + 2], above, cell, geometry)
+        if not upwelling:
+            light.upwelling[:] = 1.0
+        _slope_factors(rho, first, light, geometry.mu_s, *air, reflected, kt, out)
     return out
 
 
@@ -152,21 +130,19 @@ def _slope_light(dem, sky, setting, light):
 
 
 @compiled
-def _slope_factors(rho, dem, sky, setting, direct, total, upwelling, reflected, kt, out):
-    columns = out.shape[2]
-    above, below, gradient = np.empty((4, columns)), np.empty((4, columns)), np.empty((2, columns))
-    line = SlopeLight(np.empty(columns), np.empty(columns), np.empty(columns), np.empty(columns))
-    for i in range(out.shape[1]):
-        _sky_beside(sky, i, above, below)
-        _gradient_of_row(dem[i], dem[i + 1], dem[i + 2], setting, gradient[0], gradient[1])
-        _light_of_row(gradient[0], gradient[1], above, below, sky.row_share[i], setting, line)
-        if not upwelling:
-            for j in range(columns):
-                line.upwelling[j] = 1.0
-        for band in range(out.shape[0]):
-            _factor_of_row(rho[band, i], line, setting.sun.z, direct[band], total[band], kt[band, i])
+def _slope_factors(rho, first, light, mu_s, direct, total, reflected, kt, out):
+    """Fill in Kt and reflectance of a strip of rows."""
+    for i in range(light.cosine.shape[0]):
+        cosine, sky_view, mu_s_local = light.cosine[i], light.sky_view[i], light.mu_s_local[i]
+        for band in range(rho.shape[0]):
+            own, factor, seen = rho[band, first + i], kt[band, first + i], out[band, first + i]
+            for j in range(own.size):
+                land = horizon_terrain_view(sky_view[j], cosine[j])
+                air = mu_s, direct[band], total[band]
+                factor[j] = topographic_factor(sky_view[j], land, own[j], mu_s_local[j], *air)
             if reflected:
-                _reflect_row(rho[band, i], line.upwelling, kt[band, i], out[band, i])
+                for j in range(own.size):
+                    seen[j] = own[j] * factor[j] * light.upwelling[i, j]
 
 
 @jitable
@@ -222,16 +198,3 @@ def _light_of_row(east, north, above, below, share, setting, light):
         light.sky_view[j] = sky_factor(seen, east[j], north[j])
         light.mu_s_local[j] = np.maximum(along_normal(setting.sun, east[j], north[j]), 0.0) * lit
         light.upwelling[j] = upwelling_factor(along_normal(setting.sensor, east[j], north[j]), setting.sensor.z)
-
-
-@jitable
-def _factor_of_row(rho, light, mu_s, direct, total, out):
-    for j in range(out.size):
-        land = horizon_terrain_view(light.sky_view[j], light.cosine[j])
-        out[j] = topographic_factor(light.sky_view[j], land, rho[j], light.mu_s_local[j], mu_s, direct, total)
-
-
-@jitable
-def _reflect_row(rho, upwelling, kt, out):
-    for j in range(out.size):
-        out[j] = rho[j] * kt[j] * upwelling[j]

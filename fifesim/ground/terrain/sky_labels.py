@@ -24,8 +24,7 @@ from fifesim.ground.terrain.source_labels import REFERENCE, elevation_grid, sour
 class Places(NamedTuple):
     """Evenly spaced rows and columns, in cells of an elevation model, and their spacing."""
 
-    grid: GeoBox
-    """Grid of the elevation."""
+    grid: GeoBox  # grid of the elevation
     rows: np.ndarray
     columns: np.ndarray
     step: tuple[float, float]

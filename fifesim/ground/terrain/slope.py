@@ -46,23 +46,9 @@ def terrace_step(values):
 def bilinear(layer, rows, columns):
     """Bilinear interpolation between places, constant after the last place, shape (rows, columns)."""
     (row, down), (column, across) = rows, columns
-    out = np.empty((row.size, column.size))
-    _bilinear(np.asarray(layer, float), row, down, column, across, out)
-    return out
-
-
-@compiled
-def _bilinear(layer, row, down, column, across, out):
-    line = np.empty(layer.shape[1])
-    last = layer.shape[0] - 1, layer.shape[1] - 1
-    for i in range(row.size):
-        one, other = row[i], min(row[i] + 1, last[0])
-        share = down[i]
-        for k in range(line.size):
-            line[k] = layer[one, k] * (1 - share) + layer[other, k] * share
-        for j in range(column.size):
-            before = column[j]
-            out[i, j] = line[before] * (1 - across[j]) + line[min(before + 1, last[1])] * across[j]
+    lines = layer[row] * (1 - down[:, None]) + layer[np.minimum(row + 1, layer.shape[0] - 1)] * down[:, None]
+    after = np.minimum(column + 1, layer.shape[1] - 1)
+    return lines[:, column] * (1 - across) + lines[:, after] * across
 
 
 class Vector(NamedTuple):
@@ -118,56 +104,16 @@ def gradient(dem, cell_y, cell_x, rows=None, columns=None):
 
 @jitable
 def slope_cosine(east, north):
-    r"""
-    Cosine of a slope.
-
-    .. math:: \cos S = (1 + |\nabla z|^2)^{-1/2}
-
-    Parameters
-    ----------
-    east, north : array
-        Rise eastward and northward. [m m-1]
-
-    Returns
-    -------
-    cosine : array
-        [1]
-
-    Examples
-    --------
-    >>> round(float(slope_cosine(0.0, 1.0) ** 2), 12)
-    0.5
-    """
+    r"""Cosine of a slope from its gradient [m m-1]: :math:`\cos S = (1 + |\nabla z|^2)^{-1/2}`. [1]"""
     return 1 / np.sqrt(1 + east * east + north * north)
 
 
 @jitable
 def along_normal(vector, east, north):
     r"""
-    Component of a vector along the normal of a slope.
-
-    .. math:: \mathbf{n} \cdot \mathbf{v}
-        = \left( v_z - \frac{\partial z}{\partial x} v_x - \frac{\partial z}{\partial y} v_y \right) \cos S
-
-    For the unit vector toward the sun or the sensor it is the cosine of the local zenith angle.
-
-    Parameters
-    ----------
-    vector : Vector
-    east, north : array
-        Rise eastward and northward. [m m-1]
-
-    Returns
-    -------
-    component : array
-        Negative where the slope faces away. [unit of the vector]
-
-    Examples
-    --------
-    Ground that rises to the east leans west:
-
-    >>> round(float(along_normal(Vector(-0.5**0.5, 0.0, 0.5**0.5), 1.0, 0.0)), 12)
-    1.0
+    Component of a vector along the normal of a slope, negative where the slope faces away. [unit of the vector]
+    :math:`\mathbf{n} \cdot \mathbf{v} = \left( v_z - \frac{\partial z}{\partial x} v_x - \frac{\partial z}{\partial y}
+    v_y \right) \cos S`. For the unit vector toward the sun or the sensor it is the cosine of the local zenith angle.
     """
     return (vector.z - east * vector.x - north * vector.y) * slope_cosine(east, north)
 
@@ -204,33 +150,25 @@ def slope_aspect(dem, cell_y, cell_x):
     References
     ----------
     [DozierFrew1990]_, Eqs. 11 and 12, whose azimuths run from south through east
-
-    Examples
-    --------
-    Ground that rises by its cell to the north faces south:
-
-    >>> slope, aspect = slope_aspect(np.array([[60.0] * 3, [30.0] * 3, [0.0] * 3]), 30, 30)
-    >>> round(float(slope[0, 0]), 9), float(aspect[0, 0])
-    (45.0, 180.0)
     """
     return slope_angles(*gradient(dem, cell_y, cell_x))
 
 
 def slope_angles(east, north):
     """Slope and aspect of a gradient. [degree]"""
-    # np.hypot foresees overflow, and takes five times as long for the same digits but the last.
-    slope = np.degrees(np.arctan(np.sqrt(east * east + north * north)))
     # 0 - x and not -x: level ground must not face -0.
     aspect = np.degrees(np.arctan2(0 - east, 0 - north)) % 360
-    return slope, np.where(aspect == 360, 0.0, aspect)
+    return _slope_angle(east, north), np.where(aspect == 360, 0.0, aspect)
+
+
+def _slope_angle(east, north):
+    # np.hypot foresees overflow, and takes five times as long for the same digits but the last.
+    return np.degrees(np.arctan(np.sqrt(east * east + north * north)))
 
 
 def steepness(dem, cell_y, cell_x):
-    """Slope without aspect in one pass, with the bits of `slope_aspect`, shape (rows, columns). [degree]"""
-    dem = np.ascontiguousarray(dem, float)
-    out = np.empty((dem.shape[0] - 2, dem.shape[1] - 2))
-    _tangent(dem, 2.0 * cell_y, 2.0 * cell_x, out)
-    return np.degrees(np.arctan(out, out=out), out=out)
+    """Slope without aspect, with the bits of `slope_aspect`, shape (rows, columns). [degree]"""
+    return _slope_angle(*gradient(dem, cell_y, cell_x))
 
 
 @compiled
@@ -244,18 +182,6 @@ def _gradient(dem, rows, columns, over_y, over_x, out):
                 continue
             out[0, i, j] = rise(dem[row, column - 1], here, dem[row, column + 1]) / over_x
             out[1, i, j] = rise(dem[row + 1, column], here, dem[row - 1, column]) / over_y
-
-
-# Divided as numpy does: a check of each divisor for 0 would keep a loop from taking several cells at once.
-@compiled
-def _tangent(dem, over_y, over_x, out):
-    """Tangent of the slope."""
-    for i in range(out.shape[0]):
-        above, here, below, line = dem[i], dem[i + 1], dem[i + 2], out[i]
-        for j in range(line.size):
-            east = rise(here[j], here[j + 1], here[j + 2]) / over_x
-            north = rise(below[j + 1], here[j + 1], above[j + 1]) / over_y
-            line[j] = np.nan if np.isnan(here[j + 1]) else np.sqrt(east * east + north * north)
 
 
 def direction_vector(zenith, azimuth):
@@ -301,11 +227,6 @@ def topographic_factor(sky_view, terrain_view, reflectance, mu_s_local, mu_s, di
     References
     ----------
     [Friedl1995]_, Eq. 4; [Dubayah1992]_
-
-    Examples
-    --------
-    >>> float(topographic_factor(1.0, 0.0, 0.3, 0.8, 0.8, 0.6, 0.9))
-    1.0
     """
     direct = direct_transmittance / transmittance_down
     return sky_view + terrain_view * reflectance + direct * (mu_s_local / mu_s - sky_view)
@@ -314,31 +235,8 @@ def topographic_factor(sky_view, terrain_view, reflectance, mu_s_local, mu_s, di
 @jitable
 def upwelling_factor(mu_v_local, mu_v):
     r"""
-    Cosine correction of the light that leaves a slope toward the sensor.
-
-    .. math:: \max(\mu_v, 0) / \cos \theta_v
-
-    The paper has no divisor; with it level ground has 1 in any view.
-
-    Parameters
-    ----------
-    mu_v_local : array
-        Cosine of the sensor's zenith angle on the slope, :math:`\mu_v`. [1]
-    mu_v : float
-        The same on level ground, :math:`\cos \theta_v`. [1]
-
-    Returns
-    -------
-    factor : array
-        1 on level ground, 0 where the slope faces away. [1]
-
-    References
-    ----------
+    Cosine correction of the light that leaves a slope toward the sensor; 0 where the slope faces away. [1]
+    :math:`\max(\mu_v, 0) / \cos \theta_v`. The paper has no divisor; with it level ground has 1 in any view.
     [Friedl1995]_, Eq. 5
-
-    Examples
-    --------
-    >>> upwelling_factor(np.array([0.5, 1.0, -0.1]), 0.5).tolist()
-    [1.0, 2.0, 0.0]
     """
     return np.maximum(mu_v_local, 0.0) / mu_v

@@ -43,52 +43,62 @@ def _weights(share, out):
     out[3] = (66.0 + s * s * (-60.0 + s * s * (30.0 - 10.0 * s))) / 120.0
 
 
-@compiled
 def spline_grid(coefficients, rows, columns):
     """Values of a spline on a grid parallel to its lattice, shape (rows, columns)."""
     # Positions are at least two lattice cells inside; 0 is the centre of the first cell.
-    across = np.empty((coefficients.shape[0], columns.size))
-    weights = np.empty((columns.size, 6))
-    first = np.empty(columns.size, np.int64)
-    for j in range(columns.size):
-        first[j] = int(np.floor(columns[j])) - 2
-        _weights(columns[j] - np.floor(columns[j]), weights[j])
-    for i in range(coefficients.shape[0]):
-        for j in range(columns.size):
-            c, w = coefficients[i, first[j] : first[j] + 6], weights[j]
-            across[i, j] = w[0] * c[0] + w[1] * c[1] + w[2] * c[2] + w[3] * c[3] + w[4] * c[4] + w[5] * c[5]
-    out = np.empty((rows.size, columns.size))
-    w = np.empty(6)
-    for i in range(rows.size):
-        top = int(np.floor(rows[i])) - 2
-        _weights(rows[i] - np.floor(rows[i]), w)
-        a, b, c = across[top], across[top + 1], across[top + 2]
-        d, e, f = across[top + 3], across[top + 4], across[top + 5]
-        u, v, x, y, z, q = w[0], w[1], w[2], w[3], w[4], w[5]
-        for j in range(columns.size):
-            out[i, j] = u * a[j] + v * b[j] + x * c[j] + y * d[j] + z * e[j] + q * f[j]
+    (top, down), (left, across) = _places(rows), _places(columns)
+    lines, out = np.empty((coefficients.shape[0], left.size)), np.empty((top.size, left.size))
+    _spline_grid(np.ascontiguousarray(coefficients), top, down, left, across, lines, out)
     return out
 
 
+def _places(positions):
+    """First of six lattice points for each position, and their weights, shape (6, n)."""
+    whole, weights = np.floor(positions), np.empty((6, positions.size))
+    _weights(positions - whole, weights)
+    return whole.astype(np.int64) - 2, weights
+
+
 @compiled
+def _spline_grid(coefficients, top, down, left, across, lines, out):
+    """Interpolate all rows of coefficients to columns, into ``lines``, and these to rows."""
+    w = across
+    for i in range(lines.shape[0]):
+        c, line = coefficients[i], lines[i]
+        for j in range(left.size):
+            k = left[j]
+            near = w[0, j] * c[k] + w[1, j] * c[k + 1] + w[2, j] * c[k + 2]
+            line[j] = near + w[3, j] * c[k + 3] + w[4, j] * c[k + 4] + w[5, j] * c[k + 5]
+    for i in range(top.size):
+        k, values = top[i], out[i]
+        a, b, c, d, e, f = lines[k], lines[k + 1], lines[k + 2], lines[k + 3], lines[k + 4], lines[k + 5]
+        u, v, x, y, z, q = down[0, i], down[1, i], down[2, i], down[3, i], down[4, i], down[5, i]
+        for j in range(left.size):
+            values[j] = u * a[j] + v * b[j] + x * c[j] + y * d[j] + z * e[j] + q * f[j]
+
+
 def spline_points(coefficients, rows, columns):
     """Values of a spline at points, shape (y, x)."""
     # Positions are at least two lattice cells inside; 0 is the centre of the first cell.
     out = np.empty(rows.shape)
-    down, across = np.empty(6), np.empty(6)
-    for i in range(rows.shape[0]):
-        for j in range(rows.shape[1]):
-            row, column = np.floor(rows[i, j]), np.floor(columns[i, j])
-            _weights(rows[i, j] - row, down)
-            _weights(columns[i, j] - column, across)
-            total = 0.0
-            for k in range(6):
-                line = 0.0
-                for m in range(6):
-                    line += across[m] * coefficients[int(row) - 2 + k, int(column) - 2 + m]
-                total += down[k] * line
-            out[i, j] = total
+    points = (np.ascontiguousarray(each).reshape(-1) for each in (rows, columns))
+    _spline_points(np.ascontiguousarray(coefficients), *points, np.empty((2, 6)), out.reshape(-1))
     return out
+
+
+@compiled
+def _spline_points(coefficients, rows, columns, weights, out):
+    for i in range(out.size):
+        row, column = np.floor(rows[i]), np.floor(columns[i])
+        _weights(rows[i] - row, weights[0])
+        _weights(columns[i] - column, weights[1])
+        total = 0.0
+        for k in range(6):
+            line = 0.0
+            for m in range(6):
+                line += weights[1, m] * coefficients[int(row) - 2 + k, int(column) - 2 + m]
+            total += weights[0, k] * line
+        out[i] = total
 
 
 def spline_of_tiles(make_tile, tile, rows, columns):

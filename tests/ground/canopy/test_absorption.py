@@ -49,10 +49,6 @@ def test_fpar_ends():
     assert beer_fpar(1e4, 0.5, fpar_inf=0.9) == 0.9
 
 
-def test_fpar_of_nan_is_nan_in_its_cell():
-    np.testing.assert_array_equal(np.isnan(beer_fpar([np.nan, 1.0], 0.5)), [True, False])
-
-
 @pytest.mark.parametrize("dissociation", [0.0, 0.4, 1.0])
 def test_green_leaves_absorb_their_share_of_each_depth(dissociation):
     """By quadrature: at each depth the light that is left meets green leaves by their share there."""

@@ -10,7 +10,7 @@ from lazy import check_raster_function
 import fifesim
 from fifesim import Canopy
 from fifesim.base.geometry import Geometry
-from fifesim.ground.canopy.labels import BandCanopy, Light, canopy_kernel, level_reflectance, shares_in_words, shares_of
+from fifesim.ground.canopy.labels import BandCanopy, Light, canopy_kernel, level_reflectance
 
 BANDS = ["red", "nir"]
 LABELS = [SimpleNamespace(name="red", wavelength=0.66), SimpleNamespace(name="nir", wavelength=0.84)]
@@ -52,17 +52,6 @@ def test_some_cells_have_the_bits_of_the_scene(lai, cells, kind):
     kernel, rasters = canopy_kernel(lai, BANDS, canopy, light)
     blocks = [flat(each)[cells] if "y" in each.dims else each.values for each in rasters]
     np.testing.assert_array_equal(kernel(lai.values.ravel()[cells], *blocks), whole.values.reshape(2, -1)[:, cells])
-
-
-def test_background_of_the_same_bands_is_taken_as_it_lies_in_memory(lai):
-    raster = xr.concat([lai / 20, lai / 10], xr.Variable("band", BANDS)).drop_attrs(deep=False)
-    canopy = CANOPY._replace(background=raster)
-    _, (taken,) = canopy_kernel(lai, BANDS, canopy, LIGHT)
-    assert np.shares_memory(taken, raster)
-    _, (turned,) = canopy_kernel(lai, BANDS[::-1], canopy, LIGHT)
-    np.testing.assert_array_equal(turned, raster[::-1])
-    with pytest.raises(ValueError, match="the background lacks band green, it has red, nir"):
-        canopy_kernel(lai, ["green"], canopy, LIGHT)
 
 
 @pytest.fixture(scope="module")
@@ -128,25 +117,9 @@ def test_green_leaves_absorb_less_than_all(lai, rasters):
     np.testing.assert_allclose(whole, fifesim.fpar(lai).where(brown.notnull()), rtol=1e-14)
 
 
-def test_leaf_area_that_crowns_cannot_hold_is_refused(lai):
-    with pytest.raises(ValueError, match="within the crowns is lai / crown_cover, at most 100"):
-        reflectance(lai, Canopy(crown_cover=1e-3))
-
-
 def test_shares_of_another_unit_are_refused(lai, rasters):
     brown, _ = rasters
     with pytest.raises(ValueError, match="units '%'"):
         reflectance(lai, Canopy(brown=brown.assign_attrs(units="%")))
     with pytest.raises(ValueError, match="leaves must be 'all' or 'green', got 'dead'"):
         fifesim.fpar(lai, leaves="dead")
-
-
-def test_numbers_stay_numbers_and_rasters_become_arguments(lai, rasters):
-    brown, _ = rasters
-    canopy, names = Canopy(brown=brown, dissociation=0.25), ("brown", "dissociation", "crown_cover")
-    varying, numbers = shares_of(canopy, names, lai)
-    assert numbers == {"dissociation": 0.25, "crown_cover": 1.0}
-    assert list(varying) == ["brown"] and set(varying["brown"].coords) == {"y", "x", "spatial_ref"}
-    np.testing.assert_array_equal(varying["brown"], brown)
-    assert shares_in_words(canopy) == "brown by cell, dissociation 0.25, "
-    assert shares_in_words(canopy, ("crown_cover",)) == shares_in_words(Canopy(crown_cover=1.0)) == ""

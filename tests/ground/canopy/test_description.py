@@ -196,17 +196,6 @@ def test_a_loose_property_says_where_it_belongs(lai, name):
             call()
 
 
-@pytest.mark.parametrize("value", [0.3, "grass", {"brown": 0.3}, Canopy], ids=str)
-def test_a_canopy_of_another_kind_is_refused(lai, value):
-    for call in (
-        lambda: lai.fifesim.surface_reflectance("TM", canopy=value),
-        lambda: lai.fifesim.fpar(canopy=value),
-        lambda: fifesim.CoverClass("grass", canopy=value),
-    ):
-        with pytest.raises(TypeError, match=r"canopy must be a fifesim\.Canopy"):
-            call()
-
-
 def test_rasters_over_time_go_date_by_date(lai):
     """Those within a mapping as well; and what was not given stays so, also for classes."""
     days = xr.Variable("time", np.array(["1987-06-06T16:35", "1987-07-06T16:35"], "M8[ns]"))
@@ -279,22 +268,6 @@ def test_every_number_is_a_key_of_the_ground_and_of_a_class(name):
 def vars_of(limit):
     """Limits of the metadata of a field, such as ``Ge(ge=0)``."""
     return {name: getattr(limit, name) for name in ("ge", "le") if hasattr(limit, name)}
-
-
-def test_leaf_angles_are_a_key_too():
-    for section in (GroundKeys, ClassKeys):
-        assert section.model_fields["leaf_angles"].default == PROPERTIES["leaf_angles"].default
-
-
-@pytest.mark.parametrize("name", list(NUMERIC_PROPERTIES))
-def test_keys_out_of_range_are_refused_by_place(name):
-    for place, keys in (
-        (f"ground.{name}", lambda value: {"ground": {name: value}}),
-        (f"classes.wood.{name}", lambda value: {"classes": {"wood": {name: value}}, "landscape": {"cover": "voronoi"}}),
-    ):
-        for value in (NUMERIC_PROPERTIES[name].lowest - 0.5, NUMERIC_PROPERTIES[name].highest + 0.5):
-            with pytest.raises(ValueError, match=re.escape(f"{place} = {value:g}: must be at ")):
-                parse_scenario(keys(value))
 
 
 def test_keys_of_the_ground_and_of_a_class_are_its_canopy():

@@ -153,14 +153,3 @@ def test_classes_of_one_canopy_are_evaluated_together(lai, cover, monkeypatch):
         assert len(asked) == kinds
         alone = level_reflectance(lai, BANDS, pair[8], LIGHT)
         np.testing.assert_array_equal(made.values[:, cover == 8], alone.values[:, cover == 8])
-
-
-def test_leaf_angles_of_classes_are_told_once_each(lai, cover):
-    turned = {3: STANDS[3]._replace(canopy=Canopy(leaf_angles="planophile")), 8: STANDS[8]}
-    made = reflectance_of_classes(lai, cover, BANDS, turned, LIGHT)
-    assert made.attrs["leaf_angles"].count(" and ") == 1 and "planophile" in made.attrs["leaf_angles"]
-
-
-def test_leaf_area_of_classes_that_cannot_be_is_refused(lai, cover):
-    with pytest.raises(ValueError, match="negative"):
-        reflectance_of_classes(lai - 5, cover, BANDS, STANDS, LIGHT)

@@ -58,12 +58,6 @@ def test_mixed_leaves_are_the_mean_leaf(view):
     check_equal(canopies(BROWN, 0.0, view), leaves(mean, view))
 
 
-@pytest.mark.parametrize("view", [(28.5, 0, 0, 0.0), (60, 45, 120, 0.0)])
-def test_dead_leaves_below_green_ones_are_a_canopy_over_a_canopy(view):
-    above, below = leaves(GREEN, view, (1 - BROWN) * LAI), leaves(DEAD, view, BROWN * LAI)
-    check_equal(canopies(BROWN, 1.0, view), added(above, below))
-
-
 def test_a_canopy_over_a_canopy_is_one_over_a_background():
     """The lower one is made a background, order by order of light between both; no hot spot."""
     view = (50, 20, 40, 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
+from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 
 DENSITY = {
     "spherical": np.sin,
@@ -25,11 +25,6 @@ def test_classes_integrate_the_density(name):
     np.testing.assert_allclose(leaf_angle_classes(name, classes=9).fraction, expected, atol=1e-14)
 
 
-def test_spherical_classes_are_differences_of_cosines():
-    expected = [0.0152, 0.0451, 0.0737, 0.1000, 0.1233, 0.1428, 0.1580, 0.1684, 0.1736]
-    np.testing.assert_allclose(leaf_angle_classes("spherical", classes=9).fraction, expected, atol=5e-5)
-
-
 @pytest.mark.parametrize("a, b", [(-0.35, -0.15), (1, 0), (-1, 0), (0, 1), (0, -1), (0, 0), (0.3, -0.6)])
 def test_verhoef_classes_agree_with_prosail(a, b):
     """Its iteration stops at 1e-8, which the cube root at a = 1 magnifies."""
@@ -44,11 +39,6 @@ def test_verhoef_without_a_is_even_about_45_degrees(b):
     fraction = np.array(leaf_angle_classes(("verhoef", 0, b)).fraction)
     assert abs(fraction[:45].sum() - 0.5) < 1e-14
     np.testing.assert_allclose(fraction, fraction[::-1], atol=1e-14)
-
-
-def test_verhoef_without_parameters_is_uniform():
-    expected = leaf_angle_classes("uniform").fraction
-    np.testing.assert_allclose(leaf_angle_classes("verhoef(0, 0)").fraction, expected, atol=1e-12)
 
 
 def test_ellipsoid_with_a_mean_of_one_radian_is_a_sphere():
@@ -89,11 +79,6 @@ def test_text_of_a_distribution_makes_it_again(given):
     assert hash(leaves) == hash(leaf_angle_classes(str(leaves)))
 
 
-def test_text_keeps_another_number_of_classes():
-    leaves = leaf_angle_classes("spherical", classes=18)
-    assert leaf_angle_classes(str(leaves)) == leaves
-
-
 def test_a_sequence_is_equal_classes_from_0_to_90():
     assert leaf_angle_classes(np.array([0.5, 0.5])).inclination == (22.5, 67.5)
 
@@ -122,8 +107,3 @@ def test_rounding_is_normalised_away_and_more_is_refused():
 def test_impossible_distributions_are_refused_with_what_is_allowed(given, message):
     with pytest.raises(ValueError, match=message):
         leaf_angle_classes(given)
-
-
-def test_leaf_angles_need_one_fraction_for_each_inclination():
-    with pytest.raises(ValueError, match="2 leaf inclinations with 1 fractions"):
-        LeafAngles((10, 20), (1.0,))

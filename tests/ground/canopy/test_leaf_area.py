@@ -42,9 +42,3 @@ def test_fractions_are_told_from_others():
 def test_others_are_refused_by_name_and_value(check):
     with pytest.raises(ValueError, match=r"brown must be in \[0, 1\], got 40: give a fraction, not percent"):
         check("brown", np.array([0.4, 40.0]))
-
-
-def test_no_data_pass_where_there_are_cells():
-    check_share("brown", np.array([0.4, np.nan]))
-    with pytest.raises(ValueError, match="got nan"):
-        check_fraction("brown", np.array([0.4, np.nan]))

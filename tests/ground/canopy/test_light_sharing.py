@@ -59,9 +59,3 @@ def test_nothing_is_lost():
         assert min(each.min() for each in budget) >= -1e-15
         np.testing.assert_allclose(budget.brown[:, 0], 0, atol=1e-15)
         np.testing.assert_allclose(budget.green[:, 2], 0, atol=1e-15)
-
-
-def test_white_leaves_absorb_nothing():
-    budget = light_budget(3.0, 0.5, 0.5, 0.7, 0.3, 0.0, brown=0.4, dissociation=0.5, sza=30)
-    np.testing.assert_allclose([budget.green, budget.brown], 0, atol=1e-14)
-    np.testing.assert_allclose(budget.ground + budget.reflected, 1, rtol=1e-14)

@@ -30,14 +30,6 @@ def test_defaults_of_the_paper_are_those_calibrated_to_table_2():
     np.testing.assert_array_equal(band_background(["TM3", "TM4"]), [0.15, 0.19])
 
 
-def test_modelled_bands_look_like_a_green_leaf_over_dry_soil():
-    """A green peak, a near infrared plateau, water in the short-wave infrared; soil brightens with wavelength."""
-    reflectance, _ = band_leaf_optics(TM)
-    blue, green, red, near, short, shorter = reflectance
-    assert red < green < near and blue < green and shorter < short < near
-    assert np.all(np.diff(band_background(TM)[:5]) > 0)
-
-
 def test_given_optics_are_taken_by_band_or_in_order():
     given = {"B3": (0.1, 0.05), "B4": (0.5, 0.4)}
     np.testing.assert_array_equal(band_leaf_optics(["B4"], given), [[0.5], [0.4]])
@@ -85,12 +77,6 @@ def test_impossible_values_are_refused(call, message):
         call()
 
 
-def test_possible_values_pass():
-    check_leaf_optics([0.0, 0.7, 1.0], [0.0, 0.3, 0.0])
-    check_background([0.0, np.nan, 1.0])
-    check_lai([0.0, np.nan, 100.0])
-
-
 BANDS = tuple(band.response for band in fifesim.instrument("TM").select(["TM3", "TM4"]))
 
 
@@ -115,23 +101,6 @@ def test_exact_leaves_are_those_of_prospect():
     found = leaf_means(BANDS, Leaf(chlorophyll=values), exact=True)
     expected = one_by_one(Leaf(), "chlorophyll", values.ravel()).reshape(2, 2, 2, 3)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
-
-
-def test_several_contents_are_computed_by_kind_of_leaf(monkeypatch):
-    """Equal leaves once, and contents that broadcast."""
-    asked = []
-    means = optics.leaf_band_means
-    monkeypatch.setattr(
-        optics,
-        "leaf_band_means",
-        lambda contents, weights: asked.append(max(map(np.size, contents))) or means(contents, weights),
-    )
-    water, chlorophyll = np.array([0.01, 0.02, 0.01, 0.02]), np.array([[30.0], [50.0], [30.0]])
-    found = leaf_means(BANDS, Leaf(water=water, chlorophyll=chlorophyll))
-    assert found.shape == (2, 2, 3, 4) and asked == [4]
-    for row, column in np.ndindex(3, 4):
-        leaf = Leaf(water=float(water[column]), chlorophyll=float(chlorophyll[row, 0]))
-        np.testing.assert_allclose(found[..., row, column], optics.band_leaf_optics(BANDS, leaf), rtol=1e-12)
 
 
 def test_missing_content_is_missing_optics():

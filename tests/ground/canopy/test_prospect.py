@@ -74,16 +74,6 @@ def test_opaque_layer_reflects_and_lets_nothing_through():
     np.testing.assert_allclose(prospect.pile(0.1, 0.0, 2.5), (0.1, 0.0), rtol=1e-14)
 
 
-@pytest.mark.parametrize("name", prospect.CONTENTS)
-def test_more_of_anything_absorbs_more(name):
-    """What a leaf neither reflects nor transmits grows with each of its contents, nowhere less."""
-    few, many = (
-        1 - np.sum(prospect.leaf_spectrum(fifesim.Leaf(**{name: share * LARGEST[name]}))[1:], axis=0)
-        for share in (0.3, 0.6)
-    )
-    assert np.all(many >= few - 1e-14) and np.max(many - few) > 0.01
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -4,20 +4,13 @@ import numpy as np
 import pytest
 
 from fifesim.ground.canopy import interpolation
-from fifesim.ground.canopy.crowns import clumped, crown_shares
 from fifesim.ground.canopy.interpolation import LARGEST_TABLE_LAI
-from fifesim.ground.canopy.layers import two_layers
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.reflectance_table import (
     Scene,
     canopy_reflectance,
     cell_by_cell,
-    cell_canopy,
-    decay,
     directional_reflectance,
-    leaves_of,
-    model_reflectance,
-    sky_of,
     varied_reflectance,
 )
 from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
@@ -67,12 +60,6 @@ def test_table_is_within_the_bound_over_a_background_raster(scene):
     np.testing.assert_allclose(table, exact(lai, ground, scene), rtol=0, atol=1e-6)
 
 
-def test_exact_is_the_model_itself():
-    lai, scene = cells(), (28.5, 10, 60, 0.05, "uniform")
-    result = canopy_reflectance(lai, RHO, TAU, GROUND, diffuse_fraction=SKY, exact=True, **parameters(scene))
-    np.testing.assert_array_equal(result, exact(lai, GROUND[:, None], scene))
-
-
 @pytest.mark.parametrize("exactly", [False, True])
 @pytest.mark.parametrize("ground", [0.15, np.full((2, 3, 4), 0.15), np.full((3, 4), 0.15), [0.15, 0.15]])
 def test_bare_ground_is_the_background_and_nan_stays_in_its_cell(ground, exactly):
@@ -97,14 +84,6 @@ def test_any_layout_of_the_cells_gives_the_same_bits():
     np.testing.assert_array_equal(canopy_reflectance(lai[3:17:2, ::-1], **given), whole[:, 3:17:2, ::-1])
     np.testing.assert_array_equal(canopy_reflectance(np.asfortranarray(lai), **given), whole)
     np.testing.assert_array_equal(canopy_reflectance(lai[4, 5], **given), whole[:, 4, 5])
-
-
-def test_arguments_are_left_as_they_were():
-    lai, ground = np.array([0.0, np.nan, 20.0]), np.full((2, 3), 0.2)
-    given = lai.copy(), ground.copy()
-    canopy_reflectance(lai, [0.1, 0.1], [0.1, 0.1], ground, sza=30)
-    np.testing.assert_array_equal(lai, given[0])
-    np.testing.assert_array_equal(ground, given[1])
 
 
 @pytest.mark.parametrize(
@@ -138,29 +117,6 @@ def test_directions_of_each_cell_are_those_of_the_whole_scene_at_them():
         np.testing.assert_allclose(found[:, cell], alone, rtol=1e-13)
     with pytest.raises(ValueError, match=r"sza must be in \[0, 90\) degrees in every cell, got 90"):
         directional_reflectance(lai, leaf, background, sky, (90.0, vza, raa), **shape)
-
-
-def test_dead_leaves_are_mixed_evenly_unless_said_otherwise():
-    """By cell as in the whole scene."""
-    lai, leaf = np.array([0.5, 2.0, 4.0]), {"leaf_reflectance": RHO[:2], "leaf_transmittance": TAU[:2]}
-    options = leaf | {
-        "background": GROUND[:2],
-        "diffuse_fraction": SKY[:2],
-        "leaf_angles": "spherical",
-        "hotspot": 0.05,
-    }
-    options |= {"brown": 0.4, "brown_reflectance": np.array([0.3, 0.4]), "brown_transmittance": np.array([0.05, 0.3])}
-    whole, mixed = (
-        canopy_reflectance(lai, sza=40.0, vza=20.0, raa=60.0, exact=True, **options, **more)
-        for more in ({}, {"dissociation": 0.0})
-    )
-    np.testing.assert_array_equal(whole, mixed)
-    pairs, dead = (RHO[:2], TAU[:2]), (options["brown_reflectance"], options["brown_transmittance"])
-    towards = [np.full(3, angle) for angle in (40.0, 20.0, 60.0)]
-    found = directional_reflectance(
-        lai, pairs, GROUND[:2], SKY[:2], towards, "spherical", 0.05, dead, shares=(0.4, 0.0, 1.0)
-    )
-    np.testing.assert_allclose(found, whole, rtol=0, atol=1e-12)
 
 
 BOTH_LEAVES = {
@@ -217,36 +173,3 @@ def test_canopies_beyond_the_table_are_the_models_themselves(varied_cells):
     np.testing.assert_array_equal(found[:, 2:4], exact[:, 2:4])
     given = given._replace(dissociation=cover)
     np.testing.assert_array_equal(varied_reflectance(lai, ground, given), cell_by_cell(lai, ground, given))
-
-
-GREEN, DEAD = ((0.07, 0.45), (0.04, 0.42)), ((0.28, 0.42), (0.12, 0.3))
-BY_BAND = [np.array(each)[:, None] for each in (*GREEN, *DEAD)]
-ANGLES = {"sza": 40.0, "vza": 20.0, "raa": 30.0}
-PLAIN = Scene(*GREEN, (0.2, 0.1), *ANGLES.values(), leaf_angle_classes("spherical"), 0.1)
-LAI, BROWN = np.array([0.5, 2.0, 4.0]), np.array([0.1, 0.4, 0.9])
-
-
-def test_models_are_those_that_a_scene_needs():
-    light = ANGLES | {"hotspot": 0.1}
-    np.testing.assert_array_equal(cell_canopy(LAI, PLAIN).rso, sail(LAI, *BY_BAND[:2], **light).rso)
-    both = PLAIN._replace(brown_reflectance=DEAD[0], brown_transmittance=DEAD[1], brown=BROWN, dissociation=0.3)
-    expected = two_layers(LAI / 0.5, *BY_BAND, brown=BROWN, dissociation=0.3, **light)
-    crowns = both._replace(crown_cover=0.5, crown_shape=2.0)
-    np.testing.assert_array_equal(leaves_of(LAI / 0.5, both).rso, expected.rso)
-    expected = clumped(expected, crown_shares(0.5, 2.0, *ANGLES.values()))
-    np.testing.assert_array_equal(cell_canopy(LAI, crowns).rso, expected.rso)
-    surface = with_background(expected, 0.2)
-    expected = reflectance_factor(surface.rso, surface.rdo, np.array([[0.2], [0.1]]))
-    np.testing.assert_array_equal(model_reflectance(LAI, np.full((2, 1), 0.2), crowns), expected)
-    np.testing.assert_array_equal(cell_by_cell(LAI, np.full((2, 1), 0.2), crowns), expected)
-
-
-def test_part_of_a_scene_has_part_of_what_varies():
-    part = PLAIN._replace(brown=BROWN, sky=np.ones((2, 1))).part(slice(1, 2))
-    assert part.brown.tolist() == [0.4] and part.sky.shape == (2, 1) and part.hotspot == 0.1
-    assert sky_of(PLAIN).tolist() == [[0.2], [0.1]]
-
-
-def test_light_decays_by_sun_and_view_together():
-    mu = np.cos(np.radians([40.0, 20.0]))
-    np.testing.assert_allclose(decay(PLAIN), 0.5 / mu[0] + 0.5 / mu[1], rtol=1e-12)

@@ -110,24 +110,12 @@ def test_sun_and_observer_share_every_gap_in_the_hot_spot():
     np.testing.assert_allclose(canopy.tsstoo, canopy.tss, rtol=1e-12)
 
 
-def test_a_small_hot_spot_parameter_approaches_none():
-    small, none = (sail(2.0, 0.1, 0.05, sza=40, vza=10, raa=50, hotspot=h).rso for h in (1e-9, 0.0))
-    np.testing.assert_allclose(small, none, rtol=1e-8)
-
-
 @pytest.mark.parametrize("shape", SHAPES)
 def test_conservative_leaves_lose_no_light(shape):
     canopy = sail(LAI, RHO, 1 - RHO, sza=SZA, vza=VZA, raa=50, leaf_angles=shape)
     np.testing.assert_allclose(canopy.rdd + canopy.tdd, 1, atol=1e-9)
     np.testing.assert_allclose(canopy.rsd + canopy.tsd + canopy.tss, 1, atol=1e-9)
     np.testing.assert_allclose(canopy.rdo + canopy.tdo + canopy.too, 1, atol=1e-9)
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_conservative_leaves_over_a_white_background_reflect_everything(shape):
-    surface = with_background(sail(LAI, RHO, 1 - RHO, sza=SZA, vza=VZA, leaf_angles=shape), 1.0)
-    for reflectance in (surface.rdd, surface.rsd, surface.rdo):
-        np.testing.assert_allclose(reflectance, 1, atol=1e-9)
 
 
 @pytest.mark.parametrize("hotspot", [0.0, 0.05])
@@ -284,9 +272,3 @@ def test_arrays_broadcast_and_cells_do_not_touch_each_other():
     holed = exponential_chain(lai, one, other, third)
     assert np.isnan(holed[..., 1]).all()
     np.testing.assert_array_equal(np.delete(holed, 1, -1), np.delete(found, 1, -1))
-
-
-def test_a_chain_of_two_is_the_integral_of_one_exponential():
-    lai = np.array([0.0, 0.1, 3.0, 50.0])
-    np.testing.assert_allclose(exponential_chain(lai, 0.7, 0.0), -np.expm1(-0.7 * lai) / 0.7, rtol=1e-13)
-    assert isinstance(exponential_chain(1.0, 0.7, 0.0), float)

@@ -9,7 +9,6 @@ from fifesim.base import files
 from fifesim.base.bands import Band
 from fifesim.ground.canopy.soil import (
     FILM,
-    WaterFilms,
     below_film,
     brightened,
     grains_in_water,
@@ -83,12 +82,6 @@ def test_grains_in_what_bends_light_as_air_does_stay_as_they_are():
     assert np.all(grains_in_water(DRY, 1.08) < DRY)
 
 
-def test_water_that_does_nothing_leaves_the_soil():
-    nothing = WaterFilms(np.zeros(1), np.zeros(1), np.ones(1), np.ones((1, 6)))
-    for moisture in (0.0, 0.4, 1.0):
-        np.testing.assert_allclose(moistened(DRY[:, None], np.full(12, moisture), nothing)[:, 0], DRY, rtol=1e-12)
-
-
 def test_clear_water_loses_no_light():
     """White ground stays white below any number of films."""
     films = water_films((narrow(0.45),))
@@ -123,16 +116,6 @@ def test_surfaces_reflect_as_fresnel_says():
     assert films.inside[0] == pytest.approx(1 - (1 - 0.066) / 1.333**2, abs=1e-3)
     # Near the normal it is ((n - 1) / (n + 1))**2 = 0.0204, and little more up to 40 degrees.
     assert 0.0204 < films.surface[0] < 0.0225
-
-
-def test_moisture_darkens_and_most_in_the_shortwave_infrared():
-    """Nearly alike where water is clear, which a third of the light is lost to, and more where it absorbs."""
-    moisture = np.linspace(0, 1, 11)
-    found = moistened(np.full(6, 0.3), moisture, water_films(TM)) / 0.3
-    assert np.all(np.diff(found, axis=0) < 0)
-    tm1, _, tm3, tm4, tm5, tm7 = found[-1]
-    assert 0.6 < tm3 < 0.75 and abs(tm1 - tm4) < 0.01
-    assert tm7 < tm5 < tm4
 
 
 def test_numbers_are_broadcast_and_missing_ones_stay_missing():

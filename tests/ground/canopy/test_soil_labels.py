@@ -135,39 +135,3 @@ def test_soil_that_cannot_be_is_one_line(lai, options, message):
         reflectance(lai, None, moisture=lai.expand_dims(band=["TM3"]))
     with pytest.raises(ValueError, match="different grids"):
         reflectance(lai, None, moisture=(lai * 0).assign_coords(x=lai["x"] + 9))
-
-
-def test_soils_of_each_date(lai, share):
-    """A soil over time goes with its date, one without it with all."""
-    dates = xr.concat([lai, lai], "time").assign_coords(time=np.array(["1987-06-06", "1987-06-22"], "M8[ns]"))
-    water = xr.concat([share * 0, share], "time").assign_coords(time=dates["time"])
-    options = {"geometry": fifesim.fife_geometry()}
-    found = reflectance(dates, None, moisture=water, soil=0.02, **options)
-    np.testing.assert_array_equal(found[1], reflectance(lai, None, moisture=share, soil=0.02, **options))
-
-
-# R2 of LAI on NDVI over aligned pixels, for standard deviations of soil brightness of 0, 0.02, 0.04 and 0.06 along the
-# soil line: burned-grazed, arp 0.24 of both.
-SCATTER = [0.974, 0.970, 0.958, 0.936]
-
-
-@pytest.mark.parametrize("response", ["paper", pytest.param("detector", marks=pytest.mark.slow)])
-def test_soil_scatters_ndvi_as_much_as_its_variance_says(response):
-    """
-    The standard deviation is that of the reflectance at 0.55 um. R2 of .974 without soil is that of Table 1's response;
-    with the detector's alone it is .980 to begin with. Over 4,400 pixels seeds differ by .001.
-    """
-    instrument, cells = fifesim.instrument("TM", response=response), 600
-    grid = fifesim.fife_site(30 / 9, window=((0, cells), (0, cells)))
-    lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.24, seed=3)
-    truth = lai.fifesim.aggregate(30)
-    field = fifesim.correlated_fields(grid, {"soil": 0.24}, seed=3)["soil"]
-    found = []
-    for deviation in (0.0, 0.02, 0.04, 0.06):
-        rho = lai.fifesim.surface_reflectance(
-            instrument, bands=TM34, canopy=fifesim.Canopy(soil=deviation * field if deviation else None)
-        )
-        found.append(fifesim.regress(truth, rho.fifesim.to_toa().fifesim.sense(instrument).fifesim.ndvi()).r2)
-    np.testing.assert_allclose(found, SCATTER, rtol=0, atol=0.01)
-    # Scatter grows as the variance does, so that each step is larger than the one before.
-    assert np.all(np.diff(found, 2) < 0)

@@ -14,8 +14,8 @@ import fifesim
 from fifesim.base import files
 from fifesim.base.bands import Band, solar_spectrum
 from fifesim.ground.canopy import optics, spectra
-from fifesim.ground.canopy.library import LEAVES, SPECTRA, library_spectra
 from fifesim.ground.canopy.prospect import leaf_spectrum
+from fifesim.ground.canopy.spectra import LEAVES, SPECTRA, library_spectra
 
 TM = [band.response for band in fifesim.instrument("TM").bands]
 NAMES = [band.name for band in TM]
@@ -106,14 +106,6 @@ def test_own_spectrum_is_a_file_or_a_dataset(tmp_path, lai):
     assert 0.1 + 0.5 * (0.76 - 0.4) < nir < 0.1 + 0.5 * (0.9 - 0.4)
 
 
-def test_a_chosen_leaf_reaches_the_canopy(lai):
-    brown, green = (
-        fifesim.surface_reflectance(lai, "MODIS", bands=["MODIS1", "MODIS2"], canopy=fifesim.Canopy(leaf_optics=leaf))
-        for leaf in (fifesim.Leaf(chlorophyll=0, carotenoids=0, brown=0.5), fifesim.Leaf())
-    )
-    assert float(brown.sel(band="MODIS1").mean()) > float(green.sel(band="MODIS1").mean())
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
@@ -171,14 +163,6 @@ def test_spectra_are_those_of_land():
     ndvi = (at(0.84) - at(0.66)) / (at(0.84) + at(0.66))
     # From bare soil to closed canopies.
     assert ndvi.min() < 0.1 and ndvi.max() > 0.9 and 0.25 < np.mean(ndvi < 0.5) < 0.35
-
-
-def test_leaves_are_green_red_dry_and_dead():
-    """Features of the contents in the closed canopies: the green peak, the water bands and the red edge."""
-    closed = at(0.84) > 0.3
-    green_peak, water = (at(0.55) / at(0.66))[closed], (at(1.65) / at(1.25))[closed]
-    assert np.quantile(green_peak, 0.05) < 0.9 < 1.3 < np.quantile(green_peak, 0.95)
-    assert np.quantile(water, 0.05) < 0.6 < 0.9 < np.quantile(water, 0.95)
 
 
 def test_first_spectrum_of_a_leaf_is_bare_ground():

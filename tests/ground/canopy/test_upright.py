@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import fifesim
-from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
-from fifesim.ground.canopy.upright import upright_reflectance
+from fifesim.ground.canopy.sail_model import reflectance_factor, sail, upright_reflectance, with_background
 
 GREEN = 0.45, 0.42
 

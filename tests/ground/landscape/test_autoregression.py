@@ -1,11 +1,9 @@
 """The autoregressive process: its spectrum, its variance and its lengths by other routes."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from oracles_field import covariances
-from scipy import fft, sparse, special, stats
+from scipy import fft, sparse, stats
 from scipy.sparse.linalg import spsolve
 
 import fifesim
@@ -15,7 +13,6 @@ from fifesim.ground.landscape.autoregression import (
     LARGEST_STREAMING_ARP,
     _box_muller,
     autocorrelation,
-    correlation_length,
     field_variance,
     margin,
     mixed_field,
@@ -66,24 +63,9 @@ def test_margin_holds_the_response():
         assert impulse[cells] < 2e-8 * impulse[0]
 
 
-@pytest.mark.parametrize("function", [field_variance, correlation_length, partial(autocorrelation, lag=0)])
-@pytest.mark.parametrize("arp", [-0.01, 0.25, 0.3, np.nan])
-def test_what_is_not_stationary_is_refused(function, arp):
-    with pytest.raises(ValueError, match="the four-neighbour process is not stationary"):
-        function(arp)
-
-
 def test_length_beyond_streaming_is_refused():
     with pytest.raises(ValueError, match="use larger cells for a longer range"):
         fifesim.arp_for_length(1e6)
-
-
-def test_variance_of_the_paper_smoothest_field():
-    """k = 0.96: the elliptic integral by its series, to the digits that 400 terms give."""
-    k2, n = 0.96**2, np.arange(400)
-    ratio = np.exp(2 * (special.gammaln(2 * n + 1) - 2 * special.gammaln(n + 1) - 2 * n * np.log(2)))
-    integral = np.pi / 2 * np.sum(ratio * k2**n / (1 - 2 * n))
-    assert field_variance(0.24) == pytest.approx(2 / np.pi * integral / (1 - k2), rel=1e-12)
 
 
 # kat_vectors of Random123 1.14: counter, key, answer.
@@ -202,15 +184,6 @@ def test_spectrum_follows_the_response(arp_and_field):
     cells = np.bincount(ring)
     means, errors = np.bincount(ring, ratio.ravel()) / cells, np.sqrt((3 / 2) ** 4 / cells)
     assert len(cells) == 8 and (np.abs(means - 1) < 4 * errors).all()
-
-
-def test_without_interaction_the_field_is_white():
-    field = streaming_field(3, 0.0, 5, -9, (1000, 1000))
-    error = 4 / np.sqrt(field.size)
-    for down, across in [(0, 1), (1, 0), (1, 1), (2, 1), (72, 0), (0, 504)]:
-        product = field[down:, across:] * field[: 1000 - down, : 1000 - across]
-        assert product.mean() == pytest.approx(0, abs=1.5 * error)
-    assert stats.kstest(field.ravel(), "norm").statistic < 1.95 / 1000
 
 
 @pytest.mark.parametrize("arp", [0.1, 0.15, 0.24])

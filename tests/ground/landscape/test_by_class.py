@@ -6,7 +6,7 @@ import xarray as xr
 from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 
 from fifesim.grids import classes
-from fifesim.grids.classes import _identity, by_class
+from fifesim.grids.classes import by_class
 
 
 @pytest.fixture
@@ -44,11 +44,6 @@ def test_each_class_has_what_its_kernel_gives(monkeypatch, lai, cover, kernels, 
     np.testing.assert_array_equal(made, expected)
 
 
-def test_block_of_one_class_is_handed_over_as_it_is(lai, cover):
-    one = by_class({5: (np.sqrt, [])}, xr.full_like(cover, 5), lai)
-    np.testing.assert_array_equal(one, np.sqrt(lai))
-
-
 @pytest.mark.parametrize("codes", [[1, 5], [-1, 1, 5], [1, 5, 9], [-1, 1, 5, 9]], ids=str)
 def test_classes_of_one_kernel_are_evaluated_together(lai, codes):
     calls = []
@@ -58,14 +53,6 @@ def test_classes_of_one_kernel_are_evaluated_together(lai, codes):
     known = np.where(cover == 9, -lai, np.where(cover == -1, np.nan, np.sqrt(lai)))
     np.testing.assert_array_equal(made, known)
     assert calls == [int(cover.isin([1, 5]).sum())]
-
-
-def test_raster_that_classes_share_is_taken_once(lai):
-    for raster in (lai, in_chunks(lai, CHUNKS), xr.DataArray([1.0, 2.0], dims="band")):
-        again = raster.copy() if raster.ndim < 2 else raster.drop_vars("spatial_ref")
-        others = raster + 1, raster.isel({raster.dims[0]: [0]})
-        keys = [_identity(each) for each in (raster, again, *others)]
-        assert [keys.index(key) for key in keys] == [0, 0, 2, 3]
 
 
 def test_code_without_a_kernel_is_an_error_when_it_computes(lai, cover):

@@ -6,7 +6,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 import xarray as xr
-from scipy import integrate, stats
+from scipy import stats
 
 import fifesim
 from fifesim.ground.canopy.description import Canopy
@@ -18,7 +18,6 @@ from fifesim.ground.landscape.classes import (
     CoverClass,
     Field,
     class_table,
-    fife_classes,
     read_table,
     table_text,
 )
@@ -85,16 +84,6 @@ def test_impossible_table_is_refused(classes, error, message):
         class_table(classes)
 
 
-def test_treatments_of_fife_differ_by_their_leaf_area():
-    table = class_table(fife_classes())
-    assert [(each.code, each.lai) for each in table] == [
-        (1, "burned-grazed"),
-        (2, "burned-ungrazed"),
-        (3, "unburned-ungrazed"),
-    ]
-    assert all(not each.canopy.given and each.arp is None for each in table)
-
-
 FULL = CoverClass(
     "wood",
     lai=stats.gamma(4, scale=0.4),
@@ -157,26 +146,6 @@ def test_share_has_exactly_its_mean_and_deviation(name, mean, sd):
     assert found.support() == (0, 1)
     assert (found.mean(), found.std()) == pytest.approx((mean, sd), rel=1e-12)
     assert Field(mean=mean, sd=sd, arp=0.24).distribution(name) is found
-
-
-@pytest.mark.parametrize(("mean", "sd"), [(0.2, 0.1), (0.7, 0.15)])
-def test_moments_of_a_share_are_those_of_its_density(mean, sd):
-    """Quadrature of the density, and the third moment that the beta distribution has beside any other."""
-    density = Field(mean=mean, sd=sd).distribution("brown").pdf
-    moments = [integrate.quad(lambda x, n=n: (x - mean) ** n * density(x), 0, 1, epsabs=1e-12)[0] for n in range(4)]
-    skewness = 2 * sd * (1 - 2 * mean) / (mean * (1 - mean) + sd**2)
-    np.testing.assert_allclose(moments, [1, 0, sd**2, skewness * sd**3], rtol=1e-8, atol=1e-10)
-
-
-def test_share_of_the_deviation_of_the_uniform_one_is_uniform():
-    found = Field(mean=0.5, sd=12**-0.5).distribution("moisture")
-    np.testing.assert_allclose(found.cdf([0.1, 0.5, 0.8]), [0.1, 0.5, 0.8], rtol=1e-12)
-
-
-def test_shares_of_green_and_dead_leaves_mirror_each_other():
-    dead, green = Field(mean=0.2, sd=0.1), Field(mean=0.8, sd=0.1)
-    x = np.linspace(0, 1, 11)
-    np.testing.assert_allclose(dead.distribution("brown").cdf(x), green.distribution("brown").sf(1 - x), atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -6,15 +6,12 @@ from scipy import integrate, stats
 
 from fifesim.ground.landscape.autoregression import field_variance, response
 from fifesim.ground.landscape.covariance import (
-    Impossible,
     copula,
     correlated,
     cross_correlation,
     field_seed,
-    largest_share,
     normal_scores,
     pairs_of,
-    refused,
     score_table,
 )
 
@@ -52,16 +49,6 @@ def test_cross_correlation_is_that_of_the_spectra(one, other):
     expected = product / np.pi**2 / np.sqrt(field_variance(one) * field_variance(other))
     assert cross_correlation(one, other) == pytest.approx(expected, abs=1e-7)
     assert cross_correlation(other, one) == cross_correlation(one, other)
-
-
-def test_cross_correlation_of_nearly_equal_arps_is_nearly_one():
-    assert cross_correlation(0.2, 0.2 + 2e-7) == pytest.approx(1, abs=1e-6)
-
-
-@pytest.mark.parametrize("arps", [(0.3, 0.1), (0.1, 0.3), (0.3, 0.3)])
-def test_fields_that_are_not_stationary_have_no_correlation(arps):
-    with pytest.raises(ValueError, match="the four-neighbour process is not stationary"):
-        cross_correlation(*arps)
 
 
 def test_ground_that_is_level_is_followed_by_nothing():
@@ -285,19 +272,3 @@ def test_what_is_no_correlation_is_one_line(correlations, kind, message):
     with pytest.raises(kind, match=message) as caught:
         pairs_of(correlations, FIELDS, GROUND)
     assert len(str(caught.value)) <= 500
-
-
-def test_largest_share_is_found():
-    def attempt(share):
-        if share > 0.37:
-            raise Impossible
-
-    assert largest_share(attempt) == pytest.approx(0.37, abs=1e-5)
-
-
-def test_refusal_names_all_and_is_short():
-    names = [f"property {number}" for number in range(5)]
-    pairs = {("lai", name): -0.98765 for name in names}
-    message = refused(pairs, 0.999, "no correlation matrix has them together; pairs that are not named count as 0")
-    assert len(message) <= 500
-    assert all(f"lai-{name} -0.98" in message for name in names)

@@ -124,12 +124,6 @@ def test_nearest_point_may_lie_two_squares_away():
     assert away.argmin() == 10 and number[0, 0] == 10
 
 
-def test_points_of_patches_are_even_over_their_squares():
-    drawn = _drawn(2, 8, 0, 0, (64, 64), 3).reshape(3, -1)
-    np.testing.assert_allclose(drawn.mean(axis=1), 0.5, rtol=0, atol=4 / np.sqrt(12 * 4096))
-    assert np.abs(np.corrcoef(drawn) - np.eye(3)).max() < 4 / 64
-
-
 def test_smooth_field_is_standard_normal_and_has_its_length():
     """300 x 300 lengths; the correlation of a Gaussian is 1/e at distance 1, the same down and across."""
     place = np.arange(1200) / 4

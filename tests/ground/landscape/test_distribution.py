@@ -16,7 +16,6 @@ from fifesim.ground.landscape.distribution import (
     quantile_map_of_classes,
     quantile_table,
     rank_map,
-    rank_quantiles,
     truncated_normal,
 )
 
@@ -42,19 +41,6 @@ def test_treatment_has_its_moments(row):
 def test_impossible_moments_are_refused():
     with pytest.raises(ValueError, match="no normal truncated"):
         truncated_normal(1.0, 5.0, 0.0, 2.0)
-
-
-def test_kernel_density_is_the_sum_of_kernels_and_mirror_images():
-    """Brute force over samples, with Scott's bandwidth."""
-    bandwidth = SAMPLES.std(ddof=1) * len(SAMPLES) ** -0.2
-    distribution = kernel_density(SAMPLES)
-    for x in (0.0, 0.03, 0.5, 1.7, 4.0):
-        expected = sum(
-            np.exp(-0.5 * ((x - centre) / bandwidth) ** 2) / np.sqrt(2 * np.pi) / bandwidth / len(SAMPLES)
-            for sample in SAMPLES
-            for centre in (sample, -sample)
-        )
-        assert distribution.pdf(x) == pytest.approx(expected, rel=1e-12)
 
 
 def test_kernel_density_agrees_with_scipy_reflected_at_zero():
@@ -89,12 +75,6 @@ def test_density_needs_some_spread():
 def write(path, table):
     path.write_text(table)
     return path
-
-
-def test_samples_of_the_densest_canopies_are_taken(tmp_path):
-    samples = np.linspace(0, 20, 30)
-    path = write(tmp_path / "dense.csv", "LAI\n" + "\n".join(map(str, samples)))
-    assert lai_distribution(path).mean() == pytest.approx(kernel_density(samples).mean(), rel=1e-9)
 
 
 def test_samples_come_from_a_csv(tmp_path):
@@ -140,11 +120,6 @@ def test_unusable_samples_are_refused(tmp_path, table, message):
 def test_what_is_no_distribution_is_refused(source, error, message):
     with pytest.raises(error, match=message):
         lai_distribution(source)
-
-
-def test_frozen_distributions_are_taken_as_they_are():
-    gamma = stats.gamma(2.0, scale=0.5)
-    assert lai_distribution(gamma) is gamma
 
 
 def kolmogorov_distance(values, distribution):
@@ -237,22 +212,3 @@ def test_streaming_scene_has_the_distribution_within_sampling_error(arp):
     lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 1000), (0, 1000))), arp=arp, seed=7)
     distance = kolmogorov_distance(lai.values, lai_distribution("burned-grazed"))
     assert distance < 1.95 / np.sqrt(independent_cells(arp, lai.size))
-
-
-@pytest.mark.slow
-def test_whole_site_has_the_distribution_within_a_thousandth():
-    lai = fifesim.lai_scene(fifesim.fife_site(30 / 9), arp=0.15, seed=7)
-    assert kolmogorov_distance(lai.values, lai_distribution("burned-grazed")) < 1e-3
-
-
-@pytest.mark.parametrize("arp", [0.15, 0.24])
-def test_periodic_scene_has_the_distribution_exactly(arp):
-    lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 300), (0, 200))), arp=arp, method="periodic")
-    assert kolmogorov_distance(lai.values, lai_distribution("burned-grazed")) == pytest.approx(0.5 / lai.size, rel=1e-6)
-
-
-def test_quantiles_of_few_ranks_are_kept_and_of_many_let_go():
-    """Pieces of a large scene ask again for the same; those of a whole one would stay in memory."""
-    distribution = stats.uniform(0, 3)
-    assert rank_quantiles(distribution, 1000) is rank_quantiles(distribution, 1000)
-    assert rank_quantiles(distribution, 2**20) is not rank_quantiles(distribution, 2**20)

@@ -9,7 +9,6 @@ from scipy import stats
 
 from fifesim.grids.classes import cells_by_class, check_codes, numbers_of
 from fifesim.ground.landscape.autoregression import periodic_field
-from fifesim.ground.landscape.coarse_lattice import deviation_table, kept_variance, level_deviations
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
 from fifesim.ground.landscape.downscaling import (
     Kriging,
@@ -17,11 +16,14 @@ from fifesim.ground.landscape.downscaling import (
     Marginal,
     by_pixel,
     densities_of_means,
+    deviation_table,
     downscaled,
     fife_variation,
+    kept_variance,
     kriged,
     kriging_block_means,
     kriging_filter,
+    level_deviations,
     map_trend,
     of_means,
     spectral_densities,
@@ -221,12 +223,6 @@ def test_means_near_the_ends_of_a_distribution_are_met():
     assert cells.min() >= 0 and cells.max() < 2.2 * 1.0015
 
 
-def test_levels_of_a_distribution_are_those_of_its_mean():
-    """Of a normal distribution the mean of a pixel is linear in its level."""
-    marginal = Marginal.of(stats.norm(10.0, 0.5), 0.3)
-    np.testing.assert_allclose(marginal.level(np.array([9.0, 10.0, 10.5])), [-2.0, 0.0, 1.0], atol=1e-4)
-
-
 def test_grass_of_fife_varies_as_its_table_says():
     """The three treatments at arp 0.15 in pixels of 3 x 3 cells: on average within a tenth."""
     inside = np.sqrt(1 - kept_variance(0.15, (3, 3)))
@@ -312,13 +308,6 @@ def test_sums_by_the_weights_of_pixels_are_the_transpose_of_the_estimate(ratio, 
     np.testing.assert_allclose(found.ravel(), weights(0.2, 0.3, ratio, shape).T @ cells.ravel(), rtol=0, atol=2e-5)
 
 
-def test_means_of_the_cells_are_the_pixels():
-    ratio, shape = (3, 3), (24, 20)
-    pixels = np.random.default_rng(1).standard_normal(shape)
-    cells = kriged(pixels, kriging_filter(0.15, 0.3, ratio, shape), ratio)
-    np.testing.assert_allclose(kriging_block_means(cells, ratio), pixels, rtol=0, atol=2e-6)
-
-
 @pytest.mark.parametrize("arp", [0.05, 0.15, 0.24])
 def test_field_with_the_means_of_another_has_the_covariance_of_the_process(arp):
     """Of z + K (B z' - B z) with matrices, without drawing: inside of pixels and across their borders, to 0.5 %."""
@@ -361,10 +350,6 @@ def test_cells_of_each_class_are_its_own_in_order(codes):
         np.testing.assert_array_equal(cells, np.flatnonzero(codes == code))
 
 
-def test_class_without_cells_has_none():
-    assert [cells.tolist() for cells in cells_by_class(np.array([2, -1], np.int16), (1, 2, 3))] == [[], [0], []]
-
-
 @pytest.mark.parametrize("dtype", [np.int16, np.int64, float, np.uint16])
 def test_codes_of_the_table_pass_in_any_numbers(codes, dtype):
     known = codes[codes >= 0]
@@ -390,12 +375,6 @@ def test_fractions_and_many_codes_are_told_in_a_line():
     with pytest.raises(ValueError, match=r"1, 2, 3, 4, 5, 6, 7, 8, \.\.\., in") as told:
         check_codes(np.arange(1, 1001), tuple(range(2000, 3000)))
     assert len(str(told.value)) < 500
-
-
-def test_of_many_other_codes_those_of_most_cells_are_named():
-    codes = np.repeat(np.arange(1, 11), np.arange(1, 11))
-    with pytest.raises(ValueError, match=r"without a class: 3, 4, 5, 6, 7, 8, 9, 10, \.\.\., in 55 of 55 cells"):
-        check_codes(codes, (40,))
 
 
 def test_numbers_are_places_in_the_table():

@@ -101,13 +101,6 @@ def test_window_is_a_slice_of_the_whole_also_where_it_begins_in_a_pixel(scene, l
     xr.testing.assert_allclose(window["x"], scene["x"][44:200], rtol=0, atol=1e-6)
 
 
-def test_window_of_the_map_is_a_slice_but_for_its_rim(scene, lai_map):
-    part = fifesim.downscale(lai_map[:, :45], GRID, arp=0.2, cv=0.3, seed=7)
-    assert np.isnan(part[:, 135:]).all()
-    np.testing.assert_allclose(part[:, : 135 - 36], scene[:, : 135 - 36], rtol=1e-3)
-    np.testing.assert_allclose(means(part)[:, :45], lai_map[:, :45], rtol=1e-12)
-
-
 def test_cells_beyond_the_map_are_unknown(scene, lai_map):
     larger = fifesim.downscale(lai_map, GRID.pad(9), arp=0.2, cv=0.3, seed=7)
     np.testing.assert_array_equal(larger[9:-9, 9:-9], scene)
@@ -178,14 +171,6 @@ def test_map_of_the_model_is_not_taken_for_a_trend(monkeypatch, options):
         fifesim.lai_scene(grid, density, arp=0.05, seed=1).fifesim.aggregate(10), grid, arp=0.05, **options
     )
     assert len(found) == 1 and found[0] <= 0.25
-
-
-def test_default_is_the_grass_of_fife(lai_map):
-    default = fifesim.downscale(lai_map, GRID, seed=1)
-    np.testing.assert_array_equal(
-        default, fifesim.downscale(lai_map, GRID, cv=lambda m: np.minimum(0.4 / m, 0.6), seed=1)
-    )
-    assert default.attrs["arp"] == 0.15
 
 
 @pytest.mark.parametrize("off", [0, 1])

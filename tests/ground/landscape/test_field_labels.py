@@ -209,19 +209,6 @@ def mixed(grid, ground):
     )
 
 
-def test_fields_of_coarser_lattices_correlate_as_asked(ground, mixed):
-    """600 x 600 cells hold some 60 x 60 independent ones of the soil."""
-    for name, asked in COVARY.items():
-        other = mixed[name].values.ravel() if name == "soil" else None
-        if other is None:
-            other = normal_scores(ground[name].values.ravel(), score_table(ground[name].values.ravel()))
-        assert np.corrcoef(mixed["lai"].values.ravel(), other)[0, 1] == pytest.approx(asked, abs=0.04), name
-    assert np.corrcoef(mixed["soil"].values.ravel(), mixed["moisture"].values.ravel())[0, 1] == pytest.approx(
-        0, abs=0.06
-    )
-    assert "4 x 4 cells" in mixed["soil"].attrs["history"] and "cells" not in mixed["lai"].attrs["history"]
-
-
 def test_coarser_lattices_give_the_same_bits_in_chunks_and_windows(grid, ground, mixed):
     window = (slice(201, 300), slice(50, 222))
     options = {"arps": {"soil": 0.05, "moisture": 0.05, "lai": 0.15}, "covary": COVARY, "seed": 7, "coarser": COARSE}

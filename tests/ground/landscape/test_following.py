@@ -30,14 +30,3 @@ def test_fields_before_the_first_that_follows_the_ground_do_not_wait_for_it(hill
         assert found[name].coarse.get(name) == whole.coarse.get(name)
     for name in ("lai", "brown"):
         assert found[name].chunks == () and found[name].values.item().noise == whole.noise
-
-
-def test_ground_in_memory_is_known_at_once(hills):
-    found = copulas(ARPS, PAIRS, hills, None, ())
-    assert len({id(each) for each in found.values()}) == 1 and isinstance(found["lai"], Copula)
-
-
-def test_a_field_that_follows_first_makes_all_wait(hills):
-    lazy = {name: in_chunks(each, {"y": 40, "x": 33}) for name, each in hills.items()}
-    found = copulas({"lai": 0.15, "soil": 0.05}, {("lai", "elevation"): 0.3}, lazy, None, ())
-    assert not any(isinstance(each, Copula) for each in found.values())

@@ -15,7 +15,6 @@ from scipy import stats
 import fifesim
 from fifesim.grids import cf
 from fifesim.grids import grid as grids
-from fifesim.ground.landscape import field_labels
 from fifesim.ground.landscape.autoregression import response
 from fifesim.ground.landscape.classes import CoverClass, Field, class_table
 from fifesim.ground.landscape.cover import Patches, patch_classes
@@ -98,13 +97,6 @@ def test_mean_and_deviation_are_as_asked(land, name):
     assert stats.kstest(values[::7, ::7].ravel(), kind.cdf).pvalue > 0.01
 
 
-def test_mean_of_a_field_is_added_to_what_may_be_negative(grid):
-    drawn = {"soil": Field(sd=0.04)}, {"soil": Field(mean=-0.1, sd=0.04)}
-    level, dark = (drawn_fields(grid, each, None, (), seed=7)[1]["soil"] for each in drawn)
-    np.testing.assert_array_equal(dark, level + -0.1)
-    assert cf.attributes("soil").items() <= dark.attrs.items()
-
-
 def test_properties_are_made_of_the_scores_of_their_names(grid):
     """Those of `correlated_fields`, to the bit."""
     scores = fifesim.correlated_fields(grid, {name: each.arp for name, each in DRAWN.items()}, seed=7)
@@ -115,17 +107,6 @@ def test_properties_are_made_of_the_scores_of_their_names(grid):
     assert made["soil"].name == "soil" and made["soil"].attrs["arp"] == 0.2 and made["brown"].attrs["site"] == "FIFE"
     assert made["soil"].attrs["history"].endswith("soil: standard deviation 0.04")
     assert made["brown"].attrs["history"].endswith("brown: by quantiles")
-
-
-def test_properties_and_what_the_elevation_tells_are_made_once_for_all_arps(grid, hills, monkeypatch):
-    asked, told, fields, tell = [], [], field_labels.landscape_fields, field_labels.of_elevation
-    monkeypatch.setattr(field_labels, "landscape_fields", lambda *a, **k: asked.append(fields(*a, **k)) or asked[-1])
-    monkeypatch.setattr(
-        field_labels, "of_elevation", lambda dem, names, **k: told.append(names) or tell(dem, names, **k)
-    )
-    leaf_area, _ = drawn_fields(grid, DRAWN, COVARY, (0.1, 0.2), seed=7, dem=hills)
-    assert list(leaf_area) == [0.1, 0.2] and told == [["elevation"]]
-    assert [list(each) for each in asked] == [[*DRAWN, "lai"], ["lai"]]
 
 
 @pytest.mark.parametrize("name", ["soil", "brown"])
@@ -155,15 +136,6 @@ def test_leaf_area_of_each_class_follows_the_hills(land, hills, code):
     assert slope == pytest.approx(COVARY["elevation"], abs=4 * error)
 
 
-def test_what_nothing_is_asked_of_is_independent(land):
-    """Bartlett again; half of its sum, since nothing correlates across."""
-    for name, other in (("soil", "brown"), ("soil", "crown_cover"), ("brown", "crown_cover")):
-        error = np.sqrt(summed(DRAWN[name].arp, DRAWN[other].arp) / land["soil"].size)
-        assert np.corrcoef(land[name].values.ravel(), land[other].values.ravel())[0, 1] == pytest.approx(
-            0, abs=4 * error
-        )
-
-
 def test_each_class_is_as_if_it_were_everywhere(land, make):
     """Beyond a fence the field goes on with the texture of another arp, and what varies beside it is the same."""
     for code, (name, kind) in enumerate(CLASSES.items(), 1):
@@ -172,17 +144,6 @@ def test_each_class_is_as_if_it_were_everywhere(land, make):
         np.testing.assert_array_equal(land["lai"].values[cells], alone["lai"].values[cells])
         for other in DRAWN:
             np.testing.assert_array_equal(land[other], alone[other])
-
-
-def test_fields_of_two_arps_are_filters_of_one_noise(grid):
-    """Their correlation is that of the two filters, over all frequencies."""
-    fields, _ = drawn_fields(grid, DRAWN, {"soil": 0.0}, (0.05, 0.2, 0.05), seed=7)
-    assert list(fields) == [0.05, 0.2]
-    u = 2 * np.pi * np.arange(512) / 512
-    one, other = (response(arp, u[:, None], u) for arp in fields)
-    known = np.mean(one * other) / np.sqrt(np.mean(one**2) * np.mean(other**2))
-    found = np.corrcoef(*(each.values.ravel() for each in fields.values()))[0, 1]
-    assert found == pytest.approx(known, abs=4 * np.sqrt(2 * summed(0.05, 0.2) / grid.shape.y / grid.shape.x))
 
 
 def test_without_covariance_leaf_area_is_that_of_the_scene(grid, make):
@@ -218,15 +179,6 @@ def test_windows_and_chunks_are_slices_of_the_whole(grid, hills, land, make):
         np.testing.assert_array_equal(lazy_part[name], land[name][WINDOW], err_msg=name)
 
 
-def test_what_is_drawn_is_labelled_and_placed(grid, land):
-    assert list(land) == ["lai", "cover", "brown", "crown_cover", "soil"]
-    for name, given in DRAWN.items():
-        check_place(land[name], grid.crs)
-        assert cf.attributes(name).items() <= land[name].attrs.items()
-        assert (land[name].attrs["arp"], land[name].attrs["rng_seed"]) == (given.arp, "7")
-    assert "lai-soil -0.4" in land["soil"].attrs["history"]
-
-
 def test_numbers_and_rasters_are_in_the_place_of_fields(grid, make, land):
     numbers = make(soil=-0.02, moisture=0.3, crown_cover=1, covary={"brown": 0.2})
     for name, value in (("soil", -0.02), ("moisture", 0.3), ("crown_cover", 1.0)):
@@ -237,11 +189,6 @@ def test_numbers_and_rasters_are_in_the_place_of_fields(grid, make, land):
     np.testing.assert_array_equal(rasters["soil"], mine)
     np.testing.assert_array_equal(rasters["moisture"], land["brown"])
     assert rasters["moisture"].attrs["long_name"] == "moisture of the soil"
-
-
-def test_a_field_without_deviation_is_a_number_everywhere(make):
-    even = make(soil=Field(mean=0.03), brown=None, covary=None)
-    assert (even["soil"] == 0.03).all()
 
 
 @pytest.mark.parametrize(
@@ -299,14 +246,6 @@ def test_drawn_cover_is_the_patches_by_their_codes(site):
     assert cover.dtype == np.int16 and cover.name == "cover" and cf.attributes("cover").items() <= cover.attrs.items()
     assert cover.attrs["flag_meanings"] == "grass wood water" and cover.attrs["flag_values"].tolist() == list(CODES)
     assert [(each.name, each.code) for each in classes_of(cover)] == [(each.name, each.code) for each in TABLE]
-
-
-@pytest.mark.parametrize("chunks", [ODD_CHUNKS, "auto"], ids=str)
-def test_drawn_cover_has_the_same_bits_in_chunks(site, chunks):
-    with no_compute():
-        lazy = drawn_cover(site, Patches("levels", 40), TABLE, 7, chunks)
-    xr.testing.assert_identical(lazy.compute(), drawn_cover(site, Patches("levels", 40), TABLE, 7))
-    assert lazy.dtype == np.int16
 
 
 def test_map_on_the_same_cells_is_read_as_it_is(tmp_path, site, codes):

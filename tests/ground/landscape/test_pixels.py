@@ -30,13 +30,6 @@ def test_tiles_hold_whole_pixels_and_are_counted_from_the_origin_of_the_crs():
     )
 
 
-def test_windows_of_map_and_grid_lie_on_the_same_tiles():
-    grid = SOURCE.zoom_out(1 / 3)
-    whole, part = pixel_lattice(raster(SOURCE), grid), pixel_lattice(raster(SOURCE)[5:, 7:], grid[31:, 44:])
-    assert part.cell == (whole.cell[0] + 31, whole.cell[1] + 44) and part.shift == whole.shift
-    assert part.pixel == (whole.pixel[0] + 5, whole.pixel[1] + 7)
-
-
 def test_pixels_that_are_no_multiple_of_their_size_from_the_origin_keep_their_cells():
     source = fifesim.grid_at("EPSG:32614", 699966, 4400033, 1000, 800, 10)
     lattice = pixel_lattice(raster(source), source.zoom_out(1 / 5))

@@ -6,7 +6,7 @@ import pytest
 import rioxarray
 import xarray as xr
 from elevations import write
-from lazy import ODD_CHUNKS, check_place, no_compute
+from lazy import check_place, no_compute
 from odc.geo.geobox import GeoBox
 from scipy import stats
 
@@ -52,22 +52,6 @@ def test_landscape_is_labelled_and_placed(site, land):
         "landscape: leaf area of 3 classes, seed 7",
     ]
     assert [each.name for each in classes_of(land.cover)] == list(CLASSES)
-
-
-@pytest.mark.parametrize("chunks", [ODD_CHUNKS, 20, "auto"], ids=str)
-def test_landscape_has_the_same_bits_in_any_chunks(site, land, chunks):
-    with no_compute():
-        lazy = fifesim.landscape(site, cover=PATCHES, classes=CLASSES, arp=0.1, seed=7, chunks=chunks)
-    assert all(each.chunks is not None for each in lazy.data_vars.values())
-    xr.testing.assert_identical(lazy.compute(), land)
-
-
-def test_window_of_the_site_is_a_slice_of_it(land):
-    grid = fifesim.fife_site(30 / 9, window=((80, 140), (170, 240)))
-    larger = fifesim.landscape(grid, cover=PATCHES, classes=CLASSES, arp=0.1, seed=7)
-    xr.testing.assert_identical(
-        larger.isel(y=slice(10, 55), x=slice(10, 64)).assign_coords(spatial_ref=land["spatial_ref"]), land
-    )
 
 
 def test_default_is_the_three_treatments_in_pastures():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fifesim.ground.landscape.covariance import add_scores, normal_scores, score_table
+from fifesim.ground.landscape.covariance import normal_scores, score_table
 
 
 @pytest.fixture(scope="module")
@@ -48,10 +48,3 @@ def test_missing_values_have_no_score_and_shapes_stay(places):
     table = score_table(places["wetness"])
     found = normal_scores(np.array([[np.nan, 1.0], [2.0, 3.0]]), table)
     assert np.isnan(found).tolist() == [[True, False], [False, False]]
-
-
-def test_scores_add_up(places):
-    table, values = score_table(places["wetness"]), np.array([0.5, 1.0, 2.0])
-    out = np.ones(3)
-    add_scores(values, table, -0.5, out)
-    np.testing.assert_allclose(out, 1 - 0.5 * normal_scores(values, table), rtol=0, atol=1e-15)

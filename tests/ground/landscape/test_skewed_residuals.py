@@ -118,26 +118,3 @@ def test_shift_is_one_standard_deviation_at_most():
     shift = np.abs(residual_shift(field, pixels, np.float32(0.0), kriging, LogNormal(), deviation))
     assert np.all(shift <= deviation) and shift[:, :30].max() == pytest.approx(0.1)
     assert np.isfinite(shift).all() and shift[:, 30:].max() > 0.3
-
-
-def test_what_lies_far_off_says_nothing():
-    """The level of a pixel beyond the margin of a tile moves residuals by less than a thousandth."""
-    kriging, field = Kriging.of(0.2, 0.0, (3, 3), (60, 60)), np.random.default_rng(1).standard_normal((180, 180))
-    known = kriging_block_means(field, (3, 3))
-    moved = known + np.where(np.arange(60) < 12, 1.0, 0.0)
-    here, there = (
-        residual_shift(0.3 * field, 0.3 * each, np.float32(0.0), kriging, LogNormal(), 0.3) for each in (known, moved)
-    )
-    assert np.abs(here - there)[:, 72:144].max() < 1e-3 * 0.3
-    assert np.abs(here - there)[:, :36].max() > 0.01
-
-
-def test_shift_where_the_deviation_differs_is_that_of_each():
-    """Well inside of two halves, what it is where the deviation is the same in all."""
-    kriging, field = Kriging.of(0.1, 0.0, (3, 3), (40, 40)), np.random.default_rng(1).standard_normal((120, 120))
-    deviation = np.where(np.arange(120) < 60, 0.2, 0.5) * np.ones((120, 120))
-    known = kriging_block_means(deviation * np.random.default_rng(2).standard_normal((120, 120)), (3, 3))
-    both = residual_shift(deviation * field, known, np.float32(0.0), kriging, LogNormal(), deviation)
-    for each, inside in ((0.2, slice(24, 36)), (0.5, slice(84, 96))):
-        alone = residual_shift(each * field, known, np.float32(0.0), kriging, LogNormal(), each)
-        np.testing.assert_allclose(both[:, inside], alone[:, inside], rtol=0, atol=0.02 * alone[:, inside].std())

@@ -81,11 +81,6 @@ def test_cell_has_the_same_bits_in_every_window():
     np.testing.assert_array_equal(part, whole[:, 7:12, 3:5])
 
 
-def test_zenith_and_tangent_are_inverse():
-    tangent = np.array([0.0, 0.1, 1.0, 7.0])
-    np.testing.assert_allclose(horizons.tangent(horizons.zenith(tangent)), tangent, rtol=1e-13, atol=1e-15)
-
-
 @pytest.mark.parametrize("count", [0, 15, 16.5])
 def test_too_few_directions_are_refused(count):
     with pytest.raises(ValueError, match="from 16 up"):
@@ -197,28 +192,6 @@ def test_spherical_pit_on_a_raster(depth):
     # What the land takes: in the pit as much as it hides of the sky above its own plane.
     view = horizon_terrain_view(found, np.cos(np.radians(slope)))
     np.testing.assert_allclose(view[inside], ((1 + np.cos(np.radians(slope))) / 2)[inside] - 1 + depth / 2, atol=0.012)
-
-
-def test_v_valley_on_a_raster():
-    """Walls of 20 degrees that end at a level upland: on the floor, and half way up."""
-    wall, half, cell = np.radians(20.0), 60, 5.0
-    x = (np.arange(3 * half * 2 + 1) - 3 * half) * cell
-    profile = np.minimum(np.abs(x), half * cell) * np.tan(wall)
-    dem = np.broadcast_to(profile, (401, x.size))
-    _, _, found = cells_of(dem, cell, 1000.0)
-    middle = found[200]
-    # Half way up: behind, the plane of the wall; ahead the far rim, half a depth up and three quarters of a width away.
-    rim = np.arctan(np.tan(wall) / 3)
-    sky = (1 + np.cos(rim + wall)) / 2
-    np.testing.assert_allclose(middle[3 * half], np.cos(wall), rtol=5e-3)
-    np.testing.assert_allclose(middle[3 * half + half // 2], sky, rtol=5e-3)
-
-
-def test_open_hills_lose_no_sky_twice():
-    """Vd lies between nothing and a wide plane's."""
-    slope, _, found = cells_of(hills((60, 70)), 10.0, 300.0)
-    assert (found > 0.3).all()
-    assert (found <= (1 + np.cos(np.radians(slope))) / 2 + 1e-12).all()
 
 
 def test_sky_of_a_place_nearby_is_kept_within_its_limits():

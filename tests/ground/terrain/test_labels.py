@@ -155,14 +155,6 @@ def test_terrain_beyond_the_scene_counts(site, around, lai):
     assert (abs(walled / flat - 1) > 1e-4).all()
 
 
-def test_a_larger_elevation_gives_what_its_window_gives(around, lai):
-    """On cells away from the window's edge; the horizon is that of the larger one in both."""
-    window = around.isel(y=slice(50, 120), x=slice(50, 130))
-    whole = fifesim.surface_reflectance(lai, bands=["TM4"], dem=around, geometry=SUN)
-    part = fifesim.surface_reflectance(lai, bands=["TM4"], dem=window, horizon=fifesim.horizon(around), geometry=SUN)
-    np.testing.assert_allclose(part, whole, rtol=1e-12)
-
-
 def test_chain_without_elevation_is_the_level_chain(level, lai):
     flat = fifesim.surface_reflectance(
         lai, bands=["TM3", "TM4"], dem=labelled(grids.geobox(lai), np.full(lai.shape, 321.0)), geometry=SUN

@@ -66,11 +66,6 @@ def test_component_along_the_normal_is_that_of_vectors():
     np.testing.assert_allclose(terrain.slope_cosine(east, north), normal[2], rtol=0, atol=1e-14)
 
 
-def test_angles_and_gradient_are_inverse():
-    slope, aspect = np.array([0.5, 45.0, 80.0]), np.array([359.0, 180.0, 37.0])
-    np.testing.assert_allclose(terrain.slope_angles(*plane_gradient(slope, aspect)), [slope, aspect], rtol=1e-12)
-
-
 def test_values_are_those_of_a_linear_interpolation():
     rng = np.random.default_rng(1)
     layer = rng.standard_normal((6, 9))

@@ -19,13 +19,10 @@ import fifesim
 from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
 from fifesim.ground.terrain import source_labels as sources
-from fifesim.ground.terrain.elevation_labels import _mean_slope, source_dem
+from fifesim.ground.terrain.elevation_labels import source_dem
 from fifesim.ground.terrain.source_labels import (
-    ELEVATION_TILE,
     beside_altitude,
-    looked_up,
     model_under,
-    open_source,
     source_resolution,
 )
 
@@ -49,12 +46,6 @@ def test_units_of_a_compound_reference_system(tmp_path):
     metres = write(tmp_path / "metres.tif", values, affine, "EPSG:26914+5703")
     same = fifesim.fine_dem(metres, grid())
     np.testing.assert_allclose(fifesim.fine_dem(feet, grid(), vertical_units="us-ft"), same, rtol=0, atol=1e-9)
-
-
-def test_units_of_an_array(path):
-    raster = rioxarray.open_rasterio(path, masked=True).assign_attrs(units="ft")
-    with pytest.raises(ValueError, match="in 'ft'"):
-        fifesim.fine_dem(raster, grid())
 
 
 def test_missing_reference_system_is_refused(tmp_path):
@@ -118,17 +109,6 @@ def test_arrays_give_what_their_file_gives(path):
         xr.testing.assert_identical(raster, before)
         upside_down = raster.sortby("y").squeeze("band")
         np.testing.assert_allclose(fifesim.fine_dem(upside_down, grid()), whole, rtol=0, atol=1e-6)
-
-
-def test_window_of_a_source_may_reach_beyond_it(path):
-    """NaN there, from a file as from a window of its cells."""
-    source, values = open_source(path), model()[0]
-    rows, columns = values.shape
-    np.testing.assert_array_equal(source.read(0, 0, rows, columns), values)
-    window = source.read(-3, columns - 2, 8, 9)
-    np.testing.assert_array_equal(window[3:, :2], values[:5, -2:])
-    assert np.isnan(window[:3]).all() and np.isnan(window[:, 2:]).all()
-    assert np.isnan(source.read(rows + 5, 0, 3, 3)).all()
 
 
 @pytest.fixture(scope="module")
@@ -201,12 +181,6 @@ def test_a_window_too_fine_to_read_is_refused(path, monkeypatch):
         fifesim.fine_dem(path, grid(size=600.0))
 
 
-def test_filled_hole_is_the_same_in_any_chunks(tmp_path):
-    where = with_hole(tmp_path)
-    whole = fifesim.fine_dem(where, grid(), fill=90)
-    np.testing.assert_array_equal(fifesim.fine_dem(where, grid(), fill=90, chunks=100).compute(), whole)
-
-
 def test_finer_source_is_averaged(tmp_path):
     """A wave of two cells of the source is gone, the mean of the surface stays."""
     values, affine = model(cell=10.0)
@@ -233,30 +207,6 @@ def test_lazy_array_gives_the_same_bits_in_any_chunks(path):
     for chunks in ({"y": 100, "x": 77}, "auto"):
         lazy = fifesim.fine_dem(raster.chunk({"y": 17, "x": 40}), grid(), chunks=chunks)
         np.testing.assert_array_equal(lazy.compute(), whole)
-
-
-@pytest.mark.parametrize("crs", ["EPSG:26914", "EPSG:26915"])
-def test_window_of_a_part_holds_what_its_tiles_read(path, crs):
-    """Under a grid of the source's own rows and columns, and under one that is turned and bent."""
-    place = {} if crs == "EPSG:26914" else {"west": 187700.0, "north": 4340000.0}
-    under = model_under(grid(crs=crs, **place), path, 60.0, None)
-    rows, columns = slice(20, 60), slice(100, 101)
-    window = under.tile_window(rows, columns)
-    origin = grids.lattice_position(under.place.grid)
-    first = [
-        (start + part.start) // ELEVATION_TILE * ELEVATION_TILE - start
-        for start, part in zip(origin, (rows, columns), strict=True)
-    ]
-    top, left, height, width = under.window(*under.place.positions(*(at + np.arange(ELEVATION_TILE) for at in first)))
-    for part, start, length, size in zip(window, (top, left), (height, width), under.source.shape, strict=True):
-        assert part.start <= max(start, 0) and part.stop >= min(start + length, size)
-
-
-def test_places_beyond_all_cells_are_unknown():
-    known = np.array([[True, False], [True, True]])
-    found = looked_up(known, np.array([[-0.6], [-0.4], [1.4], [1.6]]), np.array([[0.4, 0.6, 1.6]]))
-    np.testing.assert_array_equal(found, [[False] * 3, [True, False, False], [True, True, False], [False] * 3])
-    assert not looked_up(np.ones((0, 3), bool), np.zeros((2, 1)), np.zeros((1, 2))).any()
 
 
 def slopes(values, cell):
@@ -392,14 +342,6 @@ def test_feet_without_a_unit_are_a_warning_by_their_slope(cell):
         fifesim.fine_dem(steep, grid, vertical_units="m")
 
 
-def test_mean_slope_is_that_of_a_plane_at_30_m():
-    """Roughness below 30 m is averaged away."""
-    rows, columns = np.mgrid[:90, :120]
-    rough = 10 * (rows * np.tan(np.radians(25)) + 0.5 * ((rows + columns) % 2))
-    assert _mean_slope(rough, (10.0, 10.0)) == pytest.approx(25, abs=0.1)
-    assert np.isnan(_mean_slope(rough[:3], (10.0, 10.0)))
-
-
 def test_voids_of_zero_are_a_warning():
     dem = hills()
     dem[48:50, 48:50] = 0.0
@@ -528,11 +470,6 @@ def test_hole_is_refused_by_its_place_and_size(tmp_path):
     np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=0.1 * AMPLITUDE)
 
 
-def test_hole_too_large_to_fill_is_refused(tmp_path):
-    with pytest.raises(ValueError, match="a hole of"):
-        fifesim.fine_dem(with_hole(tmp_path, 12, 12), grid(), fill=60)
-
-
 def test_lazy_array_tells_of_its_hole_when_computed(tmp_path):
     raster = rioxarray.open_rasterio(with_hole(tmp_path), masked=True, chunks={"y": 20, "x": 20})
     dem = fifesim.fine_dem(raster, grid())
@@ -549,12 +486,3 @@ def test_terraces_of_whole_numbers_are_warned_of(tmp_path, path):
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         fifesim.fine_dem(path, grid())
-
-
-def test_marks_of_no_data_are_no_heights(tmp_path):
-    """An undeclared -9999 is below all land."""
-    values, affine = model()
-    values[25, 25] = -9999.0
-    where = write(tmp_path / "marked.tif", values, affine, nodata=-1.0)
-    with pytest.raises(ValueError, match=r"holds elevations such as -\d+ m, land has -500 to 9000 m"):
-        fifesim.fine_dem(where, grid())

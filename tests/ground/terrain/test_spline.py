@@ -6,7 +6,7 @@ from scipy import ndimage
 
 from fifesim.base.lattice import assemble
 from fifesim.ground.terrain import spline
-from fifesim.ground.terrain.spline import noise_square, smooth_noise
+from fifesim.ground.terrain.spline import smooth_noise
 
 
 @pytest.mark.parametrize(("cells", "error"), [(5, 6e-4), (6, 2e-4), (8, 3e-5)])
@@ -77,13 +77,6 @@ def test_window_is_a_slice_and_streams_and_seeds_are_unrelated():
     assert np.abs(np.corrcoef([each.ravel() for each in (whole, *others)]) - np.eye(3)).max() < 0.1
 
 
-def test_square_of_nodes_is_noise_of_the_same_kind():
-    drawn = np.random.default_rng(1)
-    squares = [noise_square(drawn, 0.3, 181) for _ in range(20)]
-    assert np.shape(squares) == (20, 181, 181)
-    assert np.mean(np.square(squares)) == pytest.approx(1, abs=0.06)
-
-
 def plane(shape=(80, 90)):
     rows, columns = np.mgrid[: shape[0], : shape[1]]
     return 400.0 + 3.0 * columns - 2.0 * rows
@@ -98,12 +91,6 @@ def test_plane_goes_on_past_its_edge():
     assert found[:, :79].all()
     np.testing.assert_allclose(out[found], values[found], rtol=0, atol=1e-9)
     assert np.isfinite(spline.extend(known, 2)).all()
-
-
-def test_nothing_known_stays_unknown():
-    nothing = np.full((5, 5), np.nan)
-    assert np.isnan(spline.extend(nothing, 3)).all()
-    assert np.isnan(spline.fill_gaps(nothing, (3, 3))).all()
 
 
 def test_holes_in_a_plane_are_filled_by_the_plane():
