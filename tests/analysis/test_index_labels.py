@@ -156,7 +156,7 @@ def test_images_are_composed_by_their_ndvi_or_by_what_is_given(stack):
         (
             lambda ndvi: ndvi,
             {"method": "mode"},
-            "method must be one of 'maximum-value', 'median', 'nadir-most', 'mean-of-clear', got 'mode'",
+            "method must be 'maximum-value', 'median', 'nadir-most' or 'mean-of-clear', got 'mode'",
         ),
         (lambda ndvi: ndvi, {"method": "nadir-most"}, "nadir-most needs the view of each date"),
         (lambda ndvi: ndvi, {"method": "mean-of-clear"}, "mean-of-clear needs to know where the images are clear"),

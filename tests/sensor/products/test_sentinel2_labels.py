@@ -287,7 +287,7 @@ def test_a_band_at_another_size_says_where_it_is(folders):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"resolution": 30}, "resolution must be 10, 20 or 60 m, got 30"),
+        ({"resolution": 30}, "resolution must be 10, 20 or 60, got 30"),
         ({"bands": "B13"}, r"unknown band of MSI '\w+13'"),
         ({"angles": "tile"}, "angles must be 'centre' or 'pixel', got 'tile'"),
     ],

@@ -115,7 +115,7 @@ def test_nothing_is_noisy_by_default_and_nan_stays():
     [
         (lambda: NoiseModel(-1.0, 0.0), "thermal must not be negative"),
         (lambda: NoiseModel(1.0, 0.0, detectors=0), "detectors"),
-        (lambda: NoiseModel(1.0, 0.0, along="lines"), "pushbroom"),
+        (lambda: NoiseModel(1.0, 0.0, along="lines"), "along must be .columns. or .rows., got .lines."),
         (lambda: NoiseModel.from_snr(80.0, 200.0, 40.0), "share of the variance"),
         (lambda: NoiseModel.from_snr([80.0, 20.0], [200.0, 300.0]), "negative variance of thermal"),
         (lambda: NoiseModel.from_snr([20.0, 200.0], [20.0, 300.0]), "negative variance of shot"),
