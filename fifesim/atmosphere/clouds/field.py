@@ -9,10 +9,10 @@ millimetres, so that a window, another chunk or another cell size has the same c
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy import optimize, special
 from scipy.interpolate import BSpline
 
+from fifesim.base.arrays import compiled
 from fifesim.base.caches import cached
 from fifesim.base.lattice import generator
 
@@ -162,7 +162,7 @@ def _normal_field(clouds, northing, easting):
     return total
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _add_octave(noise, rows, columns, down, across, total):
     """Add one octave to the cells, along the rows of the lattice first."""
     size, lines, made = len(noise), np.empty((4, columns.size)), np.full(4, -1)

@@ -14,6 +14,7 @@ from fifesim.atmosphere.clouds import layer
 from fifesim.atmosphere.clouds.field import LONGEST, PERIOD, SHORTEST, CloudCover, cloud_displacement, cloud_thickness
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import Chunks, Kind, Pair, Time, Times, WholeNumber
+from fifesim.base.caches import cached
 from fifesim.base.geometry import ANGLES
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import warn
@@ -245,46 +246,47 @@ def cast_clouds(
     >>> lai.fifesim.cast_clouds(sky).cloud.shape
     (100, 100)
     """
-    grids.check_axes(scene)
     geometry = directions.uniform_geometry(directions.given_geometry(geometry, scene, time), "clouds")
-    if geometry.sza > LOWEST_SUN:
-        raise ValueError(
-            f"the sun must be at least 5 degrees above the horizon, got {90 - geometry.sza:.1f}: choose another time"
-        )
     if not least > 0:
         raise ValueError(f"least must be an optical thickness above 0, got {least:g}: the default is {LEAST:g}")
     if altitude is None:
         altitude = Atmosphere.parse(scene.attrs["atmosphere"]).altitude if "atmosphere" in scene.attrs else 0.4
-    if not np.isfinite(altitude):
-        raise ValueError(f"altitude must be a finite number [km], got {altitude:g}")
-    grid = grids.geobox(scene)
-    thickness, height = _checked(clouds, scene)
-    ground = None if dem is None else with_crs_of(dem.transpose("y", "x"), scene)
-    sizes = _chunks_of(scene, thickness, ground)
-    turned = directions.from_grid_north(geometry, grid)
-    east, north, image_east, image_north = cloud_displacement(1.0, *(getattr(turned, name) for name in ANGLES))
-    down, across = grids.cell_size(grid)
-    ways = {name: (south / down, -west / across) for name, south, west in zip(
-        COLUMNS, (image_north, north, 0.0), (image_east, east, 0.0), strict=True)}  # fmt: skip
-    _warn_of_missing(thickness, grid, ways.values(), _highest(height, grid, ground, 1000 * altitude))
-    found = {
-        name: _seen_along(way, thickness, grid, height, ground, 1000 * altitude, sizes) for name, way in ways.items()
-    }
-    seen, sunlit = found["optical_thickness"], found["shadow_thickness"]
-    masks = {"cloud": (seen >= least).where(seen.notnull()), "shadow": (sunlit >= least).where(sunlit.notnull())}
-    names = {"shadow": "cloud_shadow"}
-    text = f"cast_clouds: height {height:g} m, from optical thickness {least:g}"
-    made = {
-        name: cf.label(
-            grids.place(each.astype(float), grid), names.get(name, name), history=text, source=clouds[COLUMNS[0]]
-        )
-        for name, each in (masks | found).items()
-    }
+    found = _cast(scene, clouds, dem, altitude, geometry)
+    masks = zip(("cloud", "shadow"), COLUMNS, strict=False)
+    made = {name: np.where(np.isnan(found[of]), np.nan, found[of] >= least) for name, of in masks} | found
+    text = f"cast_clouds: height {_height(clouds):g} m, from optical thickness {least:g}"
+    grid, names = grids.geobox(scene), {"shadow": "cloud_shadow"}
+    for name, data in made.items():
+        cells = grids.place(xr.DataArray(data, dims=("y", "x")), grid)
+        made[name] = cf.label(cells, names.get(name, name), history=text, source=clouds[COLUMNS[0]])
     return directions.with_geometry(xr.Dataset(made), geometry)
 
 
-def _checked(clouds, scene):
-    """Optical thickness of a cloud field, dims (y, x), and height of its layer [m]."""
+def _cast(scene, clouds, dem, altitude, geometry):
+    """Optical thickness toward the sensor, toward the sun and overhead of each cell, by name, shape (y, x). [1]"""
+    grids.check_axes(scene)
+    if geometry.sza > LOWEST_SUN:
+        raise ValueError(
+            f"the sun must be at least 5 degrees above the horizon, got {90 - geometry.sza:.1f}: choose another time"
+        )
+    if not np.isfinite(altitude):
+        raise ValueError(f"altitude must be a finite number [km], got {altitude:g}")
+    grid, height, reference = grids.geobox(scene), _height(clouds), 1000 * altitude
+    thickness = with_crs_of(clouds["optical_thickness"].transpose("y", "x"), scene)
+    ground = None if dem is None else with_crs_of(dem.transpose("y", "x"), scene)
+    turned = directions.from_grid_north(geometry, grid)
+    east, north, image_east, image_north = cloud_displacement(1.0, *(getattr(turned, name) for name in ANGLES))
+    down, across = grids.cell_size(grid)
+    ways = [(image_north / down, -image_east / across), (north / down, -east / across), (0.0, 0.0)]
+    _warn_of_missing(thickness, grid, ways, _highest(height, grid, ground, reference))
+    options = thickness, grid, height, ground, reference, _chunks_of(scene, thickness, ground)
+    # Toward nadir, the clouds toward the sensor are those overhead.
+    found = {way: _seen_along(way, *options) for way in set(ways)}
+    return {name: found[way] for name, way in zip(COLUMNS, ways, strict=True)}
+
+
+def _height(clouds):
+    """Height of the layer of a cloud field, in the middle of its base and top, after a check of its variables. [m]"""
     if missing := [name for name in ("optical_thickness", "base", "top") if name not in clouds]:
         raise ValueError(
             f"clouds need the variables optical_thickness, base and top, {', '.join(missing)} is missing: see "
@@ -292,12 +294,9 @@ def _checked(clouds, scene):
         )
     if np.ndim(clouds["base"]) or np.ndim(clouds["top"]):
         raise ValueError("base and top of clouds must be one number each [m]: cast layers of different height in turn")
-    for name in ("base", "top"):
-        cf.check_units(clouds[name], f"cloud_{name}")
-    base, top = _base_and_top((float(clouds["base"]), float(clouds["top"])))
-    thickness = clouds["optical_thickness"]
-    cf.check_units(thickness, "optical_thickness")
-    return with_crs_of(thickness.transpose("y", "x"), scene).astype(float, copy=False), (base + top) / 2
+    for name, quantity in (("base", "cloud_base"), ("top", "cloud_top"), ("optical_thickness", "optical_thickness")):
+        cf.check_units(clouds[name], quantity)
+    return sum(_base_and_top((float(clouds["base"]), float(clouds["top"])))) / 2
 
 
 def _chunks_of(scene, *others):
@@ -355,7 +354,7 @@ class _Way(NamedTuple):
 
 
 def _seen_along(shifts, thickness, grid, height, ground, reference, sizes):
-    """Optical thickness of the clouds along a line of sight from each cell, dims (y, x)."""
+    """Optical thickness of the clouds along a line of sight from each cell, shape (y, x). [1]"""
     field = grids.geobox(thickness)
     way = _Way(shifts, grids.lattice_offset(field, grid), tuple(field.shape), height, reference)
     cells = [np.arange(size) for size in grid.shape]
@@ -364,8 +363,7 @@ def _seen_along(shifts, thickness, grid, height, ground, reference, sizes):
     if ground is not None:
         offset = grids.lattice_offset(grids.geobox(ground), grid)
         reads.append(chunks.margin_reads(ground.data, 0, offset=offset, shape=tuple(grid.shape)))
-    data = chunks.windows(partial(_along, way), reads, tuple(grid.shape), sizes)
-    return xr.DataArray(data, dims=("y", "x"))
+    return chunks.windows(partial(_along, way), reads, tuple(grid.shape), sizes)
 
 
 def _along(way, rows, columns, cells, elevation=None):
@@ -399,15 +397,19 @@ def with_clouds(toa, clouds, atmosphere, bands, geometry, *, elevation=None):
     """Apparent reflectance of a scene with clouds, dims (band, y, x), from the reflectance without. [1]"""
     geometry = directions.uniform_geometry(geometry, "to_toa with clouds")
     if COLUMNS[1] not in clouds:
-        clouds = cast_clouds(toa, clouds, dem=elevation, altitude=atmosphere.altitude, geometry=geometry)
-    for name in ANGLES:
-        if name in clouds.coords and not np.isclose(float(clouds[name]), getattr(geometry, name)):
-            raise ValueError(
-                f"the clouds were cast with {name} {float(clouds[name]):g}, the reflectance has "
-                f"{getattr(geometry, name):g}: cast them again with cast_clouds"
-            )
-    sky = cloud_tables(atmosphere, bands, geometry)
-    columns = [clouds[name].drop_vars([*ANGLES, "earth_sun_distance"], errors="ignore") for name in COLUMNS]
+        columns = [
+            xr.Variable(("y", "x"), each)
+            for each in _cast(toa, clouds, elevation, atmosphere.altitude, geometry).values()
+        ]
+    else:
+        for name in ANGLES:
+            if name in clouds.coords and not np.isclose(float(clouds[name]), getattr(geometry, name)):
+                raise ValueError(
+                    f"the clouds were cast with {name} {float(clouds[name]):g}, the reflectance has "
+                    f"{getattr(geometry, name):g}: cast them again with cast_clouds"
+                )
+        columns = [clouds[name].drop_vars([*ANGLES, "earth_sun_distance"], errors="ignore") for name in COLUMNS]
+    sky = cloud_tables(atmosphere, tuple(bands), geometry)
     plain = toa.drop_vars(["band", *ANGLES], errors="ignore")
     # The reflectance without clouds is of no use to others, except in a graph of tasks.
     kernel = partial(layer.under_clouds, sky=sky, in_place=toa.chunks is None)
@@ -416,9 +418,10 @@ def with_clouds(toa, clouds, atmosphere, bands, geometry, *, elevation=None):
     return cf.label(out, "toa_reflectance", source=toa, history="to_toa: with clouds")
 
 
+@cached(16, "light of clouds by thickness")
 def cloud_tables(atmosphere, bands, geometry):
     """Tables of `layer.under_clouds` for an atmosphere, bands and one direction of sun and sensor."""
-    terms = engines.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
+    terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
     return layer.sky_tables(
         [layer.band_co_albedo(band) for band in bands],
         terms.gas_transmittance * terms.path_reflectance,

@@ -295,7 +295,6 @@ def sky_tables(co_albedos, path, diffuse_fraction, ozone, sza, vza, raa):
     return CloudTables(light, kind, *(np.asarray(each, float) for each in (path, diffuse_fraction, ozone)))
 
 
-@cached(64, "light of clouds by thickness")
 def _steps(co_albedo, sza, vza, raa):
     """Light of clouds at the steps of `CloudTables`, shape (field, step). [1]"""
     thickness = np.minimum((np.arange(_STEPS + 1) / _PER_ROOT) ** 2, THICKEST)
@@ -384,27 +383,28 @@ def under_clouds(clear, seen, sunlit, overhead, *, sky, in_place=False):
         out = np.array(out, order="C")
     _, rows, width = out.shape
     found = np.empty((3, width), np.uint32), np.empty((3, width), np.uint32), np.empty((3, width))
+    at_nadir = overhead is seen
+    lines = (seen, sunlit) if at_nadir else (seen, sunlit, overhead)
     light, size = np.empty((6, width)), max(_CELLS // max(width, 1), 1)
     for first in range(0, rows, size):
-        columns = [np.ascontiguousarray(each[first : first + size], float) for each in (seen, sunlit, overhead)]
-        if _cloud_rows(out, first, *columns, sky, *found, light):
+        columns = [np.ascontiguousarray(each[first : first + size], float) for each in lines]
+        if _cloud_rows(out, first, *columns[:2], columns[-1], at_nadir, sky, *found, light):
             wrong = np.concatenate([each[(each < 0) | (each > THICKEST)] for each in columns])[0]
             raise ValueError(f"optical_thickness must be from 0 to {THICKEST:g}, got {wrong:g}: clip it, .clip(0, 100)")
     return out
 
 
-_CELLS = 2**14  # whose three columns of clouds fit in the cache of a core
+_CELLS = 2**15  # whose three columns of clouds fit in the cache of a core
 
 
 @compiled
-def _cloud_rows(scene, first, seen, sunlit, overhead, sky, cell, step, share, light):
+def _cloud_rows(scene, first, seen, sunlit, overhead, at_nadir, sky, cell, step, share, light):
     """Add clouds to some rows of a scene; whether a thickness is invalid."""
+    up = 0 if at_nadir else 2
     for i in range(len(seen)):
         v = _find(seen[i], cell[0], step[0], share[0])
         s = _find(sunlit[i], cell[1], step[1], share[1])
-        # Toward nadir, the clouds toward the sensor are those overhead.
-        up = 0 if _equal(seen[i], overhead[i]) else 2
-        o = v if up == 0 else _find(overhead[i], cell[2], step[2], share[2])
+        o = v if at_nadir else _find(overhead[i], cell[2], step[2], share[2])
         if min(v, s, o) < 0:
             return True
         if max(v, s, o) == 0:
@@ -422,14 +422,6 @@ def _cloud_rows(scene, first, seen, sunlit, overhead, sky, cell, step, share, li
                 if sky.kind[b] == kind:
                     _cloud_row(scene[b, first + i], light, sky.path[b], sky.diffuse_fraction[b], sky.ozone[b])
     return False
-
-
-@jitable
-def _equal(one, other):
-    equal = True
-    for j in range(one.size):
-        equal &= one[j] == other[j]
-    return equal
 
 
 @jitable

@@ -322,7 +322,7 @@ class _Scene:
             cells, self.setup.clouds, dem=self.setup.dem, altitude=own.air.altitude, geometry=own.setup.geometry
         )
         responses = [band.response for band in own.bands]
-        return [cast[name].values for name in COLUMNS], cloud_tables(own.air, responses, own.setup.geometry)
+        return [cast[name].values for name in COLUMNS], cloud_tables(own.air, tuple(responses), own.setup.geometry)
 
     def is_stand(self, ground):
         """Whether only leaf area varies, so that plain arrays do."""
