@@ -12,9 +12,9 @@ import xarray as xr
 from fifesim.analysis import scores
 from fifesim.analysis.regression import totals
 from fifesim.analysis.regression_labels import check_same_quantity, matched, sound_cells
-from fifesim.base.arguments import Kind, Pairing, described, is_a
+from fifesim.base.arguments import RASTER, Kind, Pairing, described, is_a
 from fifesim.base.messages import warn
-from fifesim.grids.inputs import MASKS_TOO, AnyDimensions, RasterOrDataset
+from fifesim.grids.inputs import MASKS_TOO, RasterOrDataset
 from fifesim.grids.reductions import computed, sums_by_row
 
 _BINS = 10
@@ -35,7 +35,7 @@ By = Annotated[
 
 def score(
     estimate: Annotated[xr.DataArray | xr.Dataset, MASKS_TOO],
-    truth: AnyDimensions,
+    truth: Annotated[xr.DataArray, RASTER._replace(dimensions=0, numbers=MASKS_TOO.numbers)],
     by: By | None = None,
     *,
     landscape: str = _LANDSCAPE,
@@ -51,7 +51,7 @@ def score(
         ``high``, the ends of central intervals, with a dimension or coordinate ``level``. The name of the variable may
         come first, as in ``lai_sd``. An ensemble has a dimension ``member``. Mask pixels that must not count, for
         instance with ``estimate.where(estimate.flag == 0)``. A raster of bool is a mask, for instance of clouds; its
-        truth is the share of each pixel, 0 to 1.
+        truth is another mask, or the share of each pixel, 0 to 1.
     truth : xarray.DataArray, dims (y, x), or any that the estimate has
         In the unit of the estimate.
     by : xarray.DataArray or sequence of float, optional
@@ -101,6 +101,8 @@ def score(
     """
     if isinstance(estimate, xr.DataArray) and estimate.dtype.kind == "b":
         return _mask_scores(estimate, truth, by, pair)
+    if truth.dtype.kind == "b":
+        raise ValueError("the truth is a mask and the estimate is not: give a mask, such as estimate > 0.5")
     given = _parts(estimate, truth)
     check_same_quantity(given["value"], truth, ("estimate", "truth"))
     unit = truth.attrs.get("units", given["value"].attrs.get("units", "1"))

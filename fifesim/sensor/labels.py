@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.arguments import Interval, NoiseKinds, Offset, Time, WholeNumber
+from fifesim.base.arguments import Interval, NoiseKinds, NumberByBand, Offset, Time, WholeNumber
 from fifesim.base.bands import check_counts
 from fifesim.base.geometry import ANGLES
 from fifesim.base.lattice import check_seed
@@ -161,6 +161,7 @@ def sense(
     onto: GeoBox | None = None,
     interval: Interval | None = None,
     offset: Offset = (0.0, 0.0),
+    gain_drift: NumberByBand = 1.0,
     noise: NoiseKinds = (),
     seed: WholeNumber = 0,
     noise_models: NoiseModels | None = None,
@@ -188,7 +189,10 @@ def sense(
         down and across. It changes the coordinates, but not the footprints. [m]
     offset : (float or array, float or array), optional
         Registration error southward and eastward, as numbers, or as a drift with one value per row and per column.
-        Footprints are shifted; coordinates stay nominal. [pixel]
+        Arrays over ``time`` have an error for each date. Footprints are shifted; coordinates stay nominal. [pixel]
+    gain_drift : float or xarray.DataArray, optional
+        Response of the detectors relative to their calibration, as a number for all bands, one for each band, or an
+        array over ``time``, ``band`` or both. The recorded radiance is multiplied by it; gains stay nominal. [1]
     noise : str or sequence of str, optional
         Noise components: "shot", "thermal" and "fixed-pattern", or "all" components known for the instrument. Unknown
         components raise an error.
@@ -242,14 +246,15 @@ def sense(
     array([51.6, 73.4], dtype=float32)
     """
     return sensed(
-        toa, instrument, onto=onto, interval=interval, offset=offset, noise=noise, seed=seed, noise_models=noise_models,
-        quantise=quantise, scaling=scaling, min_valid=min_valid, geometry=geometry, time=time,
+        toa, instrument, onto=onto, interval=interval, offset=offset, gain_drift=gain_drift, noise=noise, seed=seed,
+        noise_models=noise_models, quantise=quantise, scaling=scaling, min_valid=min_valid, geometry=geometry,
+        time=time,
     )  # fmt: skip
 
 
 def sensed(
-    toa, instrument, *, onto, interval=None, offset=(0.0, 0.0), noise, seed, noise_models=None, quantise=True,
-    scaling="detector", min_valid=MIN_VALID, geometry, time=None, line_spreads=None,
+    toa, instrument, *, onto, interval=None, offset=(0.0, 0.0), gain_drift=1.0, noise, seed, noise_models=None,
+    quantise=True, scaling="detector", min_valid=MIN_VALID, geometry, time=None, line_spreads=None,
 ):  # fmt: skip
     """Image as from `sense`, with other line spread functions by band if they are given."""
     toa, description, bands = by_bands(toa, instrument)
@@ -271,12 +276,13 @@ def sensed(
         )
         # Lines are counted from the origin of the CRS, so that a window has the same noise as the whole image.
         first = grids.lattice_position(pixels)
-        radiance = noisy(as_radiance(means, bands, light), description, bands, noise, seed, first, noise_models)
+        radiance = drifted(as_radiance(means, bands, light), bands, gain_drift)
+        radiance = noisy(radiance, description, bands, noise, seed, first, noise_models)
         image, carried = recorded(radiance, description, bands, quantise, light if scaling == "product" else None)
         carried |= {} if light is None else directions.coordinates_of(light)
         image = grids.place(image, pixels, carried)
         image.data = held(image.data)
-        history = _history(description, interval, offset, noise, seed, quantise, scaling)
+        history = _history(description, interval, offset, gain_drift, noise, seed, quantise, scaling)
         return labelled(image, toa, description, history)
 
     if len(groups) == 1:
@@ -311,7 +317,7 @@ def labelled(image, toa, description, history):
     return image
 
 
-def _history(description, interval, offset, noise, seed, quantise, scaling):
+def _history(description, interval, offset, gain_drift, noise, seed, quantise, scaling):
     """Text of the settings that differ from the defaults, for the history."""
     kinds = check_kinds(noise)
     bits = description.bits if scaling == "detector" else description.product.bits
@@ -320,9 +326,30 @@ def _history(description, interval, offset, noise, seed, quantise, scaling):
         f"scaling {scaling}" if scaling != "detector" else "",
         f"interval {interval}" if interval is not None else "",
         "offset" if any(np.any(np.asarray(each) != 0) for each in offset) else "",
+        "gain drift" if isinstance(gain_drift, Mapping) or np.any(np.asarray(gain_drift) != 1) else "",
         f"noise {' '.join(kinds)}, seed {seed}" if kinds else "",
     ]
     return ", ".join(filter(None, parts))
+
+
+def drifted(radiance, bands, gain_drift):
+    """Radiance as detectors record it whose response has drifted since the calibration. [W m-2 sr-1 um-1]"""
+    names = [band.name for band in bands]
+    if isinstance(gain_drift, xr.DataArray) and "band" in gain_drift.dims:
+        gain_drift = dict(zip(gain_drift["band"].values.tolist(), gain_drift.values, strict=True))
+    if isinstance(gain_drift, Mapping):
+        if missing := [name for name in names if name not in gain_drift]:
+            raise ValueError(f"gain_drift lacks band {', '.join(missing)}, it has {', '.join(map(str, gain_drift))}")
+        gain_drift = [gain_drift[name] for name in names]
+    factors = np.asarray(gain_drift, float)
+    if factors.shape not in ((), (len(names),)):
+        raise ValueError(f"gain_drift must be a number, or one for each of {', '.join(names)}, got {factors.tolist()}")
+    if not np.all((factors > 0) & np.isfinite(factors)):
+        raise ValueError(f"gain_drift must be a factor above 0, such as 0.98, got {factors.tolist()}")
+    if np.all(factors == 1):
+        return radiance
+    factors = xr.Variable("band", np.broadcast_to(factors, len(names)))
+    return radiance.copy(data=(radiance.variable * factors).transpose(*radiance.dims).astype(radiance.dtype).data)
 
 
 @by_date

@@ -212,5 +212,9 @@ def test_mask_scores_count_omitted_and_committed_area_by_thickness():
     np.testing.assert_allclose(by.omission, [1 / 2.5, 0.0])
     np.testing.assert_allclose(by.commission, [1.5 / 3, 0.0])
     assert by.omission.dims == ("thickness",) and by.n.values.tolist() == [4, 3]
+    other = fifesim.score(mask, truth > 0.4)
+    xr.testing.assert_identical(other, fifesim.score(mask, (truth > 0.4).astype(float)))
     with pytest.raises(ValueError, match="truth of a mask is a share from 0 to 1, got 0 to 2"):
         fifesim.score(mask, 2 * truth)
+    with pytest.raises(ValueError, match="the truth is a mask and the estimate is not"):
+        fifesim.score(truth, mask)

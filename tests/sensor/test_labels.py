@@ -61,6 +61,30 @@ ONTO = {
 }
 
 
+def test_dates_have_their_own_registration_error_and_response(toa):
+    dates = np.array(["1987-05-01T16:35", "1987-06-06T16:35"], "M8[ns]")
+    both = xr.concat([toa.assign_coords(time=each) for each in dates], "time")
+    south = xr.DataArray([0.3, -0.2], coords={"time": dates}, dims="time")
+    response = xr.DataArray(
+        [[0.9, 0.8], [1.0, 0.7]], coords={"time": dates, "band": ["TM4", "TM3"]}, dims=("time", "band")
+    )
+    found = both.fifesim.sense("TM", quantise=False, offset=(south, 0.0), gain_drift=response)
+    for number, (offset, factors) in enumerate(((0.3, (0.8, 0.9)), (-0.2, (0.7, 1.0)))):
+        plain = both.isel(time=number).fifesim.sense("TM", quantise=False, offset=(offset, 0.0))
+        expected = plain.values * np.array(factors)[:, None, None]
+        np.testing.assert_allclose(found.isel(time=number).values, expected, rtol=1e-12)
+    assert "gain drift" in found.attrs["history"]
+    lazy = in_chunks(toa, ODD_CHUNKS).fifesim.sense("TM", gain_drift=0.9)
+    np.testing.assert_array_equal(lazy.values, toa.fifesim.sense("TM", gain_drift=0.9).values)
+    for wrong, message in (
+        (0.0, "gain_drift must be a factor above 0"),
+        ({"TM3": 1.0}, "gain_drift lacks band TM4, it has TM3"),
+        ([1.0, 2.0, 3.0], "one for each of TM3, TM4"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            toa.fifesim.sense("TM", gain_drift=wrong)
+
+
 @pytest.mark.parametrize("onto", ONTO.values(), ids=ONTO.keys())
 def test_sense_keeps_its_word_and_equals_the_kernels(toa, site, onto):
     image = check_raster_function(lambda toa: fifesim.sense(toa, "TM", onto=onto), toa, quantity="dn")

@@ -24,6 +24,7 @@ from fifesim.grids import grid as grids
 from fifesim.grids.dates import by_date, joined
 from fifesim.grids.directions import Directions
 from fifesim.grids.grid import with_crs_of
+from fifesim.grids.reductions import computed, extremes
 from fifesim.grids.sites import one_or_several
 
 HIGHEST_CLOUD = 20_000.0  # of clouds [m]
@@ -31,6 +32,7 @@ LOWEST_SUN = 85.0  # zenith angle beyond which shadows have no end [degree]
 LEAST = 0.1  # optical thickness from which a cell counts as cloud; sensors miss thinner clouds [1]
 DEEPEST_GROUND = 500.0  # ground below the altitude of the atmosphere that the margin of relief allows for [m]
 _TILE = 1008
+_MOST_LAYERS = 64  # of clouds at different heights
 
 COLUMNS = ("optical_thickness", "shadow_thickness", "overhead_thickness")
 """Variables of `cast_clouds` that `to_toa` reads: clouds toward the sensor, toward the sun and overhead."""
@@ -74,7 +76,7 @@ def cloud_field(
         Speed of the clouds eastward and northward. [m s-1]
     time : str, datetime, sequence or float, optional
         Time by which the clouds have drifted: seconds, or dates and times. Each date in UTC has an independent sky that
-        drifts from midnight on. A list adds the dimension time.
+        drifts from midnight on. A list adds the dimension time, whose coordinate is the dates or the seconds.
     margin : float, optional
         Distance by which the field extends beyond the grid on every side, for clouds whose shadow or image falls on the
         grid: height times the sum of the tangents of the zenith angles of sun and sensor. [m]
@@ -112,10 +114,13 @@ def cloud_field(
     time = one_or_several(time)
     if np.ndim(time):
         options = {"thickness": thickness, "length": length, "height": height, "seed": seed, "drift": drift}
-        # Seconds have no date, which is the coordinate of several skies.
-        dates = [utc(one)[0] for one in time]
-        each = [cloud_field(grid, cover, **options, time=one, margin=margin, chunks=chunks) for one in dates]
-        return each[0].assign(optical_thickness=joined([one["optical_thickness"] for one in each]))
+        moments = [one if isinstance(one, int | float | np.number) else utc(one)[0] for one in time]
+        each = [cloud_field(grid, cover, **options, time=one, margin=margin, chunks=chunks) for one in moments]
+        cells = [
+            sky["optical_thickness"].assign_coords(time=sky.coords.get("time", one))
+            for sky, one in zip(each, moments, strict=True)
+        ]
+        return each[0].assign(optical_thickness=joined(cells))
     grid = grids.check_grid(grid)
     base, top = _base_and_top(height)
     mean, deviation = _pair(thickness, lambda single: (single, single))
@@ -140,7 +145,7 @@ def cloud_field(
     cells = cf.label(cells, "optical_thickness", history=text, rng_seed=str(seed))
     numbers = {name: ((), each, cf.attributes(f"cloud_{name}")) for name, each in (("base", base), ("top", top))}
     clouds = xr.Dataset({"optical_thickness": cells, **numbers})
-    return clouds if time is None or isinstance(time, int | float) else directions.dated(clouds, time)
+    return clouds if time is None or isinstance(time, int | float | np.number) else directions.dated(clouds, time)
 
 
 def _cells(sky, northing, easting, moved, row, column, shape):
@@ -197,8 +202,8 @@ def cast_clouds(
     scene : xarray.DataArray, dims (..., y, x)
         Raster on the cells of the ground, such as leaf area or reflectance.
     clouds : xarray.Dataset, dims (y, x)
-        ``optical_thickness`` [1] of clouds, 0 without clouds and NaN where unknown, and the numbers ``base`` and
-        ``top`` [m], from `cloud_field` or other sources. Its grid has the cells of the scene and may be larger.
+        ``optical_thickness`` [1] of clouds, 0 without clouds and NaN where unknown, and ``base`` and ``top`` [m],
+        numbers or rasters, from `cloud_field` or other sources. Its grid has the cells of the scene and may be larger.
     dem : xarray.DataArray, dims (y, x), optional
         Elevation, onto which images and shadows of the clouds fall; by default the ground is level. [m]
     altitude : float, optional
@@ -231,7 +236,8 @@ def cast_clouds(
     Notes
     -----
     Clouds are a thin layer at the middle of base and top. The nearest cell of the field is read, so positions are right
-    to half a cell, and a cloud of n cells has a shadow of n cells on level ground.
+    to half a cell, and a cloud of n cells has a shadow of n cells on level ground. Rasters of base and top are divided
+    into layers, at most 64, between which displacements differ by one cell; behind each other, their thicknesses add.
 
     See Also
     --------
@@ -254,7 +260,7 @@ def cast_clouds(
     found = _cast(scene, clouds, dem, altitude, geometry)
     masks = zip(("cloud", "shadow"), COLUMNS, strict=False)
     made = {name: np.where(np.isnan(found[of]), np.nan, found[of] >= least) for name, of in masks} | found
-    text = f"cast_clouds: height {_height(clouds):g} m, from optical thickness {least:g}"
+    text = f"cast_clouds: from optical thickness {least:g}"
     grid, names = grids.geobox(scene), {"shadow": "cloud_shadow"}
     for name, data in made.items():
         cells = grids.place(xr.DataArray(data, dims=("y", "x")), grid)
@@ -271,32 +277,54 @@ def _cast(scene, clouds, dem, altitude, geometry):
         )
     if not np.isfinite(altitude):
         raise ValueError(f"altitude must be a finite number [km], got {altitude:g}")
-    grid, height, reference = grids.geobox(scene), _height(clouds), 1000 * altitude
-    thickness = with_crs_of(clouds["optical_thickness"].transpose("y", "x"), scene)
+    grid, reference = grids.geobox(scene), 1000 * altitude
     ground = None if dem is None else with_crs_of(dem.transpose("y", "x"), scene)
     turned = directions.from_grid_north(geometry, grid)
     east, north, image_east, image_north = cloud_displacement(1.0, *(getattr(turned, name) for name in ANGLES))
     down, across = grids.cell_size(grid)
     ways = [(image_north / down, -image_east / across), (north / down, -east / across), (0.0, 0.0)]
-    _warn_of_missing(thickness, grid, ways, _highest(height, grid, ground, reference))
-    options = thickness, grid, height, ground, reference, _chunks_of(scene, thickness, ground)
+    layers = _layers(*_checked(clouds, scene), np.abs(ways).max())
+    highest = _highest(max(height for _, height in layers), grid, ground, reference)
+    _warn_of_missing(grids.geobox(layers[0][0]), grid, ways, highest, ground is not None and ground.chunks is not None)
+    sizes, found = _chunks_of(scene, layers[0][0], ground), {}
     # Toward nadir, the clouds toward the sensor are those overhead.
-    found = {way: _seen_along(way, *options) for way in set(ways)}
+    for way in set(ways):
+        seen = [_seen_along(way, cells, grid, height, ground, reference, sizes) for cells, height in layers]
+        found[way] = seen[0] if len(seen) == 1 else np.minimum(sum(seen), layer.THICKEST)
     return {name: found[way] for name, way in zip(COLUMNS, ways, strict=True)}
 
 
-def _height(clouds):
-    """Height of the layer of a cloud field, in the middle of its base and top, after a check of its variables. [m]"""
-    if missing := [name for name in ("optical_thickness", "base", "top") if name not in clouds]:
+def _checked(clouds, scene):
+    """Optical thickness, base and top of a cloud field with the CRS of a scene."""
+    quantities = {"optical_thickness": "optical_thickness", "base": "cloud_base", "top": "cloud_top"}
+    if missing := [name for name in quantities if name not in clouds]:
         raise ValueError(
             f"clouds need the variables optical_thickness, base and top, {', '.join(missing)} is missing: see "
             "fifesim.cloud_field"
         )
-    if np.ndim(clouds["base"]) or np.ndim(clouds["top"]):
-        raise ValueError("base and top of clouds must be one number each [m]: cast layers of different height in turn")
-    for name, quantity in (("base", "cloud_base"), ("top", "cloud_top"), ("optical_thickness", "optical_thickness")):
+    for name, quantity in quantities.items():
         cf.check_units(clouds[name], quantity)
-    return sum(_base_and_top((float(clouds["base"]), float(clouds["top"])))) / 2
+    thickness, base, top = (
+        with_crs_of(clouds[name].transpose("y", "x"), scene) if np.ndim(clouds[name]) else clouds[name]
+        for name in quantities
+    )
+    return thickness, base, top
+
+
+def _layers(thickness, base, top, per_metre):
+    """Optical thickness of thin layers, and their heights [m], from the displacement per metre of height [cell m-1]."""
+    if not (np.ndim(base) or np.ndim(top)):
+        return [(thickness, sum(_base_and_top((float(base), float(top)))) / 2)]
+    lowest, highest, thinnest = (float(each) for each in computed(base.min(), top.max(), (top - base).min()))
+    _base_and_top((lowest, max(highest, lowest)))
+    if thinnest < 0:
+        raise ValueError(f"the base of clouds must not be above their top, but is by up to {-thinnest:g} m: swap them")
+    height = (base + top) / 2
+    low, high = extremes(height)
+    step = max(1 / per_metre, (high - low) / (_MOST_LAYERS - 1)) if per_metre else np.inf
+    number = np.round((height.fillna(low) - low) / step)
+    thickness = thickness.where(height.notnull() | (thickness == 0))
+    return [(thickness.where(number == k, 0.0), low + k * step) for k in range(round((high - low) / step) + 1)]
 
 
 def _chunks_of(scene, *others):
@@ -317,9 +345,8 @@ def _highest(height, grid, ground, reference):
     return max(height + reference - np.min(known[~np.isnan(known)], initial=height + reference), 0.0)
 
 
-def _warn_of_missing(thickness, grid, ways, height):
-    """Warn if the field ends within reach of the images and shadows on a grid."""
-    field = grids.geobox(thickness)
+def _warn_of_missing(field, grid, ways, height, lazy):
+    """Warn if the grid of a field ends within reach of the images and shadows on another grid."""
     missing, needed = [0.0], [0.0]
     for first, cells, known, size, shifts in zip(
         grids.lattice_offset(field, grid), grid.shape, field.shape, grids.cell_size(grid),
@@ -329,8 +356,9 @@ def _warn_of_missing(thickness, grid, ways, height):
         needed += [max(map(abs, reach)) * size]
         missing += [max(-min(reach) - first, first + max(reach) + cells - known) * size]
     if max(missing) > 0:
+        level = ", for level ground because the elevation is lazy" if lazy else ""
         warn(
-            f"the clouds end {max(missing):.0f} m too early: beyond, the sky is taken as clear; give "
+            f"the clouds end {max(missing):.0f} m too early{level}: beyond, the sky is taken as clear; give "
             f"cloud_field(..., margin={max(needed):.0f}) or more, or a larger raster"
         )
 

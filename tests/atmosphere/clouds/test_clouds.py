@@ -165,6 +165,32 @@ def test_a_cloud_of_n_cells_hides_and_shades_n_cells(site, reflectance):
 
 
 @pytest.mark.filterwarnings("ignore:the clouds end")
+def test_clouds_of_different_heights_are_those_of_each_height_in_turn(site, reflectance):
+    rng = np.random.default_rng(4)
+    thickness = np.where(rng.random(site.shape) < 0.2, 5.0, 0.0)
+    high = rng.random(site.shape) < 0.5
+    options = {"geometry": fifesim.Geometry(50, 130, 30, 280)}
+    level = reflectance.drop_vars(["sza", "saa", "vza", "vaa"])
+    both = clouds_of(thickness, site)
+    for name, rise in (("base", 0.0), ("top", 200.0)):
+        both[name] = both.optical_thickness.copy(data=np.where(high, 1500.0, 600.0) + rise).drop_attrs()
+    found = level.fifesim.cast_clouds(both, **options)
+    lower, upper = (
+        level.fifesim.cast_clouds(clouds_of(np.where(part, thickness, 0), site, height), **options)
+        for part, height in ((~high, 700.0), (high, 1600.0))
+    )
+    for name in ("optical_thickness", "shadow_thickness", "overhead_thickness"):
+        # 900 m are divided into layers of 30 m / tan(50) = 25 m, so that the upper one is right to half of it.
+        assert (found[name] == lower[name] + upper[name]).mean() > (0.99 if name == "overhead_thickness" else 0.6)
+        assert float(found[name].sum()) == pytest.approx(float((lower[name] + upper[name]).sum()), rel=0.05)
+    unknown = both.assign(top=both.top.where(both.optical_thickness == 0))
+    cells = level.fifesim.cast_clouds(unknown, **options)
+    assert int(cells.overhead_thickness.isnull().sum()) == int((thickness > 0).sum())
+    with pytest.raises(ValueError, match="base of clouds must not be above their top, but is by up to 200 m"):
+        level.fifesim.cast_clouds(both.rename(base="top", top="base"), **options)
+
+
+@pytest.mark.filterwarnings("ignore:the clouds end")
 def test_shadow_on_relief_is_that_of_steps_along_the_sunbeam(site, reflectance):
     """Brute force: from each cell toward the sun in steps of 1 m, until the beam is at the height of the clouds."""
     rng = np.random.default_rng(3)
@@ -254,6 +280,8 @@ def test_window_chunks_cell_size_and_drift_show_the_same_clouds(site):
     # 6 m/s eastward and 3 m/s southward for 100 s are 20 and 10 cells.
     later = fifesim.cloud_field(site, **sky, drift=(6.0, -3.0), time=100.0).optical_thickness
     np.testing.assert_array_equal(later.values[10:, 20:], whole.values[:-10, :-20])
+    several = fifesim.cloud_field(site, **sky, drift=(6.0, -3.0), time=[0.0, 100.0]).optical_thickness
+    np.testing.assert_array_equal(several.sel(time=100.0).values, later.values)
     days = fifesim.cloud_field(site, **sky, drift=(6.0, 0.0), time=["1987-06-06T16:00", "1987-06-07T16:00"])
     assert days.optical_thickness.dims == ("time", "y", "x")
     assert not np.array_equal(*(days.optical_thickness.values > 0))
