@@ -86,7 +86,7 @@ PARTS = {
     "readings": lambda case: {"readings": effects.readings(case, _SEEDS).to_dict("records")},
     "sizes": lambda case: {"sizes": effects.sizes(case, _SEEDS).to_dict("records")},
     "sensitivity": lambda case: {
-        "sensitivity": effects.sensitivity(case, _SEEDS).to_dict("records")
+        "sensitivity": effects.effects_of_numbers(case, _SEEDS).to_dict("records")
     },
     "deviations": lambda case: {"deviations": paper_deviations.deviations(_SEEDS)},
 }

@@ -193,7 +193,6 @@ SHARED_NAMES = {
     "explore",
     "reproduce",
     "rerun",
-    "sensitivity",
     "simulate",
     "verify",
 }

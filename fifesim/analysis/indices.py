@@ -1,4 +1,8 @@
-"""Spectral vegetation indices, and the choice of a date for each cell of a composite."""
+"""
+Spectral vegetation indices, and the choice of a date for each cell of a composite.
+
+Indices take reflectances of the ground, arrays that broadcast, and are NaN where a denominator is zero. [1]
+"""
 
 import numpy as np
 from scipy.special import ndtr
@@ -67,16 +71,6 @@ def enhanced(nir, red, blue):
         \mathrm{EVI} = 2.5 \, \frac{\rho_\mathrm{nir} - \rho_\mathrm{red}}
             {\rho_\mathrm{nir} + 6 \rho_\mathrm{red} - 7.5 \rho_\mathrm{blue} + 1}
 
-    Parameters
-    ----------
-    nir, red, blue : array
-        Reflectances, of the ground. [1]
-
-    Returns
-    -------
-    evi : array, shape of the broadcast inputs
-        NaN where the denominator is zero. [1]
-
     References
     ----------
     [Huete2002]_
@@ -94,16 +88,6 @@ def enhanced_of_two_bands(nir, red):
         \mathrm{EVI2} = 2.5 \, \frac{\rho_\mathrm{nir} - \rho_\mathrm{red}}
             {\rho_\mathrm{nir} + 2.4 \rho_\mathrm{red} + 1}
 
-    Parameters
-    ----------
-    nir, red : array
-        Reflectances, of the ground. [1]
-
-    Returns
-    -------
-    evi2 : array, shape of the broadcast inputs
-        [1]
-
     References
     ----------
     [Jiang2008]_
@@ -114,24 +98,12 @@ def enhanced_of_two_bands(nir, red):
 
 def soil_adjusted(nir, red, soil=0.5):
     r"""
-    Soil-adjusted vegetation index (SAVI).
+    Soil-adjusted vegetation index (SAVI); L is `soil`, and 0 gives NDVI.
 
     .. math::
 
         \mathrm{SAVI} = (1 + L) \, \frac{\rho_\mathrm{nir} - \rho_\mathrm{red}}
             {\rho_\mathrm{nir} + \rho_\mathrm{red} + L}
-
-    Parameters
-    ----------
-    nir, red : array
-        Reflectances. [1]
-    soil : float, optional
-        L: 0 is NDVI. [1]
-
-    Returns
-    -------
-    savi : array, shape of the broadcast inputs
-        [1]
 
     References
     ----------
@@ -143,22 +115,12 @@ def soil_adjusted(nir, red, soil=0.5):
 
 def modified_soil_adjusted(nir, red):
     r"""
-    Modified soil-adjusted vegetation index (MSAVI), without the parameter L.
+    Modified soil-adjusted vegetation index (MSAVI), without the parameter L; NaN where noise makes the root imaginary.
 
     .. math::
 
         \mathrm{MSAVI} = \tfrac{1}{2} \left[ 2 \rho_\mathrm{nir} + 1
             - \sqrt{(2 \rho_\mathrm{nir} + 1)^2 - 8 (\rho_\mathrm{nir} - \rho_\mathrm{red})} \right]
-
-    Parameters
-    ----------
-    nir, red : array
-        Reflectances. [1]
-
-    Returns
-    -------
-    msavi : array, shape of the broadcast inputs
-        NaN where noise makes the root imaginary. [1]
 
     References
     ----------
@@ -174,16 +136,6 @@ def near_infrared_of_vegetation(nir, red):
     Near infrared reflectance of vegetation (NIRv).
 
     .. math:: \mathrm{NIR_V} = \mathrm{NDVI} \; \rho_\mathrm{nir}
-
-    Parameters
-    ----------
-    nir, red : array
-        Reflectances. [1]
-
-    Returns
-    -------
-    nirv : array, shape of the broadcast inputs
-        [1]
 
     References
     ----------
@@ -231,19 +183,7 @@ def date_of_maximum(index):
 
 
 def date_of_median(index):
-    """
-    Date with the median value of an index, the lower of two middle ones.
-
-    Parameters
-    ----------
-    index : array, shape (..., date)
-        Such as NDVI; NaN where a date has no data.
-
-    Returns
-    -------
-    chosen : array of int, shape (...)
-        -1 where no date has data.
-    """
+    """Date with the median value of an index, the lower of two middle ones, shape (...); -1 for no data."""
     index = np.asarray(index, float)
     count = (~np.isnan(index)).sum(axis=-1)
     # Missing values are sorted to the end.

@@ -184,23 +184,9 @@ def covariance(sums):
 
 def semivariance(sums):
     r"""
-    Semivariance by lag.
+    Semivariance by lag from `lag_sums`, as `covariance` [Chiles2012]_.
 
     .. math:: \gamma(h) = \frac{1}{2 N(h)} \sum (z_{i+h} - z_i)^2
-
-    Parameters
-    ----------
-    sums : array, shape (6, lags down, lags across)
-        From `lag_sums`.
-
-    Returns
-    -------
-    semivariance : array, shape (lags down, lags across)
-        NaN where there is no pair.
-
-    References
-    ----------
-    [Chiles2012]_, Section 2.2
     """
     count, _, _, product, first_square, second_square = sums
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -401,44 +387,12 @@ def shapley(values, causes):
 
 
 def taken_away(values, causes):
-    r"""
-    Reduction of an effect when one cause is removed, :math:`v(\mathrm{all}) - v(\mathrm{all} \setminus i)`.
-
-    Parameters
-    ----------
-    values, causes
-        As in `shapley`.
-
-    Returns
-    -------
-    changes : array, shape (causes, ...)
-
-    Raises
-    ------
-    ValueError
-        As in `shapley`.
-    """
+    r"""Reduction without one cause, :math:`v(\mathrm{all}) - v(\mathrm{all} \setminus i)`, as `shapley`."""
     return np.asarray(values, float)[(1,) * causes] - _one_apart(values, causes, 0)
 
 
 def by_itself(values, causes):
-    r"""
-    Effect of one cause without any other, :math:`v(i) - v(\mathrm{none})`.
-
-    Parameters
-    ----------
-    values, causes
-        As in `shapley`.
-
-    Returns
-    -------
-    changes : array, shape (causes, ...)
-
-    Raises
-    ------
-    ValueError
-        As in `shapley`.
-    """
+    r"""Effect of one cause without any other, :math:`v(i) - v(\mathrm{none})`, as `shapley`."""
     return _one_apart(values, causes, 1) - np.asarray(values, float)[(0,) * causes]
 
 
@@ -469,21 +423,10 @@ class SobolIndices(NamedTuple):
 
 def sobol_points(points):
     r"""
-    Points at which a function is evaluated for its Sobol indices.
+    Points at which a function is evaluated for its Sobol indices, shape (k + 2, n, k) [Saltelli2010]_.
 
-    Parameters
-    ----------
-    points : array, shape (n, 2 k)
-        Points in the unit cube of twice the number of inputs.
-
-    Returns
-    -------
-    sets : array, shape (k + 2, n, k)
-        The matrices A and B, and for each input :math:`A_B^i`, A with the column of this input from B.
-
-    References
-    ----------
-    [Saltelli2010]_
+    From points of twice the number of inputs, shape (n, 2 k), in the unit cube: the matrices A and B, and for each
+    input :math:`A_B^i`, A with the column of this input from B.
     """
     one, other = np.split(np.asarray(points, float), 2, axis=1)
     inputs = one.shape[1]

@@ -39,19 +39,7 @@ def normal_crps(mean, sd, truth):
 
 
 def normal_pit(mean, sd, truth):
-    """
-    Probability integral transform of the truth by a normal distribution: uniform if the estimate is calibrated.
-
-    Parameters
-    ----------
-    mean, sd, truth : array
-        As in `normal_crps`.
-
-    Returns
-    -------
-    pit : array, shape of the broadcast inputs
-        Probability of a value below the truth, 0 to 1. [1]
-    """
+    """Probability of a value below the truth, by a normal distribution: uniform if it is calibrated. [1]"""
     with np.errstate(divide="ignore", invalid="ignore"):
         return ndtr((np.asarray(truth, float) - mean) / np.asarray(sd, float))
 
@@ -120,19 +108,7 @@ def mask_errors(mask, truth):
 
 
 def ensemble_pit(members, truth):
-    """
-    Rank of the truth in an ensemble, as a share; ties count half.
-
-    Parameters
-    ----------
-    members, truth : array
-        As in `ensemble_crps`.
-
-    Returns
-    -------
-    pit : array, shape (...)
-        0 to 1. NaN where an input is. [1]
-    """
+    """Rank of the truth in an ensemble as a share, shape (...); ties count half, NaN where an input is. [1]"""
     members, truth = np.asarray(members, float), np.asarray(truth, float)[..., None]
     below = (members < truth).sum(axis=-1) + 0.5 * (members == truth).sum(axis=-1)
     share = (below + 0.5) / (members.shape[-1] + 1)

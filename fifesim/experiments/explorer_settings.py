@@ -44,19 +44,7 @@ _MOST_CELLS = 400
 
 @dataclass(frozen=True)
 class Setting:
-    """
-    Values of all sliders except registration.
-
-    Attributes
-    ----------
-    arp : float or None
-        None for a map of leaf area. [1]
-    haze : float or None
-        Visibility [km] or optical thickness; None if the scenario has no aerosol.
-    sza : float
-        [degree]
-    instrument : str
-    """
+    """Values of all sliders except registration; arp is None for a map, haze without aerosol."""
 
     arp: float | None
     haze: float | None
@@ -66,28 +54,15 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """
-    Scenarios of all settings of a page.
+    """Scenarios of all settings of a page."""
 
-    Attributes
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-        Scenario of the ground on the page.
-    haze : str
-        Key of the haze: visibility or aot.
-    arps, hazes, szas, instruments : tuple
-        Values of the sliders, one at least.
-    offsets : tuple of (float, float)
-        Registration errors southward and eastward. [pixel]
-    """
-
-    scenario: Scenario
-    haze: str
+    scenario: Scenario  # of the ground on the page
+    haze: str  # key of the haze: visibility or aot
     arps: tuple
     hazes: tuple
     szas: tuple
     instruments: tuple
-    offsets: tuple
+    offsets: tuple  # registration errors southward and eastward [pixel]
 
     @property
     def shape(self):

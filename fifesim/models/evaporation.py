@@ -19,44 +19,16 @@ WATER_PER_AIR = 0.622  # ratio of the molecular masses of water and dry air [1]
 
 @in_range
 def latent_heat(ta_k):
-    """
-    Latent heat of vaporization of water.
-
-    Parameters
-    ----------
-    ta_k : array
-        [K]
-
-    Returns
-    -------
-    latent_heat : array, shape of ta_k
-        [J kg-1]
-
-    References
-    ----------
-    [Allen1998]_, Eq. 3-1
-    """
+    """Latent heat of vaporization of water at a temperature in K, [Allen1998]_, Eq. 3-1. [J kg-1]"""
     return 2.501e6 - 2361 * (np.asarray(ta_k, float) - 273.15)
 
 
 @in_range
 def saturation_pressure(ta_k):
     """
-    Saturation vapour pressure over water, and its slope.
+    Saturation vapour pressure over water [Pa] and its slope [Pa K-1] at a temperature in K.
 
-    Parameters
-    ----------
-    ta_k : array
-        [K]
-
-    Returns
-    -------
-    pressure, slope : array, shape of ta_k
-        [Pa], [Pa K-1]
-
-    References
-    ----------
-    [Mu2011]_, whose slope has the rounded constants 17.38 and 239
+    From [Mu2011]_, whose slope has the rounded constants 17.38 and 239.
     """
     tc = np.asarray(ta_k, float) - 273.15
     pressure = 610.8 * np.exp(17.27 * tc / (tc + 237.3))

@@ -20,21 +20,7 @@ CARBON = 12.011e-6
 
 
 def ramp(values, low, high):
-    """
-    Linear rise from 0 at one value to 1 at another, constant beyond.
-
-    Parameters
-    ----------
-    values : array
-        NaN gives NaN.
-    low, high : float
-        Values with a result of 0 and of 1, in the unit of the values.
-
-    Returns
-    -------
-    ramp : array, shape of values
-        [1]
-    """
+    """Linear rise from 0 at one value to 1 at another, constant beyond. [1]"""
     return np.clip((np.asarray(values, float) - low) / (high - low), 0.0, 1.0)
 
 

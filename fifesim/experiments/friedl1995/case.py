@@ -150,30 +150,14 @@ _BLUR = (
 
 @dataclass(frozen=True)
 class Reading:
-    """
-    Interpretation of Table 1: position and spatial response of the pixels relative to the blocks of ground.
-
-    Parameters
-    ----------
-    name : str
-    text : str
-        Interpretation of Table 1.
-    own_interval : bool
-        Pixels at the instrument's own sampling interval, paired with the blocks by row and column.
-    count : int, optional
-        Number of angles of the line spread function, instead of Table 1's.
-    eifov : float, optional
-        Effective field of view of a Gaussian that replaces the line spread function of Table 1. [m]
-    offset : float
-        Constant displacement of the image, southward and eastward. [cell]
-    """
+    """Interpretation of Table 1: position and spatial response of the pixels relative to the blocks of ground."""
 
     name: str
     text: str
-    own_interval: bool = False
-    count: int | None = None
-    eifov: float | None = None
-    offset: float = 0.0
+    own_interval: bool = False  # pixels at the instrument's own interval, paired with the blocks by row and column
+    count: int | None = None  # angles of the line spread function, instead of Table 1's
+    eifov: float | None = None  # effective field of view of a Gaussian instead of this function [m]
+    offset: float = 0.0  # constant displacement of the image, southward and eastward [cell]
 
     @property
     def other_response(self):
@@ -274,45 +258,17 @@ _CORNER = 1000
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """
-    Common description of the nine scenes.
-
-    Parameters
-    ----------
-    reading : Reading
-        Interpretation of Table 1.
-    dem : str
-        "flat", "flint-hills" or a raster file of elevation.
-    densities : mapping of str
-        LAI distribution of each treatment, as in `fifesim.lai_distribution`.
-    optics : mapping of str to (float, float), optional
-        Leaf reflectance and transmittance by band; by default the fitted values. [1]
-    background : mapping of str to float, optional
-        Background by band, or fractions of spectra; by default the fitted values. [1]
-    sensor : str
-        Name of an instrument, or its file.
-    cells : int, optional
-        Cells along the edge of a scene; by default 333, or 12 pixels of a coarse sensor.
-    bits : int, optional
-        Number of bits; by default from the instrument.
-    west, north : float, optional
-        Upper left corner of the scenes in EPSG:26914, for the relief; by default 3.33 km from the corner of the
-        site, which the paper does not give. [m]
-
-    Raises
-    ------
-    ValueError
-        If a scene would have fewer than 10 pixels along its edge, or the sensor lacks a red or near infrared band.
-    """
+    """Common description of the nine scenes."""
 
     reading: Reading = NATIVE
-    dem: str = "flat"
+    dem: str = "flat"  # or "flint-hills", or a raster file of elevation
     densities: Mapping = field(default_factory=lambda: densities_of(None))
-    optics: Mapping | None = None
-    background: Mapping | None = None
+    optics: Mapping | None = None  # leaf reflectance and transmittance by band, fitted by default [1]
+    background: Mapping | None = None  # by band, or fractions of spectra; fitted by default [1]
     sensor: str = TABLE_1
-    cells: int | None = None
+    cells: int | None = None  # along the edge of a scene, 333 or 12 pixels of a coarse sensor by default
     bits: int | None = None
+    # Upper left corner in EPSG:26914, by default 3.33 km from the corner of the site, which the paper does not give.
     west: float | None = None
     north: float | None = None
 

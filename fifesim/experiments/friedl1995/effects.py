@@ -75,7 +75,7 @@ def lines_in_a_row(table, prefix=""):
     return row | {"growth": float(np.mean(growths))}
 
 
-def sensitivity(case, seeds, each=iter):
+def effects_of_numbers(case, seeds, each=iter):
     """Effect on Table 2 of a change of each chosen number, with the same random numbers, as a table."""
     base = friedl1995_table.realise_scenes(case, seeds).isel(reading=0).mean("realisation")
     rows = []

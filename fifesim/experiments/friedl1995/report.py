@@ -91,9 +91,6 @@ def _of_case(readings):
     return {row["name"]: row for row in readings.to_dict("records") if row["dem"] == readings["dem"].iloc[0]}
 
 
-# Tables of effects, with labels for the progress bar.
-_TABLES = {"readings": "readings of Table 1", "sizes": "sizes of the scene", "sensitivity": "numbers chosen"}
-
 # Cases use the same random numbers, so their differences need few realisations.
 _EFFECT_REALISATIONS = 2
 _DPI = 200
@@ -111,14 +108,24 @@ def reproduce_to_folder(
     reproduction.check_named(case)
     check_memory_of_cells(case.cells)
     pictures = pictures_of(case)
-    names = ["table2.csv", *(f"{name}.csv" for name in _TABLES), *pictures.values(), "scenarios", "report.html"]
+    names = [
+        "table2.csv",
+        "readings.csv",
+        "sizes.csv",
+        "sensitivity.csv",
+        *pictures.values(),
+        "scenarios",
+        "report.html",
+    ]
     with results(folder, names, overwrite=overwrite) as partial:
         found = reproduce_case(case, realisations, seed, each=_shown)
         seeds = range(seed, seed + _EFFECT_REALISATIONS)
         tables = {
-            name: getattr(table_effects, name)(case, seeds, each=_shown(label)) for name, label in _TABLES.items()
+            "readings": table_effects.readings(case, seeds, each=_shown("readings of Table 1")),
+            "sizes": table_effects.sizes(case, seeds, each=_shown("sizes of the scene")),
+            "sensitivity": table_effects.effects_of_numbers(case, seeds, each=_shown("numbers chosen")),
+            "table2": _both(found),
         }
-        tables["table2"] = _both(found)
         for name, table in tables.items():
             table.to_csv(partial / f"{name}.csv", index=False, float_format="%.6g")
         drawn = {key: report.png(figures.plot_reproduction(key[0], found, reading=key[1]), _DPI) for key in pictures}

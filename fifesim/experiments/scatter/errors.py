@@ -121,27 +121,7 @@ def check_retrieval(retrieval, scenario):
 
 
 def error_shares(scenario, target, retrieval="line"):
-    """
-    Bias and variance of the error of a quantity in one realisation, by stage.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Complete.
-    target : Target
-    retrieval : "line" or Retrieval, optional
-
-    Returns
-    -------
-    shares : xarray.Dataset, dims (stage)
-        ``bias`` and ``variance`` by stage, and the numbers ``total_bias``, ``total_variance``, ``truth`` (mean) and
-        ``truth_variance``.
-
-    Raises
-    ------
-    ValueError
-        If the quantity is invalid.
-    """
+    """Bias and variance of the error in one realisation by stage, their totals, and mean and variance of the truth."""
     fixed = fixed_stages(retrieval)
     stages = tuple(name for name in working_stages(scenario) if name not in fixed)
     scene = scene_of(scenario, retrieval if isinstance(retrieval, Retrieval) else None)

@@ -182,26 +182,12 @@ STEP = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Pixels:
-    """
-    Pixels of a scene under every combination of its stages.
+    """Pixels of a scene under every combination of its stages."""
 
-    Parameters
-    ----------
-    stages : tuple of str
-        Stages that are not already ideal, in the order of `STAGES`.
-    ndvi : array, shape (2,) * len(stages) + (n,)
-        Index 1 if the stage is active, 0 if it is ideal. [1]
-    truth : dict of str to array, shape as ``ndvi`` or 1 along its axes
-        True LAI and FPAR.
-    homogeneous_ndvi : array, shape (n,)
-        NDVI with all stages active, for ground that is uniform within each pixel. [1]
-    homogeneous_truth : dict of str to array, shape (n,)
-    """
-
-    stages: tuple
-    ndvi: np.ndarray
-    truth: dict
-    homogeneous_ndvi: np.ndarray
+    stages: tuple  # that are not ideal already, in the order of STAGES
+    ndvi: np.ndarray  # shape (2,) * len(stages) + (n,), index 1 where the stage is active
+    truth: dict  # LAI and FPAR, shape as ndvi or 1 along its axes
+    homogeneous_ndvi: np.ndarray  # all stages active, over ground that is uniform within each pixel, shape (n,)
     homogeneous_truth: dict
 
 

@@ -42,7 +42,8 @@ def effect_tables():
         patch.setattr(effects, "READINGS", {name: READINGS[name] for name in few})
         patch.setattr(effects, "changes", lambda case: [effects.Change("itself", "1", "1", case)])
         case = case_of(cells=90)
-        return {name: getattr(effects, name)(case, [1]) for name in ("readings", "sizes", "sensitivity")}
+        made = {"readings": effects.readings, "sizes": effects.sizes, "sensitivity": effects.effects_of_numbers}
+        return {name: function(case, [1]) for name, function in made.items()}
 
 
 @pytest.fixture(scope="session")

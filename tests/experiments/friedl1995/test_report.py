@@ -122,6 +122,7 @@ def prepared(quick, monkeypatch, effect_tables, small):
 
     monkeypatch.setattr(reproduction, "reproduce_case", ready)
     for name, table in effect_tables.items():
+        name = "effects_of_numbers" if name == "sensitivity" else name
         monkeypatch.setattr(effects, name, lambda *arguments, table=table, **options: table)
     quick.asked = asked
     return quick

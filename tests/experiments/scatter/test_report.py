@@ -42,13 +42,6 @@ def test_mechanisms_share_out_the_stages_once(budget):
         assert row["lai"]["error"] == pytest.approx(0, abs=1e-12)
 
 
-def test_registration_is_no_mechanism_of_the_paper():
-    """The paper's third is regularization; of pixels beside their blocks it says nothing."""
-    (name,) = (name for name, parts in report.MECHANISMS.items() if "registration" in parts)
-    assert "not discussed" in name and report.MECHANISMS[name] == ("registration",)
-    assert report.MECHANISMS["iii. Regularization by the sensor"] == ("point spread",)
-
-
 @pytest.fixture
 def command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

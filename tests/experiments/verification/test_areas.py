@@ -17,9 +17,7 @@ from fifesim.experiments.verification.deviations import (
     largest,
     rms_percent,
 )
-from fifesim.ground.canopy import layers
-from fifesim.ground.terrain import horizon, spline
-from fifesim.sensor.response import calibration, scan
+from fifesim.ground.terrain import spline
 
 
 def run():
@@ -43,20 +41,10 @@ def test_installation_is_within_all_bounds():
     assert any("6SV1.1" in line for line in lines) and any("prosail" in line for line in lines)
 
 
-def test_every_area_has_a_stage():
-    """In the order of the way of a pixel, so that every stage has one heading."""
-    assert list(deviations.AREA_STAGES) == list(areas.AREAS)
-
-
 @pytest.mark.parametrize(
     "area, owner, name, wrong, said",
     [
-        ("canopy", layers, "extinction_coefficient", 1.01, "canopy: extinction by spherical leaves"),
-        ("terrain", horizon, "horizon_sky_view", 1.01, "terrain: sky seen from a wide plane"),
-        ("terrain", horizon, "horizon_sky_view", np.nan, "terrain: sky under a rugged horizon"),
         ("terrain", spline, "spline_grid", np.nan, "terrain: wave of six cells"),
-        ("sensor", calibration, "gain_offset", 1.01, "sensor: counts of TM's radiances"),
-        ("sensor", scan, "growth", 1.01, "sensor: growth of a footprint"),
         ("analysis", scaling, "ndvi_hessian", 1.01, "analysis: second derivatives of NDVI"),
     ],
 )
