@@ -1,7 +1,8 @@
 """
 Spectral vegetation indices, and the choice of a date for each cell of a composite.
 
-Indices take reflectances of the ground, arrays that broadcast, and are NaN where a denominator is zero. [1]
+Indices take reflectances in the near infrared N, the red R and the blue B, arrays that broadcast, and are NaN where a
+denominator is zero.
 """
 
 import numpy as np
@@ -63,68 +64,27 @@ def normalized_difference_std(nir, red, nir_std, red_std):
 
 
 def enhanced(nir, red, blue):
-    r"""
-    Enhanced vegetation index (EVI).
-
-    .. math::
-
-        \mathrm{EVI} = 2.5 \, \frac{\rho_\mathrm{nir} - \rho_\mathrm{red}}
-            {\rho_\mathrm{nir} + 6 \rho_\mathrm{red} - 7.5 \rho_\mathrm{blue} + 1}
-
-    References
-    ----------
-    [Huete2002]_
-    """
+    r"""Enhanced vegetation index (EVI), :math:`2.5 (N - R) / (N + 6 R - 7.5 B + 1)` [Huete2002]_. [1]"""
     nir, red, blue = (np.asarray(each, float) for each in (nir, red, blue))
     return _ratio(2.5 * (nir - red), nir + 6 * red - 7.5 * blue + 1)
 
 
 def enhanced_of_two_bands(nir, red):
-    r"""
-    Enhanced vegetation index without the blue (EVI2).
-
-    .. math::
-
-        \mathrm{EVI2} = 2.5 \, \frac{\rho_\mathrm{nir} - \rho_\mathrm{red}}
-            {\rho_\mathrm{nir} + 2.4 \rho_\mathrm{red} + 1}
-
-    References
-    ----------
-    [Jiang2008]_
-    """
+    r"""Enhanced vegetation index without the blue (EVI2), :math:`2.5 (N - R) / (N + 2.4 R + 1)` [Jiang2008]_. [1]"""
     nir, red = np.asarray(nir, float), np.asarray(red, float)
     return _ratio(2.5 * (nir - red), nir + 2.4 * red + 1)
 
 
 def soil_adjusted(nir, red, soil=0.5):
-    r"""
-    Soil-adjusted vegetation index (SAVI); L is `soil`, and 0 gives NDVI.
-
-    .. math::
-
-        \mathrm{SAVI} = (1 + L) \, \frac{\rho_\mathrm{nir} - \rho_\mathrm{red}}
-            {\rho_\mathrm{nir} + \rho_\mathrm{red} + L}
-
-    References
-    ----------
-    [Huete1988]_
-    """
+    r"""Soil-adjusted vegetation index (SAVI), :math:`(1 + L) (N - R) / (N + R + L)`, L is `soil` [Huete1988]_. [1]"""
     nir, red = np.asarray(nir, float), np.asarray(red, float)
     return _ratio((1 + soil) * (nir - red), nir + red + soil)
 
 
 def modified_soil_adjusted(nir, red):
     r"""
-    Modified soil-adjusted vegetation index (MSAVI), without the parameter L; NaN where noise makes the root imaginary.
-
-    .. math::
-
-        \mathrm{MSAVI} = \tfrac{1}{2} \left[ 2 \rho_\mathrm{nir} + 1
-            - \sqrt{(2 \rho_\mathrm{nir} + 1)^2 - 8 (\rho_\mathrm{nir} - \rho_\mathrm{red})} \right]
-
-    References
-    ----------
-    [Qi1994]_, the second of them
+    Modified soil-adjusted index (MSAVI), :math:`[2 N + 1 - \sqrt{(2 N + 1)^2 - 8 (N - R)}] / 2`, NaN where noise makes the
+    root imaginary [Qi1994]_, the second of them. [1]
     """
     nir, red = np.asarray(nir, float), np.asarray(red, float)
     square = (2 * nir + 1) ** 2 - 8 * (nir - red)
@@ -132,15 +92,7 @@ def modified_soil_adjusted(nir, red):
 
 
 def near_infrared_of_vegetation(nir, red):
-    r"""
-    Near infrared reflectance of vegetation (NIRv).
-
-    .. math:: \mathrm{NIR_V} = \mathrm{NDVI} \; \rho_\mathrm{nir}
-
-    References
-    ----------
-    [Badgley2017]_
-    """
+    """Near infrared reflectance of vegetation (NIRv), NDVI times the reflectance [Badgley2017]_. [1]"""
     return normalized_difference(nir, red) * np.asarray(nir, float)
 
 

@@ -183,11 +183,7 @@ def covariance(sums):
 
 
 def semivariance(sums):
-    r"""
-    Semivariance by lag from `lag_sums`, as `covariance` [Chiles2012]_.
-
-    .. math:: \gamma(h) = \frac{1}{2 N(h)} \sum (z_{i+h} - z_i)^2
-    """
+    r"""Semivariance by lag from `lag_sums`, :math:`\sum (z_{i+h} - z_i)^2 / (2 N(h))` [Chiles2012]_, Section 2.2."""
     count, _, _, product, first_square, second_square = sums
     with np.errstate(divide="ignore", invalid="ignore"):
         squares = (first_square + second_square - 2.0 * product) / (2.0 * count)
@@ -423,10 +419,8 @@ class SobolIndices(NamedTuple):
 
 def sobol_points(points):
     r"""
-    Points at which a function is evaluated for its Sobol indices, shape (k + 2, n, k) [Saltelli2010]_.
-
-    From points of twice the number of inputs, shape (n, 2 k), in the unit cube: the matrices A and B, and for each
-    input :math:`A_B^i`, A with the column of this input from B.
+    Points at which a function is evaluated for its Sobol indices [Saltelli2010]_, shape (k + 2, n, k): from points of the
+    unit cube, shape (n, 2 k), the matrices A, B and :math:`A_B^i`, A with the column of input i from B.
     """
     one, other = np.split(np.asarray(points, float), 2, axis=1)
     inputs = one.shape[1]

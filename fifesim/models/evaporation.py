@@ -25,11 +25,7 @@ def latent_heat(ta_k):
 
 @in_range
 def saturation_pressure(ta_k):
-    """
-    Saturation vapour pressure over water [Pa] and its slope [Pa K-1] at a temperature in K.
-
-    From [Mu2011]_, whose slope has the rounded constants 17.38 and 239.
-    """
+    """Saturation vapour pressure over water [Pa] and its slope [Pa K-1] by temperature [K], as rounded in [Mu2011]_."""
     tc = np.asarray(ta_k, float) - 273.15
     pressure = 610.8 * np.exp(17.27 * tc / (tc + 237.3))
     return pressure, 17.38 * 239 * pressure / (239 + tc) ** 2

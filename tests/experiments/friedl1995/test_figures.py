@@ -55,7 +55,7 @@ def test_axes_are_those_of_the_paper(found, number, panel, points, x, y):
 @pytest.mark.parametrize(
     ("number", "options", "said"),
     [
-        ("5", {}, "number must be a number"),
+        ("5", {}, "number must be a whole number"),
         (2, {}, "one of 3, 4, 5, 6, 7, 8, 9"),
         (5, {"reading": "offset"}, "one of native, aligned, which were computed"),
     ],
