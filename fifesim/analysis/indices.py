@@ -83,8 +83,8 @@ def soil_adjusted(nir, red, soil=0.5):
 
 def modified_soil_adjusted(nir, red):
     r"""
-    Modified soil-adjusted index (MSAVI), :math:`[2 N + 1 - \sqrt{(2 N + 1)^2 - 8 (N - R)}] / 2`, NaN where noise makes the
-    root imaginary [Qi1994]_, the second of them. [1]
+    Modified soil-adjusted index (MSAVI), :math:`[2 N + 1 - \sqrt{(2 N + 1)^2 - 8 (N - R)}] / 2`, NaN where noise makes
+    the root imaginary [Qi1994]_, the second of them. [1]
     """
     nir, red = np.asarray(nir, float), np.asarray(red, float)
     square = (2 * nir + 1) ** 2 - 8 * (nir - red)

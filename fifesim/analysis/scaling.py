@@ -419,8 +419,8 @@ class SobolIndices(NamedTuple):
 
 def sobol_points(points):
     r"""
-    Points at which a function is evaluated for its Sobol indices [Saltelli2010]_, shape (k + 2, n, k): from points of the
-    unit cube, shape (n, 2 k), the matrices A, B and :math:`A_B^i`, A with the column of input i from B.
+    Points at which a function is evaluated for its Sobol indices [Saltelli2010]_, shape (k + 2, n, k): from points
+    of the unit cube, shape (n, 2 k), the matrices A, B and :math:`A_B^i`, A with the column of input i from B.
     """
     one, other = np.split(np.asarray(points, float), 2, axis=1)
     inputs = one.shape[1]

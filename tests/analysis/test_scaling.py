@@ -156,3 +156,8 @@ def test_constant_and_undefined_functions_are_refused():
         sobol_indices(np.ones((4, 8)))
     with pytest.raises(ValueError, match="not finite"):
         sobol_indices(np.full((4, 8), np.nan))
+
+
+def test_correlation_that_stays_up_has_no_range():
+    assert np.isnan(scaling.crossing(np.arange(3.0), np.array([1.0, 0.9, 0.8])))
+    assert scaling.crossing(2 * np.arange(3.0), np.array([1.0, 0.55, -0.45])) == pytest.approx(3.0)
