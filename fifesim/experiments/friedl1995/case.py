@@ -1,19 +1,19 @@
 """Experiment of Friedl et al. (1995): nine scenarios, readings of Table 1, and user-supplied inputs."""
 
 import os
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from math import ceil
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import tomlkit
 
 from fifesim.base import files
 from fifesim.base.arguments import is_path
-from fifesim.base.files import check_regular, in_a_line, shown
+from fifesim.base.files import in_a_line, read_csv, shown
 from fifesim.base.times import SITE_CORNERS, SITE_SIZE
 from fifesim.grids.grid import as_carried
 from fifesim.ground.canopy import optics as canopy_optics
@@ -103,15 +103,8 @@ def _files(names):
 
 def _table(path, columns, what):
     """Numbers by band from a CSV file."""
+    table, wanted = read_csv(path, f"the {what}"), ("band", *columns)
     name = in_a_line(Path(path).name, 100)
-    wanted = ("band", *columns)
-    try:
-        check_regular(path)
-        table = pd.read_csv(path, comment="#", skipinitialspace=True, dtype={"band": str})
-    except FileNotFoundError:
-        raise ValueError(f"there is no {what} file {in_a_line(str(path), 200)}") from None
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{what} file {name}: {in_a_line(error, 200)}") from None
     lacking = [column for column in wanted if column not in table.columns]
     if lacking:
         raise ValueError(f"{what} file {name} lacks the column {' and '.join(lacking)}: it needs {', '.join(wanted)}")
@@ -119,7 +112,7 @@ def _table(path, columns, what):
     if numbers.isna().any(axis=None):
         band = table["band"][numbers.isna().any(axis=1).idxmax()]
         raise ValueError(f"{what} file {name}: band {shown(band)} has no number in {' or '.join(columns)}")
-    return dict(zip(table["band"].str.strip(), numbers.itertuples(index=False, name=None), strict=True))
+    return dict(zip(table["band"].astype(str).str.strip(), numbers.itertuples(index=False, name=None), strict=True))
 
 
 def _shares(text):
@@ -181,25 +174,16 @@ class Reading:
             return replace(description, lsf=GaussianResponse(kind="gaussian", eifov=angle))
         return description
 
-    def instrument_file(self, altitude):
+    def instrument_file(self):
         """TOML text of an instrument file with the response of the reading and all other values from Table 1."""
-        text = files.path(_FILE).read_text(encoding="utf-8")
-        if self.count is not None:
-            step = instrument(TABLE_1).paper_lsf.step
-            lsf = f'[lsf]\nkind = "cosine"\nstep = {step!r}  # rad\ncount = {self.count}  # {self.text}\n'
-        else:
-            lsf = f'[lsf]\nkind = "gaussian"\neifov = {self.eifov / altitude!r}  # rad: {self.text}\n'
-        changes = {
-            r"(?s)\[lsf\].*?\n(?=\n\[)": lsf,
-            r"(?m)^blur = .*$": 'blur = { kind = "assumed" }',
-            r"(?m)^lsf = .*$": f'lsf = "{self.name}"',
-            r"(?m)^\[references\]$": f'[references]\n"{self.name}" = "{self.text}"',
-        }
-        for pattern, new in changes.items():
-            text, times = re.subn(pattern, new, text)
-            if times != 1:
-                raise RuntimeError(f"{_FILE} has no response that can be changed: reinstall fifesim")
-        return text
+        document = tomlkit.parse(files.path(_FILE).read_text(encoding="utf-8"))
+        response = asdict(self.instrument(instrument(TABLE_1, "paper")).lsf)
+        document["lsf"] = {name: value for name, value in response.items() if value is not None}
+        document["lsf"].comment(self.text)
+        document["origin"]["blur"] = tomlkit.inline_table() | {"kind": "assumed"}
+        document["sources"]["lsf"] = self.name
+        document["references"][self.name] = self.text
+        return tomlkit.dumps(document)
 
 
 # Statements of the paper on cells and pixels, by section. They support the aligned reading.

@@ -244,7 +244,7 @@ def scenario_text(case, own, treatment, arp, seed):
     if not case.reading.other_response:
         return write_scenario(scenario.complete())
     name = f"{case.reading.name}.toml"
-    (own / name).write_text(case.reading.instrument_file(case.instrument.altitude), encoding="utf-8")
+    (own / name).write_text(case.reading.instrument_file(), encoding="utf-8")
     sensor = scenario.sensor.model_copy(update={"instrument": str(own / name)})
     complete = scenario.model_copy(update={"sensor": sensor}).complete()
     # Relative path, so that both files can be moved together.

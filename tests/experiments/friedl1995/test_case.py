@@ -123,7 +123,7 @@ def test_blur_is_that_measured_in_flight():
 @pytest.mark.parametrize("name", OTHER)
 def test_instrument_file_of_a_reading_is_that_instrument(name, tmp_path):
     reading, tm = READINGS[name], PAPER
-    (tmp_path / "own.toml").write_text(reading.instrument_file(tm.altitude), encoding="utf-8")
+    (tmp_path / "own.toml").write_text(reading.instrument_file(), encoding="utf-8")
     read, made = read_instrument(tmp_path / "own.toml"), reading.instrument(tm)
     assert read.lsf == made.lsf != tm.lsf
     assert read.bands == made.bands and read.bits == made.bits and read.ground_interval == made.ground_interval
