@@ -3,7 +3,7 @@ What a composite keeps
 ======================
 
 A composite chooses one date for each pixel from many dates with clouds, haze and slant views. This page simulates
-two weeks of AVHRR over even grassland, so that every difference from a clear view at nadir is an error, and compares
+14 dates of AVHRR over even grassland, so that every difference from a clear view at nadir is an error, and compares
 four composites.
 """
 
@@ -22,11 +22,11 @@ grass = fifesim.Canopy(
 )
 
 # %%
-# `overpasses` lists the passes of NOAA-9 by day, with sun and view. Each date has an independent haze and an
-# independent sky, of which 40 % have thin clouds.
+# `overpasses` lists the passes of NOAA-9 by day, with sun and view. Views are within 55 degrees of nadir. Each date has
+# an independent visibility of 8 to 60 km and an independent sky, of which 40 % have thin clouds.
 
-dates = fifesim.overpasses("AVHRR", "1987-06-01T00:00Z", "1987-06-15T00:00Z", (39.06, -96.54))
-dates = dates.isel(time=dates.vza < 64)
+dates = fifesim.overpasses("AVHRR", "1987-06-01T00:00Z", "1987-06-21T00:00Z", (39.06, -96.54))
+dates = dates.isel(time=dates.vza <= 55).isel(time=slice(0, 14))
 haze = np.random.default_rng(5).uniform(8, 60, dates.sizes["time"])  # km
 
 
@@ -84,7 +84,9 @@ figure.colorbar(shown, ax=axes, label="NDVI less clear nadir view", shrink=0.8)
 
 # %%
 # With more dates the maximum rises above the clear view at nadir, and its views are forward: the sensor faces the sun.
-# The figure shows means over 20 random choices of dates.
+# The figure shows means over 40 random choices of dates. One date lies 0.04 below the truth, with a standard deviation
+# of 0.05; 14 dates lie 0.03 above it. With clouds that reflect their albedo in all directions
+# (`two_stream_reflectance`), one date would lie 0.07 below: thin clouds scatter mostly forward.
 
 
 def forward(composite):
@@ -93,11 +95,11 @@ def forward(composite):
     return float((apart > 90).mean())
 
 
-counts = [1, 2, 3, 5, 8, 12, dates.sizes["time"]]
+counts = [1, 2, 3, 5, 10, 14]
 rng = np.random.default_rng(1)
 bias, spread, share = [], [], []
 for count in counts:
-    chosen = [np.sort(rng.permutation(counts[-1])[:count]) for _ in range(20)]
+    chosen = [np.sort(rng.permutation(counts[-1])[:count]) for _ in range(40)]
     largest = [series.isel(time=each).fifesim.composite() for each in chosen]
     errors = np.array([each.values - truth for each in largest])
     bias.append(errors.mean())
