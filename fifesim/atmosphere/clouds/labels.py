@@ -321,7 +321,8 @@ def _layers(thickness, base, top, per_metre):
         raise ValueError(f"the base of clouds must not be above their top, but is by up to {-thinnest:g} m: swap them")
     height = (base + top) / 2
     low, high = extremes(height)
-    step = max(1 / per_metre, (high - low) / (_MOST_LAYERS - 1)) if per_metre else np.inf
+    # Without displacement, the height does not matter.
+    step = max(1 / per_metre if per_metre else HIGHEST_CLOUD, (high - low) / (_MOST_LAYERS - 1))
     number = np.round((height.fillna(low) - low) / step)
     thickness = thickness.where(height.notnull() | (thickness == 0))
     return [(thickness.where(number == k, 0.0), low + k * step) for k in range(round((high - low) / step) + 1)]
