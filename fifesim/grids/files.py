@@ -19,7 +19,7 @@ import rasterio.shutil
 import xarray as xr
 from dask.utils import SerializableLock
 from rasterio.enums import ColorInterp
-from rasterio.windows import Window
+from rioxarray.raster_writer import RasterioWriter
 
 from fifesim.base.arguments import Chunks, FilePath
 from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, nearest_band
@@ -376,22 +376,9 @@ def _stream(array, cells, layers, grid, path, described, further):
         largest = cells.dtype.itemsize * max(cells.chunks[-2]) * max(cells.chunks[-1])
         together = cells.sizes["band"] * largest <= _AT_ONCE
         data = cells.data.rechunk({0: -1}) if together else cells.data
-        da.store(data, _Sink(str(path)), lock=_lock(str(path)), compute=True)
+        da.store(data, RasterioWriter(str(path)), lock=_lock(str(path)), compute=True)
     with rasterio.open(path, "r+") as sink:
         sink.update_tags(**{TAG: json.dumps(kept | {"cells": fingerprint_of(sink)})})
-
-
-class _Sink:
-    """Raster file that accepts assignments to slices from dask, in any process."""
-
-    def __init__(self, path):
-        self._path = path
-
-    def __setitem__(self, index, block):
-        bands, rows, columns = index
-        window = Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
-        with rasterio.open(self._path, "r+") as sink:
-            sink.write(block, indexes=list(range(bands.start + 1, bands.stop + 1)), window=window)
 
 
 def _lock(name):

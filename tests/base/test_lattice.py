@@ -79,13 +79,6 @@ def test_a_whole_number_of_any_type_is_the_seed(draw):
     assert not np.array_equal(last, before)
 
 
-def test_scenarios_hold_the_same_seeds():
-    for section in ("ground", "terrain", "sensor"):
-        assert fifesim.Scenario(**{section: {"seed": 2**63 - 1}})
-        with pytest.raises(ValueError, match="seed"):
-            fifesim.Scenario(**{section: {"seed": 2**63}})
-
-
 def test_places_streams_and_seeds_are_unrelated():
     """Neighbouring numbers from 2**63 up are the same in double precision; places are words of 64 bits."""
     keys = [(seed, stream, (0, 0, place, 0)) for seed in (0, 2**63 - 1) for stream in (1, 2**63) for place in (0, -1)]

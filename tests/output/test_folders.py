@@ -2,15 +2,12 @@
 
 import multiprocessing
 import os
-import platform
 import signal
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-import fifesim
-from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, results, versions
+from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, results
 
 NAMES = ("one.txt", "two.txt")
 
@@ -172,13 +169,6 @@ def test_a_folder_in_use_is_refused_with_what_to_type(tmp_path, held, options, s
     assert all((tmp_path / name).read_text() == "kept" for name in held)
 
 
-def test_what_a_dead_run_left_before_it_began_is_no_run(tmp_path):
-    (tmp_path / UNFINISHED).mkdir()
-    (tmp_path / UNFINISHED / "half").touch()
-    write(tmp_path, "1")
-    assert contents(tmp_path) == dict.fromkeys(NAMES, "1")
-
-
 def hold(folder, ready, end):
     with results(folder, NAMES, overwrite=True) as hidden:
         for name in NAMES:
@@ -256,9 +246,3 @@ def test_a_dead_run_holds_nothing(tmp_path, rival):
     process.join(60)
     write(tmp_path / "out", "second")
     assert contents(tmp_path / "out") == dict.fromkeys(NAMES, "second")
-
-
-def test_versions_are_those_of_the_packages_that_run():
-    found = versions()
-    assert (found["python"], found["numpy"]) == (platform.python_version(), np.__version__)
-    assert found["fifesim"] == fifesim.__version__

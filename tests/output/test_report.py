@@ -170,11 +170,6 @@ def test_other_runs_are_not_compared(sections):
     assert published(**sections) == []
 
 
-def test_small_scene_says_what_to_type_alone():
-    (_, why), (_, typed) = published(grid={"width": 120, "height": 120})
-    assert why.startswith("0.61") and typed.startswith("use interval")
-
-
 @pytest.fixture(scope="module")
 def level():
     scenario = parse_scenario({"grid": {"width": 600, "height": 300}, "terrain": {"dem": "flat"}})

@@ -6,6 +6,7 @@ import shutil
 import numpy as np
 import pytest
 import rasterio
+from elevations import write
 
 import fifesim
 from fifesim.output import report
@@ -46,11 +47,9 @@ def test_what_differs_is_counted_and_versions_are_named(travelled, tmp_path):
 
 
 def test_inputs_move_with_the_file(tmp_path):
-    profile = {"driver": "GTiff", "width": 12, "height": 12, "count": 1, "dtype": "float32", "crs": "EPSG:26914"}
     (tmp_path / "one").mkdir()
     place = rasterio.transform.from_origin(704970, 4334220, 30, 30)
-    with rasterio.open(tmp_path / "one" / "lai.tif", "w", **profile, transform=place) as sink:
-        sink.write(np.random.default_rng(1).uniform(1, 3, (1, 12, 12)).astype("float32"))
+    write(tmp_path / "one" / "lai.tif", np.random.default_rng(1).uniform(1, 3, (12, 12)), place)
     scenario = {"ground": {"lai_file": str(tmp_path / "one" / "lai.tif")}, "terrain": {"dem": "flat"}}
     simulate_to_folder(parse_scenario(scenario), tmp_path / "one" / "out")
     moved = (tmp_path / "one").rename(tmp_path / "two")

@@ -13,6 +13,7 @@ import rasterio
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 import zarr
+from elevations import write
 from typer.testing import CliRunner
 
 import fifesim
@@ -153,10 +154,8 @@ def test_the_scene_holds_the_cells(hills):
 
 
 def lai_map(path, values):
-    profile = {"driver": "GTiff", "width": 30, "height": 20, "count": 1, "dtype": "float32", "crs": "EPSG:26914"}
-    with rasterio.open(path, "w", **profile, transform=rasterio.transform.from_origin(704970, 4334220, 30, 30)) as sink:
-        sink.write(np.full((1, 20, 30), values, "float32"))
-    return {"ground": {"lai_file": str(path)}}
+    place = rasterio.transform.from_origin(704970, 4334220, 30, 30)
+    return {"ground": {"lai_file": str(write(path, np.full((20, 30), values), place))}}
 
 
 def test_report_of_a_map_calls_nothing_synthetic(tmp_path):

@@ -1,7 +1,5 @@
 """How commands speak."""
 
-import atexit
-import gc
 import logging
 import os
 import signal
@@ -9,7 +7,7 @@ import signal
 import pytest
 
 from fifesim.base.messages import LOG, quiet
-from fifesim.output.terminal import Exit, importing, in_time, interrupts_blocked, listening, print_lines, report, stop
+from fifesim.output.terminal import Exit, in_time, interrupts_blocked, listening, print_lines, report, stop
 
 
 def test_the_last_line_says_how_long_it_took_and_what_to_open(capsys):
@@ -53,18 +51,6 @@ def test_a_mistake_ends_with_its_code_and_at_most_500_characters(code, capsys):
     assert caught.value.code == code
     said = capsys.readouterr().err
     assert said.startswith("fifesim: xxx") and len(said) <= 501
-
-
-def test_what_imports_make_is_not_searched_for_garbage(monkeypatch):
-    """Nor when the interpreter ends."""
-    last = []
-    monkeypatch.setattr(atexit, "register", last.append)
-    with importing():
-        assert not gc.isenabled()
-    try:
-        assert gc.isenabled() and gc.get_freeze_count() > 0 and last == [gc.freeze]
-    finally:
-        gc.unfreeze()
 
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals cannot be blocked on Windows")

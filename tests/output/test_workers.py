@@ -235,13 +235,14 @@ def wanted(array, name="means"):
 
 @pytest.mark.parametrize("threads", [1, 3])
 def test_blocks_are_those_of_dask(threads):
+    """And they are delivered in the order in which they are wanted."""
     array, found = means(96, 17), {}
-    run_on_threads(
-        *tasks_of({"means": array}, wanted(array)), lambda name, index, block: found.update({index: block}), threads
-    )
-    for index, block in found.items():
+    backwards = wanted(array)[::-1]
+    tasks = tasks_of({"means": array}, backwards)
+    run_on_threads(*tasks, lambda name, index, block: found.update({(name, index): block}), threads)
+    assert list(found) == backwards
+    for (_, index), block in found.items():
         np.testing.assert_array_equal(block, array.blocks[index].compute(scheduler="sync"))
-    assert len(found) == array.npartitions
 
 
 @pytest.mark.parametrize("piece", [1, 5])
@@ -282,29 +283,6 @@ class Watch:
         return made
 
 
-def chunks_at_once(rows, columns):
-    """Most chunks in memory together when pixels are made of so many of them, by one thread."""
-    watched, shape = Watch(), (rows * 10, columns * 10)
-    options = {"dtype": float, "meta": np.empty((0, 0))}
-    truth = da.ones(shape, chunks=10).map_blocks(watched, **options)
-    image = truth.map_blocks(np.sqrt).map_blocks(watched, **options)
-    grid = fife_site(30 / 9, window=((0, rows * 10), (0, columns * 10)))
-    pixels = grids.aligned_grid(grid, 10.0)
-    axes = [
-        axis_operator(
-            Boxcar(3.5), cell_origin=0, cell_size=1, n_cells=size, pixel_origin=0, pixel_size=3, n_pixels=size // 3
-        )
-        for size in shape
-    ]
-    arrays = {
-        name: resample(*axes, grids.place(xr.DataArray(data, dims=("y", "x")), grid), pixels).data
-        for name, data in (("image", image), ("truth", truth))
-    }
-    places = [(name, index) for index in np.ndindex(arrays["image"].numblocks) for name in arrays]
-    run_on_threads(*tasks_of(arrays, places), lambda *block: None, 1)
-    return watched.most
-
-
 @pytest.mark.parametrize("piece", [7, 600])
 def test_no_chunk_waits_for_those_that_need_its_rims_only(monkeypatch, piece):
     """Blocks that read a row and a column before them too: the row of blocks above waits as rims."""
@@ -318,15 +296,3 @@ def test_no_chunk_waits_for_those_that_need_its_rims_only(monkeypatch, piece):
     blocks = array_from_windows(lambda window: window[1:, 1:] + window[:-1, :-1], [cells], sizes, ask, token="before")
     run_on_threads(*tasks_of({"blocks": blocks}, wanted(blocks, "blocks")), lambda *block: None, 1)
     assert watched.most <= 3
-
-
-def test_what_waits_grows_neither_with_rows_nor_with_columns():
-    """A few of the chunk that is being used and of its neighbours, never a row of them."""
-    assert chunks_at_once(40, 20) == chunks_at_once(10, 20) == chunks_at_once(10, 5) <= 3
-
-
-def test_blocks_are_delivered_as_they_are_wanted():
-    array, found = means(96, 17), []
-    backwards = wanted(array)[::-1]
-    run_on_threads(*tasks_of({"means": array}, backwards), lambda name, index, block: found.append((name, index)), 2)
-    assert found == backwards

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from fifesim.ground.landscape.autoregression import FIELD_TILE
-from fifesim.scenario import chips as chips_module
-from fifesim.scenario.chips import chips_of, first_cell_of_chip, ring_place
+from fifesim.scenario.chips import chips_of, first_cell_of_chip
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.studies import Study
 
@@ -41,18 +40,6 @@ def test_no_landscape_is_in_two_parts(chips):
     parts = {name: set(chips.landscape[chips.split == name].tolist()) for name in ("train", "validation", "test")}
     assert [len(each) for each in parts.values()] == [6, 1, 1]
     assert set.union(*parts.values()) == set(range(8))
-
-
-def test_no_two_chips_share_ground(chips):
-    """They may lie at the same place where their seeds differ."""
-    table = chips.table()
-    places = {
-        (int(a), b, c) for a, b, c in zip(table["ground.seed"], table.west.values, table.north.values, strict=True)
-    }
-    assert len(places) == len(chips)
-    for name in ("west", "north"):
-        apart = np.diff(np.unique(table[name].values))
-        assert apart.min() >= 180 - 1e-6
 
 
 def test_the_first_chips_lie_in_the_tile_of_the_scenario(chips):
@@ -109,15 +96,6 @@ def test_a_number_of_chips_is_a_whole_one(count):
         chips_of(study_of(), count)
 
 
-def test_the_spiral_goes_step_by_step_through_all_places():
-    places = [ring_place(number) for number in range(15**2)]
-    assert set(places) == set(itertools.product(range(-7, 8), repeat=2))
-    steps = [abs(a - c) + abs(b - d) for (a, b), (c, d) in itertools.pairwise(places)]
-    assert set(steps) == {1}
-    # A ring begins up its right side; chips that are larger than a tile lie in such rings, north above south.
-    assert [first_cell_of_chip(number, (13, 14), (0, 0), 10) for number in (0, 1, 2)] == [(0, 0), (0, 14), (-13, 14)]
-
-
 @pytest.mark.parametrize("size", [(4, 5), (3, 5), (10, 3), (13, 4)])
 @pytest.mark.parametrize("corner", [(0, 0), (-17, 23)])
 def test_no_two_chips_share_a_cell(size, corner):
@@ -139,17 +117,3 @@ def test_chips_fill_a_tile_before_the_next():
     for number in range(9):
         row, column = first_cell_of_chip(number, (333, 333), (211491, 5000), 1008)
         assert (row + 332) // 1008 == row // 1008 and (column + 332) // 1008 == column // 1008
-
-
-def test_a_tile_holds_the_margins_of_its_chips():
-    """With 24 cells around them only four chips of 333 fit into a tile of 1008."""
-    places = [first_cell_of_chip(number, (333, 333), (211491, 5000), 1008, (24, 24)) for number in range(8)]
-    for row, column in places:
-        assert (row - 24) // 1008 == (row + 356) // 1008 and (column - 24) // 1008 == (column + 356) // 1008
-    assert len({(row // 1008, column // 1008) for row, column in places}) == 2
-
-
-def test_chips_draw_from_streams_of_their_own():
-    """Streams 1 and 2 are those of the periodic field and of the library of spectra."""
-    streams = [chips_module._OF_CHIPS, chips_module._OF_LANDSCAPES, chips_module._ORDER, chips_module._SPLIT]
-    assert len(set(streams)) == 4 and not {0, 1, 2} & set(streams)

@@ -13,18 +13,16 @@ from oracles_canopy import fpar_of_green_leaves
 import fifesim
 from fifesim.grids import grid as grids
 from fifesim.ground.canopy.layers import extinction_coefficient
-from fifesim.ground.terrain import labels as slopes_light
 from fifesim.scenario.ground import (
     canopy_of,
     drawn_properties,
     elevation,
     ground_scene,
-    in_memory,
     scenario_light_on_hills,
     truth_of,
     warn_of_canopy,
 )
-from fifesim.scenario.scenario import Scenario, parse_scenario
+from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import setup_of
 
 SMALL = {"grid": {"width": 300.0, "height": 240.0}, "terrain": {"dem": "flat"}}
@@ -155,12 +153,6 @@ def test_leaf_area_goes_with_the_hills_of_a_scenario():
     assert heights > 0.1
 
 
-def test_one_stand_with_what_varies_has_its_own_leaf_area():
-    plain, land = scene_of(), scene_of(landscape={"deviations": {"soil": 0.02}})
-    np.testing.assert_array_equal(land["lai"], plain["lai"])
-    assert (land["cover"] == 1).all() and set(land) == {"lai", "cover", "soil"}
-
-
 def test_map_of_leaf_area_keeps_it_and_has_what_varies(tmp_path):
     lai = scene_of(ground={"seed": 5})["lai"]
     ground = {"lai_file": str(write(tmp_path / "lai.tif", lai.values, parse_scenario(SMALL).geobox().affine))}
@@ -187,7 +179,7 @@ def test_drawn_properties_are_about_their_means_with_the_arp_of_the_ground():
 def test_what_every_class_says_and_what_is_drawn_is_not_passed(scenario):
     """It would change nothing, which `surface_reflectance` refuses."""
     expected = {"hotspot": 0.1, "dissociation": 0.5, "crown_cover": 0.8, "crown_shape": 0.7, "moisture": 0.2}
-    expected |= {"background": BACKGROUND, "brown_leaf": fifesim.Leaf(brown=1.0)}
+    expected |= {"background": BACKGROUND, "brown_leaf": fifesim.Leaf(brown=1.0), "model": "sail"}
     assert given_by(canopy_of(scenario)) == expected
     alone = canopy_of(parse_scenario({"ground": OWN["ground"]}))
     assert given_by(alone) == expected | {"leaf_angles": "planophile", "brown": 0.2, "soil": 0.0}
@@ -318,20 +310,6 @@ def test_horizon_is_found_on_multiples_of_its_cells_from_the_origin_of_the_crs()
     for origin, cell in ((affine.c, affine.a), (affine.f, affine.e)):
         # Places are middles of cells of the land around, which lie on whole multiples.
         assert abs(((origin + cell / 2) / (cell / 2)) - round((origin + cell / 2) / (cell / 2))) < 1e-6
-
-
-def test_in_memory_is_the_horizon_that_lies_above_the_elevation():
-    one = Scenario(grid={"west": 708000.0, "north": 4331000.0, "width": 300.0, "height": 300.0})
-    dem, horizon, _ = elevation(one, one.geobox())
-    whole, (dem, above) = horizon.compute(), in_memory(dem, horizon)
-    assert dem.chunks is None and above.chunks is None and above.size < whole.size / 100
-    xr.testing.assert_equal(above, whole.sel(y=above.y, x=above.x))
-    light = [slopes_light.illumination(dem, one.sun_and_view(), each) for each in (above, whole)]
-    np.testing.assert_array_equal(*light)
-    assert in_memory(None, None) == (None, None)
-    flat = one.replace(dem="flat")
-    assert elevation(flat, flat.geobox()) == (None, None, {})
-    assert scenario_light_on_hills(flat, flat.geobox(), flat.sun_and_view()) is None
 
 
 @pytest.mark.parametrize(("sza", "alone"), [(70.0, True), (73.0, False)])

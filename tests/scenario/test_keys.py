@@ -10,7 +10,6 @@ from pydantic import Field, ValidationError
 from fifesim.scenario.keys import (
     VARYING,
     ClassKeys,
-    GroundKeys,
     Keys,
     LandscapeKeys,
     Section,
@@ -118,22 +117,6 @@ def test_seed_is_a_whole_number_that_toml_holds(value):
     with pytest.raises(ValidationError, match="grain"):
         Shelf(grain=value)
     assert Shelf(grain=2**63 - 1).grain == 2**63 - 1
-
-
-def test_unknown_keys_and_tables_that_are_none_are_refused():
-    with pytest.raises(ValidationError, match="Extra inputs"):
-        Shelf(width=1.0)
-    with pytest.raises(ValidationError, match="expected a table of keys, got 3"):
-        Shelf.model_validate(3)
-
-
-def test_a_class_says_what_it_was_given_and_no_default():
-    stand = ClassKeys(hotspot=0.0, distribution="burned-grazed", code=None)
-    assert list(stand.written) == ["distribution", "hotspot", "code"]
-    assert list(ClassKeys().written) == []
-    assert stand.written["hotspot"] is ClassKeys.model_fields["hotspot"]
-    ground = GroundKeys(hotspot=0.2)
-    assert list(ground.written) == list(GroundKeys.model_fields)
 
 
 def test_numbers_come_with_their_unit_and_limits_are_allowed():

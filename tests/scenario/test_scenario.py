@@ -192,11 +192,6 @@ def test_a_map_of_real_ground_lies_on_no_invented_hills():
     assert Scenario(ground=Ground(lai_file="lai.tif")).terrain.dem == "flat"
 
 
-def test_heights_beside_a_crs_are_left_out():
-    found = parse_scenario(SMALL | {"grid": SMALL["grid"] | {"crs": "EPSG:26914+5703"}}).complete()
-    assert found.grid.crs == "EPSG:26914" and found.geobox() == parse_scenario(SMALL).geobox()
-
-
 def test_engine_that_is_not_installed_is_told_at_once(monkeypatch):
     monkeypatch.setattr(six_s, "Py6S", None)
     engine = parse_scenario(SMALL | {"atmosphere": {"engine": "6S"}})
@@ -266,11 +261,6 @@ def test_a_key_is_found_by_its_name(name, whole):
 def test_what_is_no_key_is_refused(name, message):
     with pytest.raises(ValueError, match=message):
         find_key(name)
-
-
-def test_attributes_say_what_a_plot_writes_beside_it():
-    assert find_key("visibility").attributes == {"long_name": "meteorological range", "units": "km"}
-    assert find_key("leaf.chlorophyll").attributes == {"long_name": "leaf: chlorophyll"}
 
 
 def test_replaced_keys_are_those_of_a_new_scenario():
@@ -344,11 +334,6 @@ def test_parts_are_told_apart_by_where_they_come_from(values, said, short):
     scenario = parse_scenario(values)
     assert statement(scenario) == f"{said} {OVERPASS}"
     assert summary(scenario) == short
-
-
-@pytest.mark.parametrize("time", ["1987-06-06T16:35Z", "1987-06-06T11:35:00-05:00"])
-def test_time_of_the_hypothetical_overpass_is_known_in_any_spelling(time):
-    assert statement(parse_scenario(PASTURES | {"geometry": {"time": time}})) == DEFAULT
 
 
 @pytest.mark.parametrize(
@@ -437,8 +422,3 @@ def test_a_mistake_is_named_before_a_run_begins(stage, values, said):
         assert stage == "complete"
         scenario.complete()
     check_message(str(caught.value), said)
-
-
-def test_text_that_is_no_toml_is_named(tmp_path):
-    with pytest.raises(ValueError, match=r"scenario\.toml is not valid TOML"):
-        read_text(tmp_path, "[atmosphere")
