@@ -43,8 +43,6 @@ _CALIBRATE_FIRST = (
 
 def check_scaling(scaling, description, quantise=True):
     """Raise ValueError for an invalid scaling of digital numbers."""
-    if scaling not in ("detector", "product"):
-        raise ValueError(f"scaling must be 'detector' or 'product', got {scaling!r}")
     if scaling == "product" and not quantise:
         raise ValueError("scaling='product' is one of digital numbers: leave it out, or quantise=False")
     if scaling == "product" and description.product is None:

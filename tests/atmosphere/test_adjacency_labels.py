@@ -1,11 +1,8 @@
 """The adjacency effect on labelled rasters."""
 
-from pathlib import Path
-
 import dask
 import dask.array as da
 import numpy as np
-import pandas as pd
 import pytest
 import xarray as xr
 from dask.callbacks import Callback
@@ -18,7 +15,6 @@ from fifesim.atmosphere import adjacency_labels as adjacency_raster
 from fifesim.atmosphere.coupling import BandTerms
 from fifesim.grids import grid as grids
 
-SIXS = pd.read_csv(Path(__file__).parents[1] / "data" / "sixs_adjacency.csv", comment="#")
 CRS = "EPSG:26914"
 
 
@@ -104,23 +100,6 @@ def test_middle_of_a_disc_has_the_environment_function(radius, vza):
     assert share == pytest.approx(expected, abs=(beside - expected) / covered * 60.0**2 / 6)
 
 
-@pytest.mark.parametrize("row", list(SIXS[(SIXS["radius"] >= 0.3) & (SIXS["radius"] <= 3)].iloc[::4].itertuples()))
-def test_apparent_reflectance_in_the_middle_of_a_disc_agrees_with_6s(row):
-    """Closed form 3e-4, and the disc's environment function 2e-3 of a contrast of 0.35 to 0.4."""
-    size = 2 * int(row.radius * 1000 / 20) + 15
-    size += 1 - size % 2
-    centre = (np.arange(size) - size // 2) * 20.0
-    inside = np.hypot(centre[:, None], centre) < row.radius * 1000
-    # The middle of the disc is that of a block.
-    west, north = (60.0 * whole + 30.0 for whole in (11_666, 72_167))
-    west, north = west - size * 10.0, north + size * 10.0
-    disc = raster(np.where(inside, row.target_reflectance, row.environment_reflectance)[None], 20.0, west, north)
-    path = row.path_reflectance_with_gas / row.gas_transmittance
-    terms = make_terms((path, *(getattr(row, name) for name in NAMES[1:])))
-    toa = adjacency_raster.apparent_reflectance_of_scene(disc, terms, row.vza, row.environment_reflectance)
-    assert float(toa[0, size // 2, size // 2]) == pytest.approx(row.toa_reflectance, abs=1e-3)
-
-
 def brute_force(array, number, weights, vza):
     """Environment of one band, summed over blocks and cells one by one."""
     (down, across), (row, column) = grids.cell_size(array.odc.geobox), grids.lattice_position(array.odc.geobox)
@@ -181,14 +160,6 @@ def test_raster_of_surroundings_counts_at_its_place():
 
 def environment_of_one(array, surroundings):
     return adjacency_raster.environment(array, 0.3, 0.7, 0.0, surroundings=surroundings)
-
-
-def test_number_of_surroundings_is_what_padding_with_it_gives():
-    scene = raster(np.random.default_rng(6).random((1, 45, 60)), 20.0, west=699_960.0, north=4_330_020.0)
-    padded = np.pad(scene.values, ((0, 0), (30, 30), (30, 30)), constant_values=0.2)
-    padded = raster(padded, 20.0, west=699_960.0 - 600, north=4_330_020.0 + 600)
-    expected = environment_of_one(padded, 0.2)[:, 30:-30, 30:-30]
-    np.testing.assert_allclose(environment_of_one(scene, 0.2), expected, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("cell", [3.0, 30.0, 40.0, 90.0, (30.0, 80.0)])

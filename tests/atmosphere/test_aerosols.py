@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fifesim.atmosphere import aerosols, mixtures
+from fifesim.atmosphere import aerosols
 from fifesim.atmosphere.aerosols import (
     Aerosol,
     aerosol_optics,
@@ -43,14 +43,6 @@ def test_optics_agree_with_6s(name):
     np.testing.assert_allclose(extinction, rows["extinction"], rtol=1.1e-3)
     np.testing.assert_allclose(albedo, rows["single_scattering_albedo"], rtol=1e-3)
     np.testing.assert_allclose(asymmetry, rows["asymmetry"], atol=0.02 if name == "dust" else 2e-3)
-
-
-@pytest.mark.parametrize("aerosol, depth, albedo", [("dust:1", 0.41095, 0.88356), ("continental", 0.07207, 0.8518)])
-def test_optics_at_the_last_wavelength_agree_with_6s(aerosol, depth, albedo):
-    """As 6SV1.1 prints them at 3.75 um, where the depth at .55 um is .5."""
-    found, of_light, _ = aerosol_optics(aerosol, 3.75)
-    assert found == pytest.approx(depth / 0.5, rel=2e-3)
-    assert of_light == pytest.approx(albedo, rel=1e-3)
 
 
 @pytest.mark.parametrize("aerosol", ["maritime", "oceanic"])
@@ -105,14 +97,6 @@ def test_moments_are_those_of_mie_theory():
         np.testing.assert_allclose(moments[rows["order"]], rows["moment"], atol=1e-3, err_msg=name)
 
 
-def test_moments_give_the_phase_function_back():
-    """Soot has few: the series of 60 converges to the interpolation between angles."""
-    cosine = np.linspace(-1, 1, 50)
-    moments = phase_moments("soot:1", [0.55], 60)[0]
-    series = np.polynomial.legendre.legval(cosine, (2 * np.arange(60) + 1) * moments)
-    np.testing.assert_allclose(series, aerosol_phase("soot:1", cosine, 0.55), rtol=1e-3)
-
-
 def test_small_particles_polarize_like_molecules():
     """
     Soot at 3.75 um is near Rayleigh's limit, (1 - cos2) / (1 + cos2).
@@ -122,20 +106,6 @@ def test_small_particles_polarize_like_molecules():
     cosine = np.linspace(0, 1, 21)
     both = (aerosol_polarization("soot:1", cosine, 3.75) + aerosol_polarization("soot:1", -cosine, 3.75)) / 2
     np.testing.assert_allclose(both, (1 - cosine**2) / (1 + cosine**2), atol=0.01)
-
-
-def test_inputs_broadcast():
-    assert aerosol_phase("urban", np.zeros((3, 1)), WAVELENGTH).shape == (3, WAVELENGTH.size)
-    assert aerosol_polarization("urban", 0.5, WAVELENGTH).shape == WAVELENGTH.shape
-    assert phase_moments("urban", WAVELENGTH, 7).shape == (WAVELENGTH.size, 7)
-
-
-def test_a_mixture_scatters_as_its_parts():
-    """Half the volume of each: cross sections add, whatever the number of particles."""
-    parts = np.array([mixtures.cross_sections(name, WAVELENGTH) for name in ("dust", "soot")]).mean(axis=0)
-    _, albedo, asymmetry = aerosol_optics("dust:0.5+soot:0.5", WAVELENGTH)
-    np.testing.assert_allclose(albedo, parts[1] / parts[0], rtol=1e-12)
-    np.testing.assert_allclose(asymmetry, parts[2] / parts[1], rtol=1e-12)
 
 
 def test_missing_wavelength_stays_missing():
@@ -263,12 +233,6 @@ def test_what_cannot_be_is_refused(case):
     wrong, message = WRONG[case]
     with pytest.raises(ValueError, match=f"aerosol mine: .*{message}"):
         Aerosol(**{**fine, "angle": ANGLE, "phase": FORWARD, "name": "mine", **wrong})
-
-
-@pytest.mark.parametrize("albedo", [0.0, 1.0])
-def test_particles_may_absorb_all_or_nothing(albedo):
-    black_or_white = Aerosol(TABULATED, TABULATED**-1.3, np.full(4, albedo), angle=ANGLE, phase=FORWARD)
-    assert black_or_white.single_scattering_albedo.tolist() == [[albedo] * 4]
 
 
 @pytest.mark.parametrize(

@@ -52,12 +52,6 @@ def test_conservative_sobolev_is_the_limit_of_the_absorbing_one():
     np.testing.assert_allclose(absorbing, sobolev_conservative_reflectance(TAU_R, *arguments), atol=2e-6)
 
 
-@pytest.mark.parametrize("asymmetry", [0.0, 0.65])
-def test_conservative_layer_loses_no_flux(asymmetry):
-    albedo, transmittance = delta_eddington(np.array([0.01, 0.3, 2.0]), 1.0, asymmetry, 0.6)
-    np.testing.assert_allclose(albedo + transmittance, 1, atol=1e-5)
-
-
 def test_conservative_transmittance_is_eddingtons():
     np.testing.assert_allclose(
         delta_eddington(TAU_R, 1.0, 0.0, MU_S)[1], conservative_transmittance(TAU_R, MU_S), atol=2e-6

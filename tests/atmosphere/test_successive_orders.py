@@ -262,14 +262,6 @@ def test_flux_of_the_sky_is_what_comes_through_less_the_beam(ground):
 
 
 @pytest.mark.parametrize("at_ground", [False, True])
-def test_sides_of_the_sun_are_mirrors(at_ground):
-    """I and Q are even in the azimuth, U is odd and none where sun and view are in one plane."""
-    found = spheres(0.1, 0.3, at_ground=at_ground, ground=0.2)
-    np.testing.assert_allclose(found[:, :, [1, 0]], found[:, :, [3, 4]] * [[[1]], [[1]], [[-1]]], atol=1e-12)
-    np.testing.assert_allclose(found[2][:, [2, 5]], 0, atol=1e-12)
-
-
-@pytest.mark.parametrize("at_ground", [False, True])
 def test_nothing_depends_on_the_direction_of_the_zenith(at_ground):
     """Straight up or down the meridian is the azimuth's: polarization turns with it and keeps its degree."""
     intensity, along, aslant = spheres(0.1, 0.3, [0.0], RAA, at_ground)[:, 0]

@@ -372,10 +372,8 @@ def scan_angle_of(image, name):
 @pytest.mark.parametrize(
     ("name", "angle", "along", "across"),
     [
-        ("MODIS", 0, 250.0, 250.0),
         ("MODIS", 30, 294.2, 353.8),
         ("MODIS", 55, 501.5, 1207.5),
-        ("VIIRS", 0, 371.0, 388.0),
         ("VIIRS", 30, 437.4, 555.0),
         ("VIIRS", 55, 769.0, 706.0),
     ],
@@ -455,20 +453,6 @@ def test_footprints_are_as_wide_as_the_samples_that_are_summed():
 
 def angle_at_ground(scan_angle):
     return np.degrees(np.arcsin((6371 + 824) / 6371 * np.sin(np.radians(scan_angle))))
-
-
-@pytest.mark.parametrize("name", ["MODIS", "VIIRS"])
-@pytest.mark.parametrize("method", ["nearest", "mean"])
-def test_a_map_of_overlapping_sweeps_has_no_gaps(name, method):
-    """Deleted lines leave no holes, and pixels of neighbouring sweeps keep their places."""
-    image = swept(name, 55)
-    around = fifesim.grid_at("EPSG:32614", 490000.0, 4341000.0, 20000.0, 16000.0, 500.0)
-    on_map = image.fifesim.grid_swath(around, method)
-    x, y = np.meshgrid(on_map["x"], on_map["y"])
-    assert np.isfinite(on_map).all()
-    # The nearest centre is half a pixel away at most. Means with edges that sweeps share are up to 3.3 away (MODIS).
-    limit = {"nearest": 2e-3 * 400 + 1e-3 * 650, "mean": 0.5}[method]
-    assert float(abs(on_map[0] - plane(x, y)).max()) < limit
 
 
 @pytest.mark.parametrize("chunks", [CHUNKS, ODD_CHUNKS])

@@ -9,14 +9,13 @@ from __future__ import annotations
 import os
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Literal
 
 import numpy as np
 import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
 from fifesim.base import files
-from fifesim.base.arguments import FilePath, Kind
+from fifesim.base.arguments import FilePath
 from fifesim.base.bands import solar_irradiance
 from fifesim.base.caches import cached
 from fifesim.base.files import check_regular, in_a_line, read_toml, shown
@@ -34,7 +33,7 @@ from fifesim.sensor.description.instrument_file import (
     ScanZone,
 )
 from fifesim.sensor.description.plausibility import check_instrument_units
-from fifesim.sensor.description.spatial_response import with_response
+from fifesim.sensor.description.spatial_response import ResponseName, with_response
 from fifesim.sensor.description.spectral_response import SpectralResponse
 
 # Keys of a band in a short file that belong to its noise, with their names there, and those that make its response.
@@ -51,11 +50,7 @@ _KEYS |= {*_NOISE_KEYS, *_RESPONSE_KEYS, "mtf_at_nyquist"}
 
 def instrument(
     name: InstrumentLike,
-    response: Annotated[
-        Literal["system", "detector", "paper", "sharpest", "softest"],
-        Kind("'system', 'detector', 'paper', 'sharpest' or 'softest'"),
-    ]
-    | None = None,
+    response: ResponseName | None = None,
 ) -> Instrument:
     """
     Description of an instrument by its name, or from a file.

@@ -5,7 +5,7 @@ The formulas are in `spatial`.
 """
 
 from dataclasses import replace
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple, get_args
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag
@@ -155,7 +155,7 @@ SpatialResponse = Annotated[
 ]
 
 
-RESPONSES = ("system", "detector", "paper", "sharpest", "softest")
+ResponseName = Literal["system", "detector", "paper", "sharpest", "softest"]
 
 _DETECTOR = BoxcarResponse(kind="boxcar")
 
@@ -174,9 +174,9 @@ def responses_by_axis(instrument, band):
 
 def with_response(instrument, response):
     """Instrument with the response of the system, an end of its uncertainty, the detector alone, or the paper."""
+    if response not in get_args(ResponseName):
+        raise ValueError(f"response must be one of {', '.join(get_args(ResponseName))}, got {response!r}")
     # Detectors are as wide as the instantaneous field of view, or as the interval where the file has none.
-    if response not in RESPONSES:
-        raise ValueError(f"response must be one of {', '.join(RESPONSES)}, got {response!r}")
     if response == "detector":
         return replace(instrument, lsf=_DETECTOR, bands=tuple(_sharp(instrument, band) for band in instrument.bands))
     if response == "paper" and instrument.paper_lsf is not None:

@@ -425,8 +425,6 @@ def open_landsat(
     >>> image.fifesim.to_surface().fifesim.ndvi()  # doctest: +SKIP
     """
     scene, folder = read_scene(path)
-    if angles not in ("centre", "pixel"):
-        raise ValueError(f"angles must be 'centre' or 'pixel', got {angles!r}")
     description = find_instrument(scene.instrument if instrument is None else instrument)
     if instrument is None:
         metadata.check_irradiance(scene.product, scene.bands, description)

@@ -339,8 +339,6 @@ def _grid(element):
     return np.stack(angles)
 
 
-_SIZES = (10, 20, 60)
-
 _CLOUDS = {
     "long_name": "cloud and snow masks",
     "units": "1",
@@ -432,8 +430,6 @@ def open_sentinel2(
     """
     file = sentinel2_metadata_file(path)
     product, folder = sentinel2_product(file), file.parent
-    if angles not in ("centre", "pixel"):
-        raise ValueError(f"angles must be 'centre' or 'pixel', got {angles!r}")
     if product.instrument is None and instrument is None:
         raise ValueError(
             f"the product is of {product.spacecraft}, whose responses fifesim does not have: give instrument='MSI-C', "
@@ -468,8 +464,6 @@ def open_sentinel2(
 
 def _selected(product, description, resolution, names):
     """Requested bands, by default all of the pixel size except cirrus."""
-    if resolution not in _SIZES:
-        raise ValueError(f"resolution must be 10, 20 or 60 m, got {resolution!r}")
     known = {band.name: band for band in product.bands.get(resolution, ())}
     if names is None:
         found = [band for band in known.values() if band.name != CIRRUS]

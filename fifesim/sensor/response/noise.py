@@ -77,8 +77,6 @@ class NoiseModel:
                 raise ValueError(f"{name} must not be negative, got {value}")
         if self.detectors < 1:
             raise ValueError(f"detectors must be at least 1, got {self.detectors}")
-        if self.along not in ("rows", "columns"):
-            raise ValueError(f"along must be 'rows' (scanner) or 'columns' (pushbroom), got {self.along!r}")
 
     @classmethod
     def from_snr(cls, radiance: Numbers, snr: Numbers, shot_share: float | None = None, **fixed_pattern: Any) -> Self:

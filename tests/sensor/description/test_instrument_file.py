@@ -9,7 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 import fifesim
 from fifesim.base.bands import GREEN
 from fifesim.sensor.description.fields import Count, Name, Number, Positive, Share, band_called, false_colour_bands
-from fifesim.sensor.description.instrument_file import Gain, Noise, Scan
+from fifesim.sensor.description.instrument_file import Gain, Noise
 from fifesim.sensor.description.instruments import instrument, instrument_names
 
 PRODUCT = "[product]\ngain = 2e-5\noffset = -0.1\nbits = 16\nsun_corrected = false\n\n[lsf]"
@@ -73,14 +73,6 @@ def test_angles_of_a_file_reach_the_ground_on_their_axes(changed):
     along, across = mine.ground_intervals(mine.bands[0])
     assert (along, across) == pytest.approx((28.2, 31.02), rel=1e-12)
     assert mine.ground_interval == across
-
-
-def test_largest_angle_is_that_of_the_scan_or_none():
-    tm = instrument("TM")
-    assert tm.max_angle == tm.scan.max_angle == 7.47
-    assert dataclasses.replace(tm, scan=None).max_angle == np.inf
-    scan = Scan("pushbroom", max_angle=7.5)
-    assert (scan.samples, scan.lines, scan.period, scan.swath) == (None, None, None, None)
 
 
 def test_red_and_near_infrared_are_found_by_wavelength():

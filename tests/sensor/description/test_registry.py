@@ -212,20 +212,6 @@ def test_scan_covers_the_published_swath():
             np.testing.assert_allclose(width, item.scan.swath, rtol=3e-3, err_msg=item.name)
 
 
-# Revolutions a day of two-line elements; mean altitude above the equatorial radius by Kepler's third law [km].
-ORBITS = {"AVHRR": (14.1136, 852), "AVHRR10": (14.2248, 814), "AVHRR11": (14.1280, 847)}
-
-
-@pytest.mark.parametrize("name", ORBITS)
-def test_avhrr_flies_as_its_two_line_elements_say(name):
-    """At 39 degrees north the ellipsoid lies 8 km below the equatorial radius; the orbit varies by 10 km."""
-    revolutions, above_equator = ORBITS[name]
-    axis = (398600.4418 * (86400 / revolutions / (2 * np.pi)) ** 2) ** (1 / 3)
-    # The oblateness of the earth lowers the mean orbit by 3 km.
-    assert axis - 6378.137 - 3.0 == pytest.approx(above_equator, abs=1.0)
-    assert instrument(name).altitude / 1000 == pytest.approx(axis - 6370.0, abs=10.0)
-
-
 # ------------------------------------------------------------------------------------------- blur, gain and noise
 
 

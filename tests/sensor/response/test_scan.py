@@ -137,15 +137,6 @@ def test_pixels_of_modis_are_as_published(band, size, scan_angle):
     )
 
 
-def test_a_pixel_of_modis_at_the_edge_is_two_by_nearly_five_kilometres():
-    """NASA: 2.01 x 4.83 km; ten lines of 1 km are 20 km high there."""
-    along, across = pixel_size("MODIS", "MODIS1", 54.99)
-    assert (4 * along, 4 * across) == pytest.approx((2010, 4830), rel=0.01)
-    pattern, altitude = pattern_of("MODIS", "MODIS1")
-    edges = ground_of_detector(np.degrees(20 * pattern.track_interval) * np.array([-1, 1]), 55.0, altitude)
-    assert float(np.diff(edges[0])[0] * np.cos(np.radians(edges[1][0]))) == pytest.approx(20.06e3, rel=0.01)
-
-
 @pytest.mark.parametrize(
     ("band", "scan_angle", "published"),
     [("I1", 0.01, (371, 388)), ("I1", 56.06, (800, 789)), ("M5", 0.01, (742, 776)), ("M5", -56.06, (1600, 1580))],
@@ -337,22 +328,6 @@ def test_a_turned_footprint_agrees_with_dense_sums(angle, along, across, growth)
     # Pieces that the jump of a response cuts are upright instead of turned.
     np.testing.assert_allclose(found, expected, rtol=0, atol=0.04 * expected.max())
     assert np.abs(found - expected).sum() < 0.015
-
-
-@pytest.mark.parametrize("angle", [0.0, 30.0, 77.0])
-def test_moments_are_those_of_the_turned_response(angle):
-    """Centre of the pixel; covariance of the Gaussians, turned and grown, plus a twelfth of a cell."""
-    growth = (1.25, 1.6)
-    found = weights(angle, GaussianSpread(12.0), GaussianSpread(18.0), growth=growth, cell=CELL)
-    place = np.arange(N) + 0.5
-    down, right = np.meshgrid(place - 30.3, place - 28.7, indexing="ij")
-    assert float((found * down).sum()) == pytest.approx(0, abs=1e-6)
-    assert float((found * right).sum()) == pytest.approx(0, abs=1e-6)
-    back = np.linalg.inv(turned(angle, growth=growth))
-    sigma = np.array([12.0, 18.0]) / np.sqrt(8 * np.log(2))
-    expected = back @ np.diag(sigma**2) @ back.T + np.eye(2) / 12
-    covariance = np.array([[np.sum(found * a * b) for b in (down, right)] for a in (down, right)])
-    np.testing.assert_allclose(covariance, expected, rtol=0, atol=2e-3 * expected.max())
 
 
 def test_means_are_over_valid_cells():
