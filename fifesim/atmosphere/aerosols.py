@@ -435,10 +435,12 @@ def aerosol_polarization(aerosol, scattering_cosine, wavelength):
     """
     wavelength, fractions = _checked_wavelength(wavelength), parts(aerosol)
 
-    def mean(element):
-        return _weighted_mean(fractions, wavelength, lambda name: element(name, scattering_cosine, wavelength))
+    def mean(polarized):
+        return _weighted_mean(
+            fractions, wavelength, lambda name: mixtures.phase(name, scattering_cosine, wavelength, polarized=polarized)
+        )
 
-    return mean(mixtures.polarized_phase) / mean(mixtures.phase)
+    return mean(True) / mean(False)
 
 
 def phase_moments(aerosol, wavelength, count):

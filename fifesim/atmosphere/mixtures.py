@@ -36,21 +36,19 @@ def cross_sections(component, wavelength):
     return extinction, scattering, scattering * np.interp(logarithm, table.log_wavelength, table.asymmetry)
 
 
-def phase(component, scattering_cosine, wavelength):
-    """Phase function of a component, by [dAlmeida1991]_. [1]"""
+def phase(component, scattering_cosine, wavelength, *, polarized=False):
+    """Phase function of a component, or element 12 of the phase matrix with reversed sign, by [dAlmeida1991]_. [1]"""
     # Linear in the logarithm of the wavelength, which keeps its mean of 1 over the sphere; its logarithm is linear in
     # the angle.
     tables = tabulated(component)
-    log_phase = _by_angle(tables.angle, tables.log_phase, scattering_cosine)
-    return _by_wavelength(tables, lambda column: np.exp(log_phase(column)), wavelength)
+    column, share = _place(tables.log_wavelength, np.log(wavelength))
+    angle = _place_of(tables.angle, scattering_cosine)
 
+    def at(column):
+        values = np.exp(_between(tables.log_phase, *angle, column))
+        return values * _between(tables.polarization, *angle, column) if polarized else values
 
-def polarized_phase(component, scattering_cosine, wavelength):
-    """Element 12 of the phase matrix of a component with reversed sign, by [dAlmeida1991]_. [1]"""
-    tables = tabulated(component)
-    log_phase = _by_angle(tables.angle, tables.log_phase, scattering_cosine)
-    degree = _by_angle(tables.angle, tables.polarization, scattering_cosine)
-    return _by_wavelength(tables, lambda column: np.exp(log_phase(column)) * degree(column), wavelength)
+    return at(column) * (1 - share) + at(column + 1) * share
 
 
 def component_phase_moments(component, wavelength, count):
@@ -72,7 +70,7 @@ def sphere(angle):
 def phase_on_sphere(angle, log_phase):
     """Phase function of a table at the cosines of `sphere`, shape (4 (angle - 1), wavelength). [1]"""
     cosine, _ = sphere(angle)
-    return np.exp(_by_angle(angle, log_phase, cosine[:, None])(np.arange(log_phase.shape[1])))
+    return np.exp(_between(log_phase, *_place_of(angle, cosine[:, None]), np.arange(log_phase.shape[1])))
 
 
 def normalized_log_phase(angle, log_phase):
@@ -81,16 +79,14 @@ def normalized_log_phase(angle, log_phase):
     return log_phase - np.log(weights @ phase_on_sphere(angle, log_phase))
 
 
-def _by_angle(angle, table, scattering_cosine):
-    """Function that interpolates a column of a table to scattering angles."""
-    row, low = _place(angle, np.degrees(np.arccos(np.clip(scattering_cosine, -1, 1))))
-    return lambda column: table[row, column] * (1 - low) + table[row + 1, column] * low
+def _between(table, row, share, column):
+    """Values of a table between two rows."""
+    return table[row, column] * (1 - share) + table[row + 1, column] * share
 
 
-def _by_wavelength(tables, values, wavelength):
-    """Interpolation between the tabulated wavelengths, for a function of the column."""
-    column, share = _place(tables.log_wavelength, np.log(wavelength))
-    return values(column) * (1 - share) + values(column + 1) * share
+def _place_of(angle, scattering_cosine):
+    """Index of the scattering angle before each cosine, and the weight of the next angle."""
+    return _place(angle, np.degrees(np.arccos(np.clip(scattering_cosine, -1, 1))))
 
 
 def _place(nodes, values):

@@ -166,15 +166,6 @@ def test_apparent_reflectance_of_a_target_agrees_with_6s():
     np.testing.assert_allclose(toa, SIXS["toa_reflectance"], rtol=0, atol=3e-4)
 
 
-@pytest.mark.parametrize("vza", [0.0, 20.0, 40.0, 60.0, 70.0])
-def test_environment_function_grows_from_0_to_1(vza):
-    for share in environment_function(np.geomspace(1.0, 1e6, 400), vza):
-        assert np.all(np.diff(share) >= 0)
-        assert 0 <= share[0] < 2e-3
-        assert share[-1] == pytest.approx(1.0, abs=1e-12)
-    assert np.array_equal(environment_function(0.0, vza), (0.0, 0.0))
-
-
 def test_where_nothing_scatters_the_target_is_its_own_environment():
     assert environment_weights(0.0, 0.0) == (0.0, 0.0)
     assert mixed_environment_function(10.0, 0.0, 0.0, 0.0) == 1.0

@@ -161,11 +161,6 @@ def test_swath_needs_a_table(ground, swath):
         toa_from_surface(ground, AIR, BANDS, swath, adjacency=True)
 
 
-def test_angle_on_other_cells_is_refused(ground, swath):
-    with pytest.raises(ValueError, match="have different grids"):
-        toa_from_surface(ground, AIR, BANDS, by_cell(40.0, 120.0, swath.vza[:-1], 200.0))
-
-
 def test_angles_in_radians_are_refused(ground, swath):
     radians = swath.assign(vza=np.radians(swath.vza).assign_attrs(units="radian"))
     with pytest.raises(ValueError, match="has units 'radian', vza needs 'degree'"):

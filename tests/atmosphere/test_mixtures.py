@@ -9,7 +9,6 @@ from fifesim.atmosphere.mixtures import (
     cross_sections,
     mixture,
     phase,
-    polarized_phase,
 )
 from fifesim.base import files
 
@@ -39,7 +38,7 @@ def test_phase_and_polarization_pass_through_the_tables(component):
     scale = (found / tabulated)[1:-1]
     np.testing.assert_allclose(scale, np.broadcast_to(scale[:1], scale.shape), rtol=1e-6)
     np.testing.assert_allclose(scale[0], 1, atol=2e-3)
-    ratio = polarized_phase(component, cosine, wavelength) / found
+    ratio = phase(component, cosine, wavelength, polarized=True) / found
     np.testing.assert_allclose(ratio, degree.drop(columns="angle").to_numpy(float), atol=1e-6)
 
 

@@ -92,14 +92,6 @@ def test_names_that_contradict_wavelengths_are_refused(name, bands, wavelengths,
     assert matched(named(bands), name) == bands
 
 
-def test_the_wavelengths_of_every_sentinel_hold_for_the_others():
-    """Centres differ by up to 17 nm from satellite to satellite."""
-    for one in ("MSI", "MSI-B", "MSI-C"):
-        names = [band.name for band in instrument(one).bands]
-        array = named(names, [band.wavelength for band in instrument(one).bands])
-        assert all(matched(array, other) == names for other in ("MSI", "MSI-B", "MSI-C"))
-
-
 def test_names_that_two_instruments_share_hold_where_the_wavelength_is_the_bands():
     """MSS4 is green on Landsat-1, near infrared on Landsat-5; MSI4 is red on each Sentinel-2."""
     first = named(["MSS4", "MSS5"], [0.55, 0.65])

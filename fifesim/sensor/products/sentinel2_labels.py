@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-import dask.array as da
 import numpy as np
 import pyproj
 import xarray as xr
@@ -548,7 +547,7 @@ def _quality(product, folder, sizes, resolution, beside):
 def _repeated(layer, times, resolution):
     if times == 1:
         return layer
-    repeat = da.repeat if isinstance(layer.data, da.Array) else np.repeat
-    data = repeat(repeat(layer.data, times, axis=0), times, axis=1)
+    # numpy calls dask's function on lazy data.
+    data = np.repeat(np.repeat(layer.data, times, axis=0), times, axis=1)
     fine = grids.aligned_grid(grids.geobox(layer), resolution)
     return grids.place(xr.DataArray(data, dims=("y", "x"), name=layer.name), fine)

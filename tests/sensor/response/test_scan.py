@@ -146,15 +146,6 @@ def test_pixels_of_viirs_are_as_published(band, scan_angle, published):
     np.testing.assert_allclose(pixel_size("VIIRS", band, scan_angle), published, rtol=0.02)
 
 
-def test_a_sweep_of_viirs_grows_as_published():
-    """ATBD: from 11.87 km at nadir to 25.60 km at 56.063 degrees."""
-    pattern, altitude = pattern_of("VIIRS", "M5")
-    half = np.degrees(8 * pattern.track_interval)
-    for scan_angle, height in ((0.0, 11.87e3), (56.063, 25.60e3)):
-        ahead, aside = ground_of_detector(half, scan_angle, altitude)
-        assert 2 * float(ahead * np.cos(np.radians(aside))) == pytest.approx(height, rel=0.01)
-
-
 def test_places_of_detectors_agree_with_rays_in_space():
     """The point where a ray from the orbit meets the sphere, by bisection, in the frame of a turned track."""
     track, altitude, distance = Track(39.0, -97.0, 193.0), 824e3, 4e5
@@ -207,26 +198,6 @@ def test_lines_deleted_on_board_are_those_of_granules(band, lines, samples, zone
     pattern, _ = pattern_of("VIIRS", band)
     line, sample = np.arange(-3 * lines, -2 * lines)[:, None], np.arange(samples) - samples // 2
     np.testing.assert_array_equal(pattern.is_deleted(line, sample), expected)
-
-
-@pytest.mark.parametrize("band", ["I1", "M5"])
-def test_deleted_lines_leave_no_gap_between_sweeps(band):
-    """
-    The last line left of a sweep reaches the first line left of the next, at every sample.
-
-    User's Guide: sweeps overlap by more than 1 and 2 M pixels at either end where 1 and 2 lines are deleted.
-    """
-    item = instrument("VIIRS")
-    pattern, altitude = pattern_of("VIIRS", band)
-    sample = np.arange(0, sum(zone.samples for zone in pattern.zones), 5)
-    ahead, _ = ground_of_detector(pattern.track_angle()[:, None], pattern.scan_angle(sample + 0.5), altitude)
-    spacing = np.diff(ahead, axis=0)[pattern.lines // 2]
-    advance = pattern.lines * item.ground_intervals(item.select([band])[0]).along
-    overlap = (ahead[-1] - ahead[0] + spacing - advance) / spacing / 2
-    deleted = pattern.is_deleted(np.arange(pattern.lines)[:, None], sample).sum(axis=0) / 2
-    assert set(deleted) == {0, pattern.lines // 16, pattern.lines // 8}
-    assert np.all(overlap >= deleted - 1e-6)
-    assert np.all(overlap[deleted == deleted.max()] > 1.2 * deleted.max())
 
 
 def test_a_pushbroom_and_a_single_detector_sweep_one_line():
