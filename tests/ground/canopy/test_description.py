@@ -1,8 +1,12 @@
-"""The description of a canopy: ranges, what was given, and the one place from which all else takes its properties."""
+"""The description of a canopy: ranges, what was given, and the table from which all else takes its properties."""
 
+import os
 import pickle
 import re
+import subprocess
+import sys
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pytest
@@ -11,7 +15,7 @@ import xarray as xr
 import fifesim
 from fifesim import Canopy
 from fifesim.ground.canopy.description import LEAST_HOTSPOT, TALLGRASS
-from fifesim.ground.canopy.properties import NUMERIC_PROPERTIES, PROPERTIES
+from fifesim.ground.canopy.properties import DRAWN, NUMERIC_PROPERTIES, PROPERTIES
 from fifesim.scenario.ground import canopy_of
 from fifesim.scenario.keys import ClassKeys, GroundKeys
 from fifesim.scenario.scenario import find_key, parse_scenario
@@ -213,19 +217,6 @@ def test_rasters_over_time_go_date_by_date(lai):
         lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=Canopy(brown=share))
 
 
-def test_dates_leave_open_what_was_not_given(site, lai):
-    """A property that all classes have is none of the call's, at each date."""
-    days = xr.Variable("time", np.array(["1987-06-06T16:35", "1987-07-06T16:35"], "M8[ns]"))
-    share = xr.concat([lai / 10, lai / 20], dim=days, combine_attrs="override").drop_attrs(deep=False)
-    classes = {"grass": fifesim.CoverClass(lai="burned-grazed", canopy=Canopy(hotspot=0.1))}
-    land = fifesim.landscape(site, classes=classes, seed=7)
-    season = land.assign(lai=xr.concat([land.lai, land.lai], dim=days, combine_attrs="override"))
-    found = season.fifesim.surface_reflectance("TM", bands=TM34, canopy=Canopy(brown=share))
-    alone = Canopy(hotspot=0.1, brown=share[1])
-    expected = season.lai[1].fifesim.surface_reflectance("TM", bands=TM34, canopy=alone)
-    np.testing.assert_array_equal(found[1], expected)
-
-
 @pytest.fixture(scope="module")
 def classes():
     """One class that leaves dead leaves open, and one that has none."""
@@ -282,25 +273,6 @@ def test_keys_of_the_ground_and_of_a_class_are_its_canopy():
     assert table["green"].canopy.over(scene).moisture == 0.2
 
 
-def test_a_scenario_has_the_reflectance_of_its_canopy():
-    """Soil and moisture of one stand, and of a class."""
-    small = {"grid": {"width": 300.0, "height": 240.0}, "terrain": {"dem": "flat"}}
-    keys = {"soil": 0.05, "moisture": 0.4}
-    one = fifesim.simulate(parse_scenario(small | {"ground": keys}))["scene"]
-    assert list(one.data_vars)[:1] == ["lai"] and not {"soil", "moisture"} & set(one.data_vars)
-    expected = one["lai"].fifesim.surface_reflectance("TM", bands=TM34, canopy=Canopy(**keys))
-    np.testing.assert_array_equal(one["surface_reflectance"], expected)
-    classes = {"wet": {"moisture": 0.8}, "dry": {"moisture": 0.0}}
-    land = {"landscape": {"cover": "voronoi", "size": 60.0}, "classes": classes}
-    several = fifesim.simulate(parse_scenario(small | land | {"ground": keys}))["scene"]
-    for code, moisture in ((1, 0.8), (2, 0.0)):
-        cells = (several["cover"] == code).values
-        alone = Canopy(soil=0.05, moisture=moisture)
-        expected = several["lai"].fifesim.surface_reflectance("TM", bands=TM34, canopy=alone)
-        assert cells.any()
-        np.testing.assert_array_equal(several["surface_reflectance"].values[:, cells], expected.values[:, cells])
-
-
 def test_the_table_of_the_howto_is_that_of_the_fields():
     page = (ROOT / "docs/howto/canopy.md").read_text(encoding="utf-8")
     rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in re.findall(r"^\| `.*\|$", page, re.MULTILINE)]
@@ -312,3 +284,95 @@ def test_the_table_of_the_howto_is_that_of_the_fields():
         if name in NUMERIC_PROPERTIES:
             found = (float(default), limits, raster == "yes")
             assert found == (known.default, f"{known.lowest:g} to {known.highest:g}", known.by_cell)
+
+
+def test_numbers_have_these_defaults_and_ranges():
+    known = {name: (each.default, each.lowest, each.highest) for name, each in NUMERIC_PROPERTIES.items()}
+    assert known == {
+        "hotspot": (0.0, 0, 10),
+        "brown": (0.0, 0, 1),
+        "dissociation": (0.0, 0, 1),
+        "crown_cover": (1.0, 0, 1),
+        "crown_shape": (1.0, 0, 10),
+        "soil": (0.0, -1, 1),
+        "moisture": (0.0, 0, 1),
+    }
+    assert set(PROPERTIES) - set(NUMERIC_PROPERTIES) == {
+        "leaf_optics",
+        "leaf_angles",
+        "model",
+        "brown_leaf",
+        "background",
+    }
+    assert set(BY_CELL) == {"brown", "dissociation", "crown_cover", "soil", "moisture"}
+    assert {name: each.effect for name, each in DRAWN.items()} == {
+        "brown": "dead leaves",
+        "crown_cover": "clumping",
+        "soil": "soil",
+        "moisture": "soil",
+    }
+
+
+# A property that no model uses yet.
+ONE_MORE = {
+    "properties.py": ('\n    "background"', '\n    "clumping": Property(1.0, "clumping index", "1", 0.2, 1),'),
+    "description.py": ("\n    given: frozenset", "\n    clumping: float | None = None"),
+}
+
+WITH_ONE_MORE = """
+import fifesim
+from fifesim.scenario.ground import canopy_of
+from fifesim.scenario.scenario import find_key
+from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.toml import write_scenario
+
+
+def refused(make, message):
+    try:
+        make()
+    except (TypeError, ValueError) as error:
+        assert message in str(error), error
+    else:
+        raise AssertionError(message)
+
+
+half = fifesim.Canopy(clumping=0.5)
+assert fifesim.Canopy().clumping == 1.0 and repr(half) == "Canopy(clumping=0.5)"
+lai = fifesim.lai_scene(fifesim.fife_site(10, window=((0, 12), (0, 12))), seed=1)
+lai.fifesim.surface_reflectance("TM", bands=["TM3"], canopy=half)
+assert fifesim.CoverClass("wood", canopy=half).canopy.clumping == 0.5
+refused(lambda: fifesim.Canopy(clumping=0.1), "clumping must be in [0.2, 1], got 0.1: it is the clumping index")
+refused(lambda: lai.fifesim.surface_reflectance("TM", clumping=0.5), "type canopy=fifesim.Canopy(clumping=...)")
+refused(lambda: parse_scenario({"ground": {"clumping": 0.1}}), "ground.clumping = 0.1: must be at least 0.2")
+
+classes = {"a": {"clumping": 0.5}, "b": {}}
+case = parse_scenario({"ground": {"clumping": 0.7}, "landscape": {"cover": "voronoi"}, "classes": classes})
+text = write_scenario(case)
+assert "\\nclumping = 0.7 # 1; clumping index\\n" in text.split("[landscape]")[0]
+assert "\\nclumping = 0.5 # 1; clumping index\\n" in text.split("[classes.a]")[1]
+scene = canopy_of(case)
+assert [each.canopy.over(scene).clumping for each in case.class_table().values()] == [0.5, 0.7]
+assert find_key("clumping").name == "ground.clumping"
+assert find_key("classes.a.clumping").name == "classes.a.clumping"
+assert find_key("clumping").attributes == {"long_name": "clumping index", "units": "1"}
+small = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}})
+assert fifesim.sweep(small, {"clumping": [0.5, 1.0]})["clumping"].values.tolist() == [0.5, 1.0]
+print(fifesim.__file__)
+"""
+
+
+def test_one_more_property_is_two_lines(tmp_path):
+    """It is a field of classes too, a key of the scenario and an axis of sweeps, without other edits."""
+    for folder in ("fifesim", "data"):
+        copytree(ROOT / folder, tmp_path / folder)
+    for name, (place, line) in ONE_MORE.items():
+        path = tmp_path / "fifesim/ground/canopy" / name
+        text = path.read_text(encoding="utf-8")
+        assert text.count(place) == 1
+        path.write_text(text.replace(place, line + place), encoding="utf-8")
+    run = subprocess.run(
+        [sys.executable, "-W", "error::UserWarning", "-c", WITH_ONE_MORE],
+        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr[-2000:]
+    assert Path(run.stdout.strip()).parents[1] == tmp_path

@@ -1,11 +1,23 @@
-"""Two layers of two kinds of leaf against one, against each other, and against a table."""
+"""Two layers of two kinds of leaf, FPAR, and the light that leaves and ground absorb."""
 
 import numpy as np
 import pytest
-from oracles_canopy import sunlit_and_seen
+from oracles_canopy import sunlit_and_seen, turned_leaves
+from scipy.integrate import quad
+from scipy.linalg import expm
 
 from fifesim.base import files
-from fifesim.ground.canopy.layers import added, leaf_layers, mixed, two_layers
+from fifesim.ground.canopy.layers import (
+    FPAR_INF,
+    added,
+    beer_fpar,
+    extinction_coefficient,
+    green_fpar,
+    leaf_layers,
+    light_budget,
+    mixed,
+    two_layers,
+)
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.sail_model import direction_distance, leaf_scattering, sail, with_background
 
@@ -111,3 +123,116 @@ def test_no_data_stay_where_they_are():
     assert [np.isnan(getattr(found, name)).tolist() for name in ("rso", "rdd_below", "tdo")] == 3 * [
         [False, True, True]
     ]
+
+
+def test_spherical_leaves_have_half_over_the_cosine():
+    """Values by hand: 0.5 / cos."""
+    sza = np.array([0, 25, 28.5, 30, 45, 60])
+    np.testing.assert_array_equal(extinction_coefficient(sza), 0.5 / np.cos(np.radians(sza)))
+    np.testing.assert_allclose(extinction_coefficient(sza), [0.5, 0.5517, 0.5689, 0.5774, 0.7071, 1.0], atol=5e-5)
+
+
+def test_vertical_leaves_have_two_over_pi_times_the_tangent():
+    """Monteith and Unsworth (1990), vertical cylinders."""
+    sza = np.array([10, 45, 80])
+    np.testing.assert_allclose(extinction_coefficient(sza, "90: 1"), 2 / np.pi * np.tan(np.radians(sza)), rtol=1e-12)
+
+
+@pytest.mark.parametrize("mean", [30, 45, 57.3, 75])
+def test_ellipsoidal_leaves_cast_the_shadow_of_an_ellipsoid(mean):
+    """Campbell (1986): K grows as sqrt(x^2 + tan^2 sza), so K^2 is linear in tan^2; classes are good to 1e-3."""
+    tangent = np.tan(np.radians([0, 10, 30, 50, 70]))
+    square = extinction_coefficient(np.degrees(np.arctan(tangent)), ("campbell", mean)) ** 2
+    slope = (square[1:] - square[0]) / tangent[1:] ** 2
+    np.testing.assert_allclose(slope, slope[-1], rtol=1e-2)
+    np.testing.assert_allclose(square, square[0] + slope[-1] * tangent**2, rtol=1e-3)
+
+
+@pytest.mark.parametrize("shape", ["planophile", "erectophile", "uniform"])
+def test_extinction_is_that_of_sail(shape):
+    tss = sail(1.0, 0.1, 0.1, sza=40, leaf_angles=shape).tss
+    np.testing.assert_allclose(extinction_coefficient(40.0, shape), -np.log(tss), rtol=1e-12)
+
+
+def test_fpar_integrates_the_light_that_each_leaf_layer_takes():
+    """Eq. 6 by quadrature of K exp(-K L)."""
+    expected = 0.94 * quad(lambda depth: 0.569 * np.exp(-0.569 * depth), 0, 2.5)[0]
+    np.testing.assert_allclose(beer_fpar(2.5, 0.569), expected, rtol=1e-12)
+
+
+def test_fpar_ends():
+    assert beer_fpar(0.0, 0.5) == 0
+    assert beer_fpar(np.inf, 0.5) == FPAR_INF == 0.94
+    assert beer_fpar(1e4, 0.5, fpar_inf=0.9) == 0.9
+
+
+@pytest.mark.parametrize("dissociation", [0.0, 0.4, 1.0])
+def test_green_leaves_absorb_their_share_of_each_depth(dissociation):
+    """By quadrature: at each depth the light that is left meets green leaves by their share there."""
+    lai, brown, extinction = 3.0, 0.4, 0.6
+    layers = leaf_layers(lai, brown, dissociation)
+
+    def taken(depth):
+        share = layers.brown if depth < layers.lai else layers.brown_below
+        return 0.94 * extinction * np.exp(-extinction * depth) * (1 - share)
+
+    expected = quad(taken, 0, layers.lai)[0] + quad(taken, layers.lai, lai)[0]
+    np.testing.assert_allclose(green_fpar(lai, extinction, brown, dissociation), expected, rtol=1e-12)
+    for share, all_of_it in ((0.0, beer_fpar(lai, extinction)), (1.0, 0.0)):
+        found = green_fpar(lai, extinction, share, dissociation)
+        np.testing.assert_allclose(found, all_of_it, rtol=1e-14)
+
+
+GREEN_LEAF, DEAD_LEAF, GROUND = (0.4, 0.3), (0.3, 0.1), 0.25
+
+
+def followed(lai, brown, dissociation, sza, inclination, beam, sky):
+    """Three streams and what leaves of unit absorptance take of them in each layer, by matrix exponentials."""
+    sun, *_ = turned_leaves(inclination, sza, 0.0, 0.0)
+    ks, bf = sun / np.cos(np.radians(sza)), np.cos(np.radians(inclination)) ** 2
+    layers, through, taken = leaf_layers(lai, brown, dissociation), np.eye(3), []
+    for depth, dead in ((layers.lai, layers.brown), (layers.lai_below, layers.brown_below)):
+        rho, tau = ((1 - dead) * one + dead * other for one, other in zip(GREEN_LEAF, DEAD_LEAF, strict=True))
+        forward, backward = ([((k + s * bf) * rho + (k - s * bf) * tau) / 2 for k in (ks, 1.0)] for s in (-1, 1))
+        streams = np.array(
+            [[-ks, 0, 0], [forward[0], forward[1] - 1, backward[1]], [-backward[0], -backward[1], 1 - forward[1]]]
+        )
+        # The last row adds up what is met by leaves: beam by its extinction, diffuse light by 1.
+        whole = expm(np.vstack([np.hstack([streams, np.zeros((3, 1))]), [[ks, 1, 1, 0]]]) * float(depth))
+        taken.append(whole[3, :3] @ through)
+        through = whole[:3, :3] @ through
+    # The light up at the top is such that the ground sends up its share.
+    known, up = through @ [beam, sky, 0], through @ [0, 0, 1]
+    top = -(known[2] - GROUND * (known[0] + known[1])) / (up[2] - GROUND * (up[0] + up[1]))
+    streams = np.array([beam, sky, top])
+    met = [float(row @ streams) for row in taken]
+    absorbed = [1 - sum(GREEN_LEAF), 1 - sum(DEAD_LEAF)]
+    dead = [layers.brown, layers.brown_below]
+    green = sum(each * (1 - share) for each, share in zip(met, dead, strict=True)) * absorbed[0]
+    brown = sum(each * share for each, share in zip(met, dead, strict=True)) * absorbed[1]
+    bottom = through @ streams
+    return green, brown, (1 - GROUND) * (bottom[0] + bottom[1]), top
+
+
+@pytest.mark.parametrize("lai, brown, dissociation, sza", [(2, 0.4, 0.5, 30), (0.3, 0.1, 0.0, 60), (5, 0.7, 1.0, 45)])
+def test_budget_is_that_of_light_followed_through_the_layers(lai, brown, dissociation, sza):
+    for sky in (0.0, 0.3, 1.0):
+        budget = light_budget(
+            lai, *GREEN_LEAF, *DEAD_LEAF, GROUND, brown=brown, dissociation=dissociation, sza=sza, leaf_angles="35: 1",
+            diffuse_fraction=sky,
+        )  # fmt: skip
+        expected = followed(lai, brown, dissociation, sza, 35.0, 1 - sky, sky)
+        np.testing.assert_allclose([float(each) for each in budget], expected, rtol=0, atol=1e-7)
+
+
+def test_nothing_is_lost():
+    lai, brown = np.array([0, 0.1, 3, 30])[:, None], np.array([0, 0.3, 1])
+    for cover in (0.2, 1.0):
+        budget = light_budget(
+            lai, *GREEN_LEAF, *DEAD_LEAF, GROUND, brown=brown, dissociation=0.4, sza=50, diffuse_fraction=0.25,
+            crown_cover=cover,
+        )  # fmt: skip
+        np.testing.assert_allclose(sum(budget), 1, rtol=0, atol=1e-12)
+        assert min(each.min() for each in budget) >= -1e-15
+        np.testing.assert_allclose(budget.brown[:, 0], 0, atol=1e-15)
+        np.testing.assert_allclose(budget.green[:, 2], 0, atol=1e-15)

@@ -72,14 +72,6 @@ def test_mixture_is_linear_in_its_parts():
     np.testing.assert_array_equal(pure["shade"], 0)
 
 
-def test_a_mapping_of_spectra_is_a_mixture_and_one_of_bands_is_not():
-    mixture = {"soil_dry": 0.5, "dead_grass": 0.5}
-    np.testing.assert_array_equal(
-        optics.band_background(TM, mixture), optics.band_background(TM, fifesim.Background(mixture))
-    )
-    np.testing.assert_array_equal(optics.band_background(TM[2:4], {"TM3": 0.1, "TM4": 0.2}), [0.1, 0.2])
-
-
 def test_names_of_bands_are_bands_although_spectra_have_them_too():
     """Shares of a mixture add up to 1 and reflectances of bands do not: .2 and .3 are no mixture."""
     given = {"soil_dry": 0.2, "dead_grass": 0.3}

@@ -1,4 +1,4 @@
-"""Fields that correlate, beside integrals of their spectra and matrices solved by others."""
+"""Fields that correlate, beside integrals of their spectra and matrices solved by others; scores of values."""
 
 import numpy as np
 import pytest
@@ -102,26 +102,6 @@ def test_ground_that_is_not_normal_together_is_followed_as_asked():
     assert follows.std() == pytest.approx(parts.ground["lai"].share, rel=1e-3)
     with pytest.raises(ValueError, match="no sum of elevation, wetness has such ranks that lai follows each"):
         copula({"lai": 0.1}, {("lai", "elevation"): 0.4, ("lai", "wetness"): 0.3}, ground)
-
-
-def test_noises_of_other_arps_correlate_more():
-    parts = copula(ARPS, {("lai", "soil"): -0.4})
-    own, shared = parts.noise["soil"]["soil"], parts.noise["soil"]["lai"]
-    assert shared == pytest.approx(-0.4 / cross_correlation(0.15, 0.24), rel=1e-12)
-    assert own**2 + shared**2 == pytest.approx(1, rel=1e-12)
-    assert parts.noise["moisture"] == {"moisture": 1.0}
-
-
-def test_noise_has_the_matrix_that_is_asked_for():
-    asked = {("lai", "soil"): -0.5, ("soil", "moisture"): 0.6, ("lai", "moisture"): 0.2}
-    parts = copula(dict.fromkeys(ARPS, 0.2), asked)
-    lower = np.array([[parts.noise[name].get(other, 0.0) for other in ARPS] for name in ARPS])
-    np.testing.assert_allclose(lower @ lower.T, [[1, -0.5, 0.2], [-0.5, 1, 0.6], [0.2, 0.6, 1]], rtol=0, atol=1e-12)
-
-
-def test_fields_that_are_one_are_allowed():
-    parts = copula({"lai": 0.1, "soil": 0.1}, {("lai", "soil"): -1.0})
-    assert parts.noise["soil"] == {"lai": -1.0}
 
 
 @pytest.mark.parametrize(
@@ -272,3 +252,46 @@ def test_what_is_no_correlation_is_one_line(correlations, kind, message):
     with pytest.raises(kind, match=message) as caught:
         pairs_of(correlations, FIELDS, GROUND)
     assert len(str(caught.value)) <= 500
+
+
+@pytest.fixture(scope="module")
+def values_of_places():
+    """Heights and wetness, neither of them normal."""
+    drawn = np.random.default_rng(4).standard_normal((2, 20_000))
+    return {"elevation": 400 + 30 * drawn[0] ** 3, "wetness": np.exp(drawn[1] - drawn[0] / 2)}
+
+
+def test_scores_are_normal_whatever_the_values(values_of_places):
+    for values in (values_of_places["elevation"], values_of_places["wetness"]):
+        scores = normal_scores(values, score_table(values))
+        assert stats.kstest(scores, "norm").statistic < 1e-3
+        assert stats.spearmanr(scores, values).statistic == pytest.approx(1, abs=1e-9)
+
+
+def test_values_that_are_shared_have_one_score():
+    table = score_table(np.array([0.0, 0.0, 0.0, 1.0, 2.0]))
+    assert table.values.tolist() == [0, 1, 2]
+    scores = normal_scores(np.array([0.0, 0.0, 0.0, 1.0, 2.0]), table)
+    assert scores.mean() == pytest.approx(0, abs=1e-12) and scores.std() == pytest.approx(1, abs=1e-12)
+
+
+def test_scores_are_those_of_a_line_between_the_nodes(values_of_places):
+    """As numpy interpolates them, on the table's own nodes, between them and beyond."""
+    table = score_table(values_of_places["elevation"])
+    values = np.concatenate([table.values, np.linspace(-5000, 6000, 3001), [np.inf, -np.inf]])
+    expected = np.interp(values, table.values, table.scores)
+    np.testing.assert_allclose(normal_scores(values, table), expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("sample", [[-1e6, 0, 1, 2, 3], [-3, -2, -1, 0, 1e6], [-1e6, 0, 1, 2, 1e6]])
+def test_nodes_that_lie_close_at_an_end_are_told_apart(sample):
+    """All but one in the same of the even steps that the search starts from."""
+    table, values = score_table(np.array(sample, float)), np.linspace(-4, 4, 81)
+    expected = np.interp(values, table.values, table.scores)
+    np.testing.assert_allclose(normal_scores(values, table), expected, rtol=0, atol=1e-9)
+
+
+def test_missing_values_have_no_score_and_shapes_stay(values_of_places):
+    table = score_table(values_of_places["wetness"])
+    found = normal_scores(np.array([[np.nan, 1.0], [2.0, 3.0]]), table)
+    assert np.isnan(found).tolist() == [[True, False], [False, False]]

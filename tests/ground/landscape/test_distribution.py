@@ -7,7 +7,6 @@ from scipy import integrate, stats
 
 import fifesim
 from fifesim.base import files
-from fifesim.ground.landscape.autoregression import field_variance, response
 from fifesim.ground.landscape.distribution import (
     QUANTILE_NODES,
     kernel_density,
@@ -130,16 +129,6 @@ def kolmogorov_distance(values, distribution):
     return max(np.max(steps[1:] - below), np.max(below - steps[:-1]))
 
 
-def independent_cells(arp, cells):
-    """
-    Cells over the sum of their correlations; fewer than the indicators of a threshold have.
-
-    The correlation of two indicators is at most that of the normal values that they come from (all are positive here).
-    The sum of the correlations is the spectrum at frequency zero over the variance.
-    """
-    return cells * field_variance(arp) / response(arp, 0, 0) ** 2
-
-
 @pytest.mark.parametrize("name", fifesim.treatments())
 def test_no_leaf_area_is_negative(name):
     field = np.array([[-40.0, -8.5, -1.0, 0.0, 1.0, 8.5, 40.0]])
@@ -204,11 +193,3 @@ def test_ranks_reproduce_the_distribution_exactly(name):
     np.testing.assert_array_equal(np.argsort(values, axis=None), np.argsort(field, axis=None))
     np.testing.assert_array_equal(np.sort(values, axis=None), distribution.ppf((np.arange(2000) + 0.5) / 2000))
     assert kolmogorov_distance(values, distribution) == pytest.approx(0.5 / 2000, rel=1e-9)
-
-
-@pytest.mark.parametrize("arp", [0.05, 0.15, 0.24])
-def test_streaming_scene_has_the_distribution_within_sampling_error(arp):
-    """1.95 / sqrt(n) is exceeded in one of a thousand samples of n independent values (Kolmogorov)."""
-    lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 1000), (0, 1000))), arp=arp, seed=7)
-    distance = kolmogorov_distance(lai.values, lai_distribution("burned-grazed"))
-    assert distance < 1.95 / np.sqrt(independent_cells(arp, lai.size))

@@ -1,4 +1,4 @@
-"""A map of leaf area made a ground scene: labels, the same bits in any chunks and windows, and what is refused."""
+"""A map of leaf area made a ground scene: labels, bits in any chunks and windows, pixels, and what is refused."""
 
 import warnings
 
@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from lazy import ODD_CHUNKS, check_place, no_compute
-from scipy import stats
 
 import fifesim
 from fifesim.grids import cf
 from fifesim.grids import grid as grids
-from fifesim.ground.landscape import downscaling
-from fifesim.ground.landscape.downscaling import kriging_block_means, map_trend
+from fifesim.ground.landscape.downscaling import kriging_block_means
+from fifesim.ground.landscape.downscaling_labels import PIXEL_MARGIN, PixelReads, pixel_lattice
 
 # Across the edge of two tiles of 504 cells.
 SOURCE = fifesim.grid_at("EPSG:32614", 1680 * 400 - 300, 1680 * 2600 - 200, 700, 500, 10)
@@ -155,24 +154,6 @@ def test_distribution_and_functions_of_the_mean_are_taken(lai_map):
     assert np.nanmean(spread[lai_map.values < 0.7]) > 0.35
 
 
-@pytest.mark.parametrize("options", [{"cv": 0.4}, {"distribution": "burned-grazed"}])
-def test_map_of_the_model_is_not_taken_for_a_trend(monkeypatch, options):
-    """What cells do in pixels moves the levels of these: by 5 % of their variance, which would pass for 0.5 or more."""
-    grid = fifesim.grid_at("EPSG:32614", 672000, 4368000, 1680, 1680, 10 / 3)
-    density = options.get("distribution", stats.lognorm(0.428))
-    found = []
-
-    def recorded(*given):
-        found.append(map_trend(*given))
-        return found[-1]
-
-    monkeypatch.setattr(downscaling, "map_trend", recorded)
-    fifesim.downscale(
-        fifesim.lai_scene(grid, density, arp=0.05, seed=1).fifesim.aggregate(10), grid, arp=0.05, **options
-    )
-    assert len(found) == 1 and found[0] <= 0.25
-
-
 @pytest.mark.parametrize("off", [0, 1])
 def test_seed_of_a_scene_gives_its_ups_and_downs(off):
     """Also where pixels are no whole number of their own size from the origin of the CRS."""
@@ -229,3 +210,65 @@ def test_whole_numbers_with_a_scale_and_rows_from_the_south_are_taken(lai_map, s
     cells = packed[::-1].fifesim.downscale(GRID, arp=0.2, cv=0.3, seed=7)
     np.testing.assert_allclose(means(cells), np.round(lai_map, 3), rtol=1e-9)
     np.testing.assert_allclose(cells, scene, rtol=0.02, atol=1e-3)
+
+
+def raster(grid):
+    return grids.place(xr.DataArray(np.ones(grid.shape), dims=("y", "x"), name="lai"), grid)
+
+
+PIXELS = fifesim.grid_at("EPSG:32614", 699960, 4400040, 1000, 800, 10)
+
+
+def test_tiles_hold_whole_pixels_and_are_counted_from_the_origin_of_the_crs():
+    lattice = pixel_lattice(raster(PIXELS), PIXELS.zoom_out(1 / 3))
+    assert lattice.ratio == (3, 3) and lattice.tile == 504 and lattice.pixels == (168, 168)
+    assert lattice.pixel == (-440004, 69996) and lattice.cell == (-440004 * 3, 69996 * 3)
+    assert lattice.shift == (0, 0)
+    tiles = lattice.tiles(slice(0, 240), 0)
+    assert tiles.start * 504 <= -440004 * 3 and tiles.stop * 504 >= -440004 * 3 + 240 and len(tiles) <= 2
+    window = PixelReads(np.ones(PIXELS.shape), lattice).window(slice(0, 240), slice(0, 300))[0]
+    assert (
+        window.start == tiles.start * 168 - PIXEL_MARGIN + 440004
+        and window.stop == tiles.stop * 168 + PIXEL_MARGIN + 440004
+    )
+
+
+def test_pixels_that_are_no_multiple_of_their_size_from_the_origin_keep_their_cells():
+    source = fifesim.grid_at("EPSG:32614", 699966, 4400033, 1000, 800, 10)
+    lattice = pixel_lattice(raster(source), source.zoom_out(1 / 5))
+    corner = [place * 5 + shift for place, shift in zip(lattice.pixel, lattice.shift, strict=True)]
+    assert corner == list(grids.lattice_position(source.zoom_out(1 / 5)))
+
+
+@pytest.mark.parametrize("cells, tile", [((2, 3), 504), ((6, 6), 504), ((7, 7), 504), ((100, 100), 800)])
+def test_tiles_hold_some_pixels_of_any_size(cells, tile):
+    grid = fifesim.grid_at("EPSG:32614", 699960, 4400040, 1000, 1000, (10 / cells[0], 10 / cells[1]))
+    lattice = pixel_lattice(raster(fifesim.grid_at("EPSG:32614", 699960, 4400040, 1000, 1000, 10)), grid)
+    assert lattice.ratio == cells and lattice.tile == tile
+    assert all(count * number == tile and count >= 8 for count, number in zip(lattice.pixels, cells, strict=True))
+
+
+@pytest.mark.parametrize(
+    "grid, message",
+    [
+        (
+            fifesim.grid_at("EPSG:26914", 699960, 4400040, 100, 100, 10 / 3),
+            r"is in EPSG:32614 and the grid in EPSG:26914",
+        ),
+        (fifesim.grid_at("EPSG:32614", 699960, 4400040, 100, 100, 4), r"10 x 10 m and the grid cells of 4 x 4 m"),
+        (PIXELS, r"a pixel must be a whole number of cells, 2 or more"),
+        (fifesim.grid_at("EPSG:32614", 699960, 4400040, 900, 900, 30), r"cells of 30 x 30 m"),
+        (
+            fifesim.grid_at("EPSG:32614", 699961, 4400040, 100, 100, 2.5),
+            r"are 0.00 rows and 0.40 columns of cells away from",
+        ),
+        (
+            fifesim.grid_at("EPSG:32614", 709960, 4400040, 100, 100, 2.5),
+            r"does not overlap the grid, which spans 709960",
+        ),
+    ],
+)
+def test_grid_that_does_not_fit_says_what_to_type(grid, message):
+    with pytest.raises(ValueError, match=message + r"[\s\S]*lai.odc.geobox.zoom_out\(1 / 3\) has 3 x 3 cells") as error:
+        pixel_lattice(raster(PIXELS), grid)
+    assert len(str(error.value)) <= 500

@@ -11,8 +11,8 @@ import fifesim
 from fifesim.grids import cf
 from fifesim.grids import chunks as chunking
 from fifesim.ground.landscape.autoregression import response
-from fifesim.ground.landscape.covariance import normal_scores, score_table
-from fifesim.ground.landscape.field_labels import correlated_fields, landscape_fields, of_elevation
+from fifesim.ground.landscape.covariance import Copula, copula, normal_scores, score_table
+from fifesim.ground.landscape.field_labels import copulas, correlated_fields, landscape_fields, of_elevation
 
 ARPS = {"lai": 0.15, "soil": 0.24, "moisture": 0.05}
 PAIRS = {("lai", "soil"): -0.4, ("lai", "moisture"): 0.3, ("soil", "moisture"): 0.2}
@@ -234,3 +234,27 @@ def test_leaf_area_alone_stays_that_of_the_scene(grid):
 def test_unknown_names_of_coarser_lattices_are_refused(grid):
     with pytest.raises(ValueError, match="coarser names sand, there are 'lai'"):
         correlated_fields(grid, {"lai": 0.15}, coarser={"sand": 4})
+
+
+FOUR_ARPS = {"soil": 0.05, "moisture": 0.1, "lai": 0.15, "brown": 0.2}
+OF_GROUND = {("lai", "elevation"): 0.3, ("lai", "soil"): -0.3, ("soil", "moisture"): -0.5, ("brown", "lai"): 0.2}
+
+
+@pytest.fixture(scope="module")
+def coarse_hills():
+    return {"elevation": fifesim.flint_hills(fifesim.fife_site(10, window=((0, 60), (0, 70))), seed=7)}
+
+
+@pytest.mark.parametrize("coarser", [(), ("soil",), ("soil", "moisture")], ids=str)
+def test_fields_before_the_first_that_follows_the_ground_do_not_wait_for_it(coarse_hills, coarser):
+    """And are put together as with it."""
+    whole = copula(FOUR_ARPS, OF_GROUND, {"elevation": coarse_hills["elevation"].values.ravel()}, coarser)
+    with no_compute():
+        lazy = {name: in_chunks(each, {"y": 40, "x": 33}) for name, each in coarse_hills.items()}
+        found = copulas(FOUR_ARPS, OF_GROUND, lazy, None, coarser)
+    for name in ("soil", "moisture"):
+        assert isinstance(found[name], Copula)
+        assert found[name].noise[name] == whole.noise[name]
+        assert found[name].coarse.get(name) == whole.coarse.get(name)
+    for name in ("lai", "brown"):
+        assert found[name].chunks == () and found[name].values.item().noise == whole.noise

@@ -1,4 +1,4 @@
-"""Fields of a landscape: their means, deviations and correlations, where they are the same, and what is refused."""
+"""Landscapes: their variables and fields, maps of cover, where they are the same, and what is refused."""
 
 import logging
 
@@ -10,12 +10,12 @@ import xarray as xr
 from affine import Affine
 from elevations import write
 from lazy import ODD_CHUNKS, check_place, in_chunks, no_compute
+from odc.geo.geobox import GeoBox
 from scipy import stats
 
 import fifesim
 from fifesim.grids import cf
 from fifesim.grids import grid as grids
-from fifesim.ground.landscape.autoregression import response
 from fifesim.ground.landscape.classes import CoverClass, Field, class_table
 from fifesim.ground.landscape.cover import Patches, patch_classes
 from fifesim.ground.landscape.distribution import quantile_map, quantile_table
@@ -61,42 +61,6 @@ def land(make):
     return make()
 
 
-def summed(*arps):
-    """Sum over lags of the product of the autocorrelations of fields, of one or two arps."""
-    u = 2 * np.pi * np.arange(512) / 512
-    spectra = [response(arp, u[:, None], u) ** 2 for arp in arps]
-    spectra = [each / each.mean() for each in spectra]
-    return spectra[0][0, 0] if len(spectra) == 1 else np.mean(spectra[0] * spectra[1])
-
-
-def scores_of(land):
-    """Standard normal scores of leaf area by its class's own distribution, from scipy."""
-    names = land["cover"].attrs["flag_meanings"].split()
-    known = {code: fifesim.lai_distribution(CLASSES[name].lai) for code, name in enumerate(names, 1)}
-    lai = land["lai"].values
-    return np.select(
-        [land["cover"].values == code for code in known], [stats.norm.ppf(each.cdf(lai)) for each in known.values()]
-    )
-
-
-@pytest.mark.parametrize("name", DRAWN)
-def test_mean_and_deviation_are_as_asked(land, name):
-    """
-    Standard errors of correlated fields.
-
-    What a field becomes by its quantiles correlates no farther than the field does; of squares, with their kurtosis.
-    """
-    given, values = DRAWN[name], land[name].values
-    kind = stats.norm(0, given.sd) if name == "soil" else given.distribution(name)
-    fourth = float(kind.stats("k")) + 2
-    error = given.sd * np.sqrt(summed(given.arp) / values.size)
-    of_variance = np.sqrt(fourth * summed(given.arp) / values.size)
-    assert values.mean() == pytest.approx(given.mean, abs=4 * error)
-    assert values.var() / given.sd**2 == pytest.approx(1, abs=4 * of_variance) and 4 * of_variance < 0.15
-    # One cell in some: those correlate little.
-    assert stats.kstest(values[::7, ::7].ravel(), kind.cdf).pvalue > 0.01
-
-
 def test_properties_are_made_of_the_scores_of_their_names(grid):
     """Those of `correlated_fields`, to the bit."""
     scores = fifesim.correlated_fields(grid, {name: each.arp for name, each in DRAWN.items()}, seed=7)
@@ -107,33 +71,6 @@ def test_properties_are_made_of_the_scores_of_their_names(grid):
     assert made["soil"].name == "soil" and made["soil"].attrs["arp"] == 0.2 and made["brown"].attrs["site"] == "FIFE"
     assert made["soil"].attrs["history"].endswith("soil: standard deviation 0.04")
     assert made["brown"].attrs["history"].endswith("brown: by quantiles")
-
-
-@pytest.mark.parametrize("name", ["soil", "brown"])
-@pytest.mark.parametrize("code", [1, 2])
-def test_leaf_area_of_each_class_correlates_as_asked(land, name, code):
-    """Normal scores in the cells of a class; Bartlett's standard error, at most, since fields correlate positively."""
-    of_class = land["cover"].values == code
-    given, arp = DRAWN[name], list(CLASSES.values())[code - 1].arp
-    kind = stats.norm(0, given.sd) if name == "soil" else given.distribution(name)
-    leaf_area = scores_of(land)[of_class]
-    other = stats.norm.ppf(kind.cdf(land[name].values[of_class]))
-    error = np.sqrt(2 * summed(arp, given.arp) / of_class.sum())
-    assert of_class.sum() > 30_000 and 4 * error < 0.06
-    assert np.corrcoef(leaf_area, other)[0, 1] == pytest.approx(COVARY[name], abs=4 * error)
-
-
-@pytest.mark.parametrize("code", [1, 2])
-def test_leaf_area_of_each_class_follows_the_hills(land, hills, code):
-    """The hills of a class are a part of all: the slope of scores on theirs is the correlation wherever it is taken."""
-    of_class, arp = land["cover"].values == code, list(CLASSES.values())[code - 1].arp
-    ranks = stats.rankdata(hills.values) - 0.5
-    heights = stats.norm.ppf(ranks / ranks.size).reshape(hills.shape)[of_class]
-    # The hills vary over kilometres: noise is summed over its neighbours, as in a mean.
-    error = np.sqrt((1 - COVARY["elevation"] ** 2) * summed(arp) / (heights**2).sum())
-    slope = (heights * scores_of(land)[of_class]).sum() / (heights**2).sum()
-    assert 4 * error < 0.1
-    assert slope == pytest.approx(COVARY["elevation"], abs=4 * error)
 
 
 def test_each_class_is_as_if_it_were_everywhere(land, make):
@@ -153,13 +90,6 @@ def test_without_covariance_leaf_area_is_that_of_the_scene(grid, make):
     fields, made = drawn_fields(grid, DRAWN, None, (0.15,), seed=7)
     assert fields == {} and list(made) == list(DRAWN)
     assert drawn_fields(grid, {}, None, (0.15,), seed=7) == ({}, {})
-
-
-def test_a_property_is_the_same_beside_any_others(grid, land):
-    alone = drawn_fields(grid, {"brown": DRAWN["brown"]}, None, (), seed=7)[1]["brown"]
-    np.testing.assert_array_equal(land["brown"], alone)
-    other = drawn_fields(grid, {"brown": DRAWN["brown"]}, None, (), seed=8)[1]["brown"]
-    assert (other != alone).mean() > 0.99
 
 
 def test_windows_and_chunks_are_slices_of_the_whole(grid, hills, land, make):
@@ -365,3 +295,120 @@ def test_map_that_is_of_no_use_is_refused(tmp_path, site, codes):
 def test_cover_that_says_no_classes_is_refused(site):
     with pytest.raises(ValueError, match="the classes of the cover are unknown"):
         classes_of(drawn_cover(site, Patches("voronoi", 40), TABLE, 7).drop_attrs())
+
+
+THREE_CLASSES = {
+    "bare": fifesim.CoverClass(lai=0.0, canopy=fifesim.Canopy(background=0.2)),
+    "grass": fifesim.CoverClass(lai="burned-grazed", arp=0.24),
+    "wood": fifesim.CoverClass(lai=stats.gamma(9, scale=0.4)),
+}
+PATCHES = fifesim.Patches("voronoi", 30)
+
+
+@pytest.fixture(scope="module")
+def patched(site):
+    return fifesim.landscape(site, cover=PATCHES, classes=THREE_CLASSES, arp=0.1, seed=7)
+
+
+@pytest.mark.parametrize("code, name, arp", [(2, "burned-grazed", 0.24), (3, THREE_CLASSES["wood"].lai, 0.1)])
+def test_leaf_area_of_a_class_is_that_of_a_scene_of_it_alone(site, patched, code, name, arp):
+    """One white noise for all: beyond a fence the field goes on, and only its density and texture change."""
+    alone = fifesim.lai_scene(site, name, arp=arp, seed=7)
+    of_class = (patched.cover == code).values
+    assert 400 < of_class.sum() < 2000
+    np.testing.assert_array_equal(patched.lai.values[of_class], alone.values[of_class])
+
+
+def test_class_of_one_leaf_area_has_it_everywhere(patched):
+    assert (patched.lai.values[patched.cover.values == 1] == 0).all()
+
+
+def test_landscape_is_labelled_and_placed(site, patched):
+    assert list(patched.data_vars) == ["lai", "cover"]
+    for name, variable in patched.data_vars.items():
+        check_place(variable, site.crs)
+        assert cf.attributes(name).items() <= variable.attrs.items()
+    assert patched.cover.dtype == np.int16
+    assert patched.lai.attrs["lai_distribution"] == "by class" and patched.lai.attrs["rng_seed"] == "7"
+    assert patched.lai.attrs["history"].splitlines() == [
+        "landscape: voronoi of 30 m, seed 7",
+        "landscape: leaf area of 3 classes, seed 7",
+    ]
+    assert [each.name for each in classes_of(patched.cover)] == list(THREE_CLASSES)
+
+
+def test_default_is_the_three_treatments_in_pastures():
+    grid = fifesim.fife_site(30)
+    patched = fifesim.landscape(grid, seed=1)
+    assert patched.attrs["site"] == patched.lai.attrs["site"] == "FIFE"
+    assert np.unique(patched.cover).tolist() == [1, 2, 3]
+    means = [float(patched.lai.where(patched.cover == code).mean()) for code in (1, 2, 3)]
+    expected = [fifesim.lai_distribution(name).mean() for name in fifesim.treatments()]
+    np.testing.assert_allclose(means, expected, rtol=0.03)
+    fences = [(patched.cover.diff(axis) != 0).mean("x" if axis == "y" else "y").max() for axis in ("y", "x")]
+    assert min(fences) > 0.1
+
+
+def test_one_class_is_everywhere(site, lai):
+    patched = fifesim.landscape(site, classes=fifesim.CoverClass("grass", lai="burned-grazed"), seed=7)
+    assert (patched.cover == 1).all()
+    np.testing.assert_array_equal(patched.lai, lai)
+
+
+def test_own_leaf_area_is_in_the_place_of_the_classes(tmp_path, site, lai):
+    path = write(tmp_path / "lai.tif", lai.values, site.affine)
+    for given in (path, lai):
+        patched = fifesim.landscape(site, lai=given, cover=PATCHES, classes=THREE_CLASSES)
+        np.testing.assert_array_equal(patched.lai, lai)
+        assert list(patched) == ["lai", "cover"]
+    assert list(fifesim.landscape(site, lai=lai)) == ["lai"]
+
+
+def test_map_of_cover_lies_below_the_leaf_area(tmp_path, site, patched):
+    codes = np.where(patched.cover.values == 2, 255, patched.cover.values)
+    path = write(tmp_path / "map.tif", codes, site.affine, nodata=255)
+    of_map = fifesim.landscape(site, cover=path, classes=THREE_CLASSES, arp=0.1, seed=7)
+    known = codes != 255
+    np.testing.assert_array_equal(of_map.lai.values[known], patched.lai.values[known])
+    assert np.isnan(of_map.lai.values[~known]).all() and (of_map.cover.values[~known] == -1).all()
+
+
+def test_cover_that_carries_its_classes_needs_no_others(site, patched):
+    again = fifesim.landscape(site, cover=patched.cover, arp=0.1, seed=7)
+    xr.testing.assert_equal(again, patched)
+
+
+@pytest.mark.parametrize(
+    "options, error, message",
+    [
+        ({"classes": THREE_CLASSES}, ValueError, "the layout of the 3 classes is unknown: give cover= a map"),
+        ({"cover": fifesim.Patches("voronoi", 9, (0.5, 0.5))}, ValueError, "2 shares for 3 classes"),
+        ({"cover": "map.tif"}, ValueError, "a map of cover needs classes="),
+        (
+            {"cover": 3, "classes": THREE_CLASSES},
+            TypeError,
+            "cover must be a fifesim.Patches, the path of",
+        ),
+        ({"cover": PATCHES, "classes": fifesim.CoverClass("water")}, ValueError, "class water has no leaf area"),
+        ({"brown": 1.5}, ValueError, r"brown must be in \[0, 1\], got 1.5"),
+        (
+            {"brown": [0.5]},
+            TypeError,
+            "brown must be a number, a fifesim.Field, the path of a raster or an xarray.DataArray",
+        ),
+        ({"arp": 0.24999}, ValueError, "at most"),
+        ({"seed": -1}, ValueError, "seed must be"),
+        ({"chunks": {"band": 1}}, ValueError, "y and x"),
+        ({"chunks": 20, "arp": 0.3}, ValueError, "arp must be"),
+    ],
+)
+def test_impossible_landscape_is_refused_before_it_computes(site, options, error, message):
+    with pytest.raises(error, match=message), no_compute():
+        fifesim.landscape(site, **options)
+
+
+def test_heights_of_a_grid_s_crs_are_left_out(site):
+    """Whatever the variables are made of, they lie on one grid."""
+    above = GeoBox(site.shape, site.affine, pyproj.CRS("EPSG:26914+5703").to_wkt())
+    made = [fifesim.landscape(grid, soil=fifesim.Field(sd=0.03), brown=0.2, seed=7) for grid in (above, site)]
+    xr.testing.assert_equal(*made)

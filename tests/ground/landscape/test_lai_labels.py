@@ -56,7 +56,7 @@ def test_periodic_scene_is_made_at_once_and_its_chunks_change_nothing(site):
     [
         ({"arp": 0.3}, r"arp must be in \[0, 0\.25\), got 0\.3"),
         ({"seed": -1}, "seed must be"),
-        ({"method": "fft"}, "method must be one of streaming, periodic, got 'fft'"),
+        ({"method": "fft"}, "method must be 'streaming' or 'periodic', got 'fft'"),
         ({"arp": 0.24999, "chunks": 10}, "at most"),
         ({"distribution": "grazed"}, "unknown LAI distribution 'grazed'"),
         ({"chunks": {"band": 1}}, "y and x"),

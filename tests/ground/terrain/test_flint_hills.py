@@ -1,11 +1,22 @@
-"""The synthetic Flint Hills against the statistics of a real watershed, and as a function of place."""
+"""The synthetic Flint Hills against the statistics of a real watershed, as a function of place, and on rasters."""
 
 import numpy as np
 import pytest
+import xarray as xr
+from lazy import check_place, no_compute
 from scipy import interpolate, ndimage
 
+import fifesim
+from fifesim.base.geometry import Geometry
+from fifesim.grids import cf
+from fifesim.grids import grid as grids
+from fifesim.grids.grid import as_carried
 from fifesim.ground.terrain import flint_hills
+from fifesim.ground.terrain import labels as terrain_labels
 from fifesim.ground.terrain.flint_hills import BASE, NODES, SADDLE, StreamPower, erode, least_ways, upland
+from fifesim.ground.terrain.labels import light_on_slopes
+from fifesim.ground.terrain.sky_labels import horizon
+from fifesim.ground.terrain.source_labels import beside_altitude
 from fifesim.ground.terrain.spline import SPLINE_REACH, spline_points
 
 CELL = 10.0
@@ -288,3 +299,73 @@ def test_place_and_seed_decide_the_upland():
     assert upland(3, 5, -2) is one
     assert not np.array_equal(upland(3, 6, -2), one)
     assert one.shape == (NODES + 2 * SPLINE_REACH,) * 2
+
+
+def test_raster_has_its_labels_and_place():
+    grid = fifesim.fife_site(30 / 9, window=((90, 190), (180, 334)))
+    dem = fifesim.flint_hills(grid, 7)
+    check_place(dem, "EPSG:26914")
+    assert cf.attributes("dem").items() <= dem.attrs.items()
+    assert dem.attrs["rng_seed"] == "7"
+    np.testing.assert_array_equal(dem, flint_hills.hills_elevation(7, dem["y"].values, dem["x"].values))
+    for chunks in ({"y": 33, "x": 100}, "auto", 7):
+        with no_compute():
+            lazy = fifesim.flint_hills(grid, 7, chunks=chunks)
+        assert lazy.chunks is not None
+        xr.testing.assert_identical(lazy.compute(), dem)
+    xr.testing.assert_equal(fifesim.flint_hills(grid[10:20, 50:99], 7), dem[10:20, 50:99])
+
+
+def test_same_hills_on_other_cells():
+    """Cells of 10 m have their centres on every third cell of 3.33 m."""
+    fine = fifesim.flint_hills(fifesim.grid_at("EPSG:26914", 7.1e5, 4.33e6, 300, 300, 10 / 3), 2)
+    coarse = fifesim.flint_hills(fifesim.grid_at("EPSG:26914", 7.1e5, 4.33e6, 300, 300, 10.0), 2)
+    np.testing.assert_allclose(fine.values[1::3, 1::3], coarse, rtol=0, atol=1e-6)
+
+
+def test_what_cannot_be_made_is_refused():
+    grid = fifesim.fife_site(30, window=((0, 9), (0, 9)))
+    with pytest.raises(ValueError, match="seed must be a whole number"):
+        fifesim.flint_hills(grid, -1)
+    with pytest.raises(ValueError, match="at most 100 m"):
+        fifesim.flint_hills(fifesim.fife_site(500), 1)
+
+
+SUN = Geometry(60.0, 110.0, 25.0, 280.0)
+
+
+def grids_of(cell, coarse, reach):
+    """Cells of a scene, and those of the land around it."""
+    grid = grids.grid_at("EPSG:26914", 708001.3, 4331002.9, 61 * cell, 47 * cell, cell)
+    box = grid.boundingbox
+    west, north = np.floor((box.left - reach) / coarse) * coarse, np.ceil((box.top + reach) / coarse) * coarse
+    width, height = box.right + reach - west + coarse, north - box.bottom + reach + coarse
+    return grid, grids.grid_at("EPSG:26914", west, north, width, height, coarse)
+
+
+@pytest.mark.parametrize(("cell", "coarse", "reach"), [(10 / 3, 30.0, 600.0), (3.7, 29.6, 400.0), (20.0, 40.0, 900.0)])
+def test_light_is_that_of_the_labelled_hills(cell, coarse, reach):
+    grid, around = grids_of(cell, coarse, reach)
+    dem = fifesim.flint_hills(grid.pad(1), 4)
+    above = horizon(fifesim.flint_hills(around, 4, chunks=50), reach=reach, beside=dem).compute()
+    expected = light_on_slopes(dem, as_carried(grid), SUN, above)
+    found = terrain_labels.light_on_hills(grid, around, 4, reach, SUN, 0.4)
+    data, sky, size, sun = found
+    np.testing.assert_array_equal(data, expected[0])
+    for one, other in zip(sky, expected[1], strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert (size, sun) == expected[2:]
+    assert np.ptp(sky.layers[3]) > 0
+
+
+def test_steepest_is_the_largest_slope():
+    _, around = grids_of(10 / 3, 30.0, 600.0)
+    assert terrain_labels.steepest(around, 4) == float(terrain_labels.slope(fifesim.flint_hills(around, 4)).max())
+
+
+def test_an_altitude_far_from_the_hills_is_told():
+    grid, around = grids_of(10 / 3, 30.0, 300.0)
+    with pytest.warns(UserWarning, match="beside an altitude of the atmosphere of 3 km"):
+        terrain_labels.light_on_hills(grid, around, 4, 300.0, SUN, 3.0)
+    with pytest.warns(UserWarning, match="beside an altitude of the atmosphere of 3 km"):
+        beside_altitude(fifesim.flint_hills(grid, seed=4), 3.0)

@@ -168,13 +168,6 @@ def cells_of(dem, cell, reach, count=32):
     return slope, aspect, sky_of(slope, aspect, horizon)
 
 
-@pytest.mark.parametrize("slope", [0.0, 10.0, 30.0, 60.0])
-def test_plane_on_a_raster(slope):
-    """Where the plane dips below the horizontal between two directions, the horizon's great circle cuts the corner."""
-    found = cells_of(plane((40, 50), 30.0, 30.0, slope, 33.0), 30.0, 600.0)[2]
-    np.testing.assert_allclose(found, (1 + np.cos(np.radians(slope))) / 2, rtol=0, atol=1e-4)
-
-
 @pytest.mark.parametrize("depth", [0.2, 0.5, 0.8])
 def test_spherical_pit_on_a_raster(depth):
     """Everywhere in a pit of a sphere of radius R: Vd = 1 - depth / 2R, for the light that enters is spread evenly."""

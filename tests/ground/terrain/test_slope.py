@@ -1,4 +1,4 @@
-"""Slope, aspect and normals against planes and vectors."""
+"""Slope, aspect and normals against planes and vectors; units of elevation."""
 
 import numpy as np
 import pytest
@@ -110,3 +110,30 @@ def test_kt_is_the_light_on_a_slope_over_that_on_level_ground():
 
 def test_a_slope_that_faces_away_is_not_seen():
     assert lights.upwelling_factor(np.array([0.3, 0.6, -0.2]), 0.6).tolist() == [0.5, 1.0, 0.0]
+
+
+def tilted(shape=(80, 90)):
+    rows, columns = np.mgrid[: shape[0], : shape[1]]
+    return 400.0 + 3.0 * columns - 2.0 * rows
+
+
+def test_terraces_are_known_by_their_step():
+    gentle = tilted() / 20
+    assert terrain.terrace_step(np.rint(gentle)) == 1
+    assert terrain.terrace_step(np.rint(gentle / 5) * 5) == 5
+    assert terrain.terrace_step(gentle) is None
+    assert terrain.terrace_step(np.full((9, 9), 400.0)) is None
+    assert terrain.terrace_step(np.rint(tilted())) is None
+    assert terrain.terrace_step(np.full((9, 9), np.nan)) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "metres"), [("m", 1), ("Foot", 0.3048), ("US survey foot", 1200 / 3937), ("ft", 0.3048), ("metre", 1)]
+)
+def test_units_by_the_names_that_files_use(name, metres):
+    assert terrain.metres_per_unit(name) == metres
+
+
+def test_unknown_unit_is_refused():
+    with pytest.raises(ValueError, match="vertical units must be one of m, ft, us-ft"):
+        terrain.metres_per_unit("furlong")
