@@ -283,8 +283,8 @@ def _foliage_tables():
     """Check tables against single evaluations where dead share, crown cover and ground differ by cell."""
     rng, worst = np.random.default_rng(7), 0.0
     lai, brown, cover = rng.gamma(1.5, 1.5, 200), rng.uniform(0, 1, 200), rng.uniform(0.3, 1, 200)
-    dead = dict(zip(("brown_reflectance", "brown_transmittance"), _DEAD, strict=True))
-    given = {"background": rng.uniform(0, 1, (2, 200)), "diffuse_fraction": [0.2, 0.1], "dissociation": 0.5, **dead}
+    given = {"background": rng.uniform(0, 1, (2, 200)), "diffuse_fraction": [0.2, 0.1], "dead": _DEAD}
+    given["dissociation"] = 0.5
     for shares in ({"brown": brown}, {"brown": 0.3, "crown_cover": cover}, {"brown": brown, "crown_cover": cover}):
         table, exact = (
             canopy_reflectance(lai, *_GREEN, exact=exact, **given, **shares, **_VIEW) for exact in (False, True)

@@ -51,8 +51,6 @@ NumberByCell: TypeAlias = Annotated[
 ]
 
 
-MODELS_OF_LEAVES = ("sail", "discrete-ordinates")  # models of radiative transfer in leaves
-
 # A smaller hot spot is narrower than the solar disc. [1]
 LEAST_HOTSPOT = 1e-6
 
@@ -227,8 +225,6 @@ def is_raster(value):
 
 def _check(name, value, known):
     """Raise ValueError if a field cannot have a value."""
-    if name == "model" and value not in MODELS_OF_LEAVES:
-        raise ValueError(f"model must be one of {', '.join(MODELS_OF_LEAVES)}, got {value!r}")
     if name == "leaf_angles":
         leaf_angle_classes(value)
     elif known.unit and not is_raster(value):

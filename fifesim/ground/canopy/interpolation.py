@@ -261,20 +261,11 @@ def interpolate_crowned(table, crowns, lai, brown, cover, background):
     return values, wrong
 
 
-class _Memory(NamedTuple):
-    """Memory for a run of cells."""
-
-    wide: np.ndarray  # all columns of a table at four dead shares
-    terms: np.ndarray  # and at the place of each cell
-    starts: np.ndarray
-    leaves: np.ndarray
-    dead: np.ndarray
-
-
 def _memory(table):
+    """Memory for a run: all columns at four dead shares, and at the place of each cell; starts, leaves and dead."""
     columns, places = table.coefficients.shape[2], np.zeros((2, _RUN))
     wide, terms = np.empty(4 * columns, np.float32), np.zeros(_RUN * columns, np.float32)
-    return _Memory(wide, terms, np.empty(_RUN, np.int64), *places)
+    return wide, terms, np.empty(_RUN, np.int64), *places
 
 
 def _for_runs(brown):
@@ -377,13 +368,13 @@ def _single(weights):
 # No divisor is 0; without this check the loop is vectorized.
 @compiled
 def _foliage(lai, brown, background, table, flat, memory, values):
-    terms, starts, leaves, dead = memory.terms, memory.starts, memory.leaves, memory.dead
+    wide, terms, starts, leaves, dead = memory
     columns, of_ground, of_brown = np.uint64(table.coefficients.shape[2]), background.shape[1] > 1, brown.size > _RUN
     wrong, step = 0, int(of_ground)
     for first in range(0, lai.size, _RUN):
         cells, shares = lai[first : first + _RUN], brown[first : first + _RUN] if of_brown else brown
         wrong += _places(table, cells, shares, starts, leaves, dead)
-        _across(table.coefficients, flat, starts[: cells.size], leaves, dead, memory.wide, terms)
+        _across(table.coefficients, flat, starts[: cells.size], leaves, dead, wide, terms)
         for band in range(values.shape[0]):
             out = values[band, first : first + _RUN]
             below = background[band, first : first + _RUN] if of_ground else background[band]
@@ -398,7 +389,7 @@ def _foliage(lai, brown, background, table, flat, memory, values):
 
 @compiled
 def _crowned(lai, brown, cover, background, table, flat, crowns, memory, values):
-    terms, starts, leaves, dead = memory.terms, memory.starts, memory.leaves, memory.dead
+    wide, terms, starts, leaves, dead = memory
     inside, places, shares, parts = np.empty(_RUN), np.empty(_RUN, np.int64), np.empty(_RUN), np.empty(4 * _RUN)
     columns, of_ground, of_brown = np.uint64(table.coefficients.shape[2]), background.shape[1] > 1, brown.size > _RUN
     wrong, step = 0, int(of_ground)
@@ -409,7 +400,7 @@ def _crowned(lai, brown, cover, background, table, flat, crowns, memory, values)
         of_cells = inside[: cells.size]
         wrong += _places(table, of_cells, browns, starts, leaves, dead)
         if table.coefficients.shape[1] > 1:
-            _across(table.coefficients, flat, starts[: cells.size], leaves, dead, memory.wide, terms)
+            _across(table.coefficients, flat, starts[: cells.size], leaves, dead, wide, terms)
         else:
             _along(flat, columns, starts[: cells.size], leaves, terms)
         _rooms(crowns, crowned, places, shares)

@@ -36,29 +36,24 @@ _DEFAULT_BACKGROUND = {"soil_dry": 0.475, "shade": 0.525}
 def optics_of_leaf(bands, leaf):
     """Reflectance and transmittance of a leaf, by default green tallgrass, shape (band,), read-only. [1]"""
     if leaf is None:
-        known = _default_leaves()
+        known = files.table("leaf_optics.csv").set_index("band").T.to_dict("list")
         found = band_leaf_optics(bands, known | _leaf_means(_lacking(known, bands), Leaf()))
     else:
         found = band_leaf_optics(bands, _leaf_means(_responses(bands, "Leaf"), leaf))
     return tuple(map(read_only, found))
 
 
-def is_even(leaf):
-    """Whether a leaf is the default one, or described by numbers."""
-    return leaf is None or (isinstance(leaf, Leaf) and not leaf.varying())
-
-
 @cached(64, "default background in bands")
 def default_background(bands):
     """Reflectance of soil and litter of tallgrass, shape (band,), read-only. [1]"""
-    known = _default_background()
+    known = files.table("background.csv").set_index("band")["background"].to_dict()
     mixed = _background_means(_lacking(known, bands), Background(_DEFAULT_BACKGROUND))
     return read_only(band_background(bands, known | mixed))
 
 
 def band_leaf_optics(bands, given=None):
     """Leaf reflectance and transmittance of bands, shape (band,). [1]"""
-    if is_even(given):
+    if given is None or (isinstance(given, Leaf) and not given.varying()):
         return tuple(each.copy() for each in optics_of_leaf(tuple(bands), given))
     if is_path(given):
         given = read_spectrum(_csv(given), LeafSpectrum)
@@ -97,16 +92,6 @@ def _csv(path):
             "reflectance and transmittance [1], or a fifesim.Leaf"
         )
     return path
-
-
-@cached(1, "default leaf optics")
-def _default_leaves():
-    return files.table("leaf_optics.csv").set_index("band").T.to_dict("list")
-
-
-@cached(1, "default background")
-def _default_background():
-    return files.table("background.csv").set_index("band")["background"].to_dict()
 
 
 def _names(bands):

@@ -9,7 +9,7 @@ import numpy as np
 
 from fifesim.base import files
 from fifesim.base.arguments import Array, NumberOrArray, described
-from fifesim.base.arrays import as_rows, compiled, jitable, numbers
+from fifesim.base.arrays import as_rows, compiled, jitable
 from fifesim.base.caches import cached
 
 # Absorbing constituents of a leaf: unit and largest plausible content.
@@ -185,12 +185,12 @@ def _leaf(contents, constants):
     absorption, structure = 0 * contents[0], contents[0]
     for number in range(1, contents.size):
         absorption += contents[number] * constants[number - 1]
-    tau = _transmissivity(absorption / structure)
+    tau = layer_transmissivity(absorption / structure)
     cone, hemisphere, leaving = constants[-3], constants[-2], constants[-1]
     # One layer that is lit from outside, and one between others.
-    top_reflectance, top_transmittance = _plate(cone, leaving, tau)
-    reflectance, transmittance = _plate(hemisphere, leaving, tau)
-    below_reflectance, below_transmittance = _pile(reflectance, transmittance, structure - 1)
+    top_reflectance, top_transmittance = plate(cone, leaving, tau)
+    reflectance, transmittance = plate(hemisphere, leaving, tau)
+    below_reflectance, below_transmittance = pile(reflectance, transmittance, structure - 1)
     multiple = top_transmittance / (1 - below_reflectance * reflectance)
     return top_reflectance + multiple * below_reflectance * transmittance, multiple * below_transmittance
 
@@ -202,31 +202,17 @@ def _number(name, value):
         raise TypeError(f"Leaf: {name} must be a number, or a raster, got {described(value)}") from None
 
 
-def layer_transmissivity(absorption):
-    r"""
-    Isotropic transmittance of an absorbing layer without its surfaces [1], from its absorption k [1]. :math:`\tau = (1
-    - k) \, e^{-k} + k^2 E_1(k)` with :math:`E_1` the exponential integral, [Jacquemoud1990]_.
-    """
-    shape, rows = as_rows(numbers(absorption))
-    tau = np.empty_like(rows[0])
-    _transmissivities(rows[0], tau)
-    return tau.reshape(shape)[()]
-
-
-@compiled
-def _transmissivities(absorption, tau):
-    """Transmittance of each of some layers."""
-    for layer in range(absorption.size):
-        tau[layer] = _transmissivity(absorption[layer])
-
-
 # Coefficients of k^n in E1(k) + ln(k), which is entire; 40 reach rounding up to k = 4.
 _SERIES = np.array([-np.euler_gamma, *(-((-1) ** n) / (n * math.factorial(n)) for n in range(1, 41))])
 
 
 @jitable
-def _transmissivity(k):
-    """Transmittance of a layer, 2 E3(k): by the series of E1, or a continued fraction [DLMF 8.9.2] of E3."""
+def layer_transmissivity(k):
+    r"""
+    Isotropic transmittance of an absorbing layer without its surfaces, from its absorption k. [1] :math:`\tau = (1 - k)
+    \, e^{-k} + k^2 E_1(k)`, which is 2 E3(k): by the series of E1, or a continued fraction [DLMF 8.9.2] of E3.
+    [Jacquemoud1990]_
+    """
     if k.real <= 0:
         return 1 + 0 * k
     if k.real > 4:
@@ -276,45 +262,17 @@ def interface_transmissivity(refractive_index, angle):
     return np.sum(passed * mu * _WEIGHTS, axis=-1) / np.sum(mu * _WEIGHTS)
 
 
-def plate(refractive_index, tau, angle):
-    """
-    Reflectance and transmittance of a layer of refractive index n and inner transmissivity `tau`, in a cone of light.
-    [Allen1969]_; [Jacquemoud1990]_
-    """
-    n = np.asarray(refractive_index, float)
-    return _plate(interface_transmissivity(n, angle), interface_transmissivity(n, 90.0) / n**2, tau)
-
-
 @jitable
-def _plate(entering, leaving, tau):
-    """Reflectance and transmittance of a layer from the transmissivities of its surfaces and its inside."""
+def plate(entering, leaving, tau):
+    """Reflectance and transmittance of a layer from the transmissivities of its surfaces and inside, [Allen1969]_."""
     inside = (1 - leaving) * tau
     transmittance = entering * tau * leaving / (1 - inside * inside)
     return 1 - entering + inside * transmittance, transmittance
 
 
-def pile(reflectance, transmittance, layers):
-    """
-    Reflectance and transmittance of a pile of equal layers under isotropic light; their number need not be whole. [1]
-    [Stokes1862]_
-    """
-    shape, rows = as_rows(reflectance, transmittance, layers)
-    found = np.empty_like(rows[:2])
-    _piles(*rows, found)
-    r, t = found.reshape(2, *shape)
-    return r[()], t[()]
-
-
-@compiled
-def _piles(reflectance, transmittance, layers, found):
-    """Reflectance and transmittance of each of some piles."""
-    for i in range(layers.size):
-        found[0, i], found[1, i] = _pile(reflectance[i], transmittance[i], layers[i])
-
-
 @jitable
-def _pile(r, t, layers):
-    """Reflectance and transmittance of a pile of layers with reflectance r and transmittance t."""
+def pile(r, t, layers):
+    """Reflectance and transmittance of a pile of layers of reflectance r above 0 and transmittance t, [Stokes1862]_."""
     square = (1 + r + t) * (1 + r - t) * (1 - r + t) * (1 - r - t)
     d = np.sqrt(square) if square.real > 0 else 0 * square
     a = (1 + r * r - t * t + d) / (2 * r)

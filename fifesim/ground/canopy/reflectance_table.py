@@ -32,88 +32,22 @@ _GROUNDS = (0.0, 0.5, 1.0)
 
 
 def canopy_reflectance(
-    lai,
-    leaf_reflectance,
-    leaf_transmittance,
-    background,
-    *,
-    sza,
-    vza=0.0,
-    raa=0.0,
-    leaf_angles="spherical",
-    hotspot=0.0,
-    diffuse_fraction=0.0,
-    brown=0.0,
-    dissociation=0.0,
-    brown_reflectance=None,
-    brown_transmittance=None,
-    crown_cover=1.0,
-    crown_shape=SHAPE,
-    exact=False,
-):
-    r"""
-    Reflectance factor of a canopy over its background, for every cell and band.
-
-    .. math:: \rho = (1 - f) \, r_{so}^* + f \, r_{do}^*
-
-    Parameters
-    ----------
-    lai : array
-        Leaf area index. NaN gives NaN. [m2 m-2]
-    leaf_reflectance, leaf_transmittance : array, shape (band,)
-        [1]
-    background : float, or array of shape (band,), (band,) + lai.shape or broadcastable
-        One dimension is bands, more are cells; NaN gives NaN. [1]
-    sza, vza, raa : float
-        [degree]
-    leaf_angles : optional
-        Whatever `leaf_angle_classes` accepts.
-    hotspot : float, optional
-        Ratio of leaf size to canopy height; 0 for none. [1]
-    diffuse_fraction : float or array, shape (band,), optional
-        Share of skylight in the irradiance. [1]
-    brown, dissociation : float, or array broadcastable to lai.shape, optional
-        Dead share of the leaf area, and how far it lies below the rest, as in `two_layers`; NaN gives NaN. [1]
-    brown_reflectance, brown_transmittance : array, shape (band,), optional
-        Optics of dead leaves, by default equal to green leaves. [1]
-    crown_cover : float, or array broadcastable to lai.shape, optional
-        Share of the ground below crowns, which hold all leaves; NaN gives NaN. [1]
-    crown_shape : float, optional
-        Crown diameter over height. [1]
-    exact : bool, optional
-        Compute each cell instead of interpolating.
-
-    Returns
-    -------
-    reflectance : array, shape (band,) + lai.shape
-        Within 1e-6 of the exact values. [1]
-
-    Raises
-    ------
-    ValueError
-        If leaf area index, leaf optics, background or shares are outside their range.
-
-    Notes
-    -----
-    Where the background is a number, its reflectance with the canopy is tabulated; where it is a raster, the layer's
-    reflectances and transmittances are tabulated, and combined with the background of each cell.
-
-    References
-    ----------
-    [Verhoef2007]_; [VerhoefBach2007]_
+    lai, leaf_reflectance, leaf_transmittance, background, *, sza, vza=0.0, raa=0.0, leaf_angles="spherical",
+    hotspot=0.0, diffuse_fraction=0.0, dead=None, crown_shape=SHAPE, exact=False, **shares,
+):  # fmt: skip
+    """
+    Reflectance factor of a canopy over its background for every cell and band, shape (band,) + lai.shape, within 1e-6.
+    [1] Leaf optics and those of dead leaves, a pair, have shape (band,); a background of one dimension is bands, more
+    are cells. Shares are those of `with_shares`. NaN gives NaN. [Verhoef2007]_; [VerhoefBach2007]_
     """
     lai, background = np.asarray(lai, float), np.asarray(background, float)
     leaf = leaf_reflectance, leaf_transmittance
-    dead = brown_reflectance, brown_transmittance
-    dead = None if any(each is None for each in dead) else dead
     bands = np.broadcast_shapes(*map(np.shape, (*leaf, diffuse_fraction)), background.shape[: background.ndim < 2])
-    if not 0 <= crown_shape < np.inf:
-        raise ValueError(f"crown_shape must be at least 0, got {crown_shape:g}: it is crown diameter over height")
     for optics in (leaf, dead or leaf):
         check_leaf_optics(*optics)
-    classes = leaf_angle_classes(leaf_angles)
-    scene = uniform_scene(leaf, diffuse_fraction, (sza, vza, raa), classes, hotspot, dead, crown_shape, bands)
-    scene = with_shares(scene, lai.shape, brown, dissociation, crown_cover)
+    angles = leaf_angle_classes(leaf_angles)
+    scene = uniform_scene(leaf, diffuse_fraction, (sza, vza, raa), angles, hotspot, dead, crown_shape, bands)
+    scene = with_shares(scene, lai.shape, **shares)
     check_cells(lai.reshape(-1), background, scene)
     return scene_reflectance(lai, background, scene, exact)
 
@@ -127,7 +61,7 @@ def scene_reflectance(lai, background, scene, exact=False):
         if scene.crown_cover != 1:
             check_crowns(lai, scene.crown_cover)
         if uniform:
-            return interpolation.interpolate(_surface_table(_per_band(background, (bands,)), scene), lai)
+            return interpolation.interpolate(surface_table(_per_band(background, (bands,)), scene), lai)
         return interpolation.interpolate_over(_layer_table(scene), lai, background)
     ground = np.broadcast_to(background, (bands,) if uniform else (bands, *cells)).reshape(bands, -1)
     if exact:
@@ -157,12 +91,6 @@ def with_shares(scene, cells, brown=0.0, dissociation=0.0, crown_cover=1.0):
         by_cell = np.ndim(share) > 0
         shares[name] = np.broadcast_to(np.asarray(share, float), cells).reshape(-1) if by_cell else float(share)
     return scene._replace(**shares)
-
-
-def surface_table(background, scene):
-    """Table of the reflectance of each band over leaf area, for a scene of numbers and a background for each band."""
-    check_background(background)
-    return _surface_table(tuple(background), scene)
 
 
 def directional_reflectance(
@@ -213,8 +141,9 @@ def _per_band(values, bands):
 
 
 @cached(32, "reflectance tables over one background")
-def _surface_table(background, scene):
-    """Table of the reflectance of each band."""
+def surface_table(background, scene):
+    """Table of the reflectance of each band over leaf area, for a scene of numbers and a background for each band."""
+    check_background(background)
     ground = np.array(background)[:, None]
     return interpolation.tabulate(
         lambda lai: model_reflectance(lai, ground, scene), decay(scene) / (scene.crown_cover or 1.0)
@@ -323,13 +252,15 @@ def model_reflectance(lai, background, scene):
 
 
 def cell_by_cell(lai, background, scene):
-    """Reflectance factor of cells by the models, one block of cells at a time."""
+    """Reflectance factor of cells by the models."""
+    return _by_block(model_reflectance, lai, background, scene, _BLOCK)
+
+
+def _by_block(model, lai, background, scene, size):
+    """Result of a model, shape (k, n), from one block of cells at a time."""
     background = np.broadcast_to(background, (len(background), lai.size))
-    out = np.empty(background.shape)
-    for start in range(0, lai.size, _BLOCK):
-        block = slice(start, start + _BLOCK)
-        out[:, block] = model_reflectance(lai[block], background[:, block], scene.part(block))
-    return out
+    blocks = [slice(start, start + size) for start in range(0, max(lai.size, 1), size)]
+    return np.concatenate([model(lai[each], background[:, each], scene.part(each)) for each in blocks], axis=1)
 
 
 def check_cells(lai, background, scene):
@@ -433,7 +364,8 @@ def scene_light(lai, background, scene, weights, part):
     # Tables have no axis for dissociation or crown cover, and no column for the ground.
     if part == "light" or isinstance(scene.dissociation, np.ndarray) or isinstance(scene.crown_cover, np.ndarray):
         check_cells(lai, ground, scene)
-        return _light_by_model(lai, ground, scene, weights, part).reshape(-1, *cells)
+        light = _by_block(lambda *some: _model_light(*some, weights, part), lai, ground, scene, _LIGHT_BLOCK)
+        return light.reshape(-1, *cells)
     if isinstance(scene.brown, np.ndarray):
         table = _light_foliage_table(scene._replace(brown=-1.0), part)
         by_band, wrong = interpolation.interpolate_foliage(table, lai, scene.brown, ground)
@@ -443,13 +375,6 @@ def scene_light(lai, background, scene, weights, part):
         check_cells(lai, ground, scene)
         by_band = interpolation.interpolate_over(_light_terms_table(scene, part), lai, ground)
     return (np.array(weights) @ by_band).reshape(1, *cells)
-
-
-def _light_by_model(lai, ground, scene, weights, part):
-    """Light of cells by the model, shape (1, n) or (4, n), one block of cells at a time."""
-    blocks = [slice(start, start + _LIGHT_BLOCK) for start in range(0, lai.size, _LIGHT_BLOCK)]
-    found = [_model_light(lai[each], ground[:, each], scene.part(each), weights, part) for each in blocks]
-    return np.concatenate(found or [np.empty((4 if part == "light" else 1, 0))], axis=1)
 
 
 def _model_light(lai, ground, scene, weights, part):

@@ -48,6 +48,13 @@ def check_arp(arp):
         )
 
 
+def check_streaming_arp(arp, remedy="use larger cells for a longer range"):
+    """Raise ValueError if an autoregressive parameter is invalid, or too large for the streaming field."""
+    check_arp(arp)
+    if arp > LARGEST_STREAMING_ARP:
+        raise ValueError(f"arp must be at most {LARGEST_STREAMING_ARP} for the streaming field, got {arp:g}: {remedy}")
+
+
 def response(arp, u, v):
     r"""
     Frequency response of the simultaneous autoregressive process.
@@ -380,13 +387,9 @@ def streaming_field(seed, arp, row, column, shape):
 
 def mixed_field(weights, arp, row, column, shape, *, tile=FIELD_TILE):
     """Field of a mixture of noises by place, with zero mean and unit variance, shape (rows, columns). [1]"""
-    check_arp(arp)
+    check_streaming_arp(arp, 'use method="periodic"')
     for seed in weights:
         check_seed(seed)
-    if arp > LARGEST_STREAMING_ARP:
-        raise ValueError(
-            f'arp must be at most {LARGEST_STREAMING_ARP} for the streaming field, got {arp:g}: use method="periodic"'
-        )
     make_tile = partial(_tile if tile == FIELD_TILE else _small_tile, tile, tuple(weights.items()), arp)
     return assemble(make_tile, tile, row, column, shape)
 

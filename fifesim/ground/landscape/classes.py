@@ -17,7 +17,7 @@ from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background, Spectrum
-from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp, check_coarser
+from fifesim.ground.landscape.autoregression import check_coarser, check_streaming_arp
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
 
 # Properties between 0 and 1.
@@ -70,9 +70,7 @@ class Field:
         if not abs(self.mean) <= 1:
             raise ValueError(f"Field: mean must be in [-1, 1], got {self.mean:g}")
         check_coarser(self.coarser)
-        check_arp(self.arp)
-        if self.arp > LARGEST_STREAMING_ARP:
-            raise ValueError(f"Field: arp must be at most {LARGEST_STREAMING_ARP}, got {self.arp:g}")
+        check_streaming_arp(self.arp)
 
     def distribution(self, name: str) -> FrozenDistribution:
         """
@@ -169,9 +167,7 @@ class CoverClass:
         if self.arp is not None:
             if not _is_number(self.arp):
                 raise TypeError(f"arp must be a number, got {described(self.arp)}")
-            check_arp(self.arp)
-            if self.arp > LARGEST_STREAMING_ARP:
-                raise ValueError(f"arp must be at most {LARGEST_STREAMING_ARP} in a landscape, got {self.arp:g}")
+            check_streaming_arp(self.arp)
         if self.code is not None:
             _check_code(self.code)
         if _is_number(self.lai):

@@ -36,12 +36,7 @@ def treatments() -> list[str]:
     >>> treatments()
     ['burned-grazed', 'burned-ungrazed', 'unburned-ungrazed']
     """
-    return list(_treatments())
-
-
-@cached(1, "names of treatments")
-def _treatments():
-    return tuple(files.table("lai_distributions.csv")["treatment"].tolist())
+    return files.table("lai_distributions.csv")["treatment"].tolist()
 
 
 def lai_distribution(source: LaiDistribution) -> FrozenDistribution:

@@ -24,7 +24,7 @@ from fifesim.grids.grid import north_up
 from fifesim.grids.inputs import unpacked
 from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.landscape import downscaling
-from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp, window_field
+from fifesim.ground.landscape.autoregression import check_streaming_arp, window_field
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.lai_labels import distribution_name, one_layer
 
@@ -231,11 +231,7 @@ def downscale(
     True
     """
     grid, seed = grids.check_grid(grid), check_seed(seed)
-    check_arp(arp)
-    if arp > LARGEST_STREAMING_ARP:
-        raise ValueError(
-            f"arp must be at most {LARGEST_STREAMING_ARP}, got {arp:g}: use larger cells for a longer range"
-        )
+    check_streaming_arp(arp)
     pixels = one_layer(unpacked(north_up(lai)))
     cf.check_quantity(pixels, "lai")
     lattice = pixel_lattice(pixels, grid)

@@ -23,6 +23,7 @@ from fifesim.grids.directions import Directions
 from fifesim.grids.inputs import FileOrRaster, unpacked
 from fifesim.grids.sites import is_fife, made_on_site
 from fifesim.grids.warp import file_onto_grid, raster_onto_grid
+from fifesim.ground.canopy.leaf_area import check_share
 from fifesim.ground.canopy.soil import check_brightness
 from fifesim.ground.landscape import distribution
 from fifesim.ground.landscape.autoregression import FIELD_TILE, check_arp, streaming_field
@@ -315,7 +316,7 @@ def _of_fields(codes, tables, arps, cover, field_of):
 
 def _property(name, given, grid, chunks, allow_remote):
     """Property as a number or a raster on the grid."""
-    check = check_brightness if name == "soil" else partial(_check_share, name)
+    check = check_brightness if name == "soil" else partial(check_share, name)
     if isinstance(given, Number):
         return cf.label(xr.DataArray(check(float(given))), name, history=f"landscape: {name} {given:g}")
     if isinstance(given, xr.DataArray):
@@ -329,11 +330,3 @@ def _property(name, given, grid, chunks, allow_remote):
         )
     shares = grids.place(chunking.pointwise(check, found), grid)
     return cf.label(shares, name, history=f"landscape: {name} of a raster")
-
-
-def _check_share(name, values):
-    """Raise ValueError for values outside 0 to 1; NaN passes."""
-    wrong = (np.asarray(values) < 0) | (np.asarray(values) > 1)
-    if wrong.any():
-        raise ValueError(f"{name} must be in [0, 1], got {np.asarray(values)[wrong].flat[0]:g}: it is a fraction")
-    return values

@@ -27,8 +27,6 @@ from fifesim.ground.canopy.leaf_area import check_map, check_source, warn_of_lar
 from fifesim.ground.landscape.autoregression import FIELD_TILE, check_arp, periodic_field, streaming_field
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
 
-FIELD_METHODS = ("streaming", "periodic")
-
 _REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
 
 
@@ -95,8 +93,6 @@ def lai_scene(
     check_arp(arp)
     seed = check_seed(seed)
     density = lai_distribution(distribution)
-    if method not in FIELD_METHODS:
-        raise ValueError(f"method must be one of {', '.join(FIELD_METHODS)}, got {method!r}")
     if method == "streaming":
         cells = _streaming_cells(grid, density, arp, seed)
         # A first window raises errors of streaming_field before anything lazy is built.

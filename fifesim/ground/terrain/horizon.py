@@ -216,33 +216,9 @@ def sky_factor(vector, east, north):
 
 
 def horizon_sky_view(tangents, directions, east, north):
-    r"""
-    Sky view factor of slopes under a known horizon.
-
-    .. math::
-
-        V_d = \frac{1}{2\pi} \int_0^{2\pi} \left[ \cos S \sin^2 H
-            + \sin S \cos(\phi - A) \, (H - \sin H \cos H) \right] d\phi
-
-    with H the lower of the zenith angles of the horizon of the land around, of the slope's own, and 90 degrees.
-
-    Parameters
-    ----------
-    tangents, directions, east, north
-        As in `sky_vector`.
-
-    Returns
-    -------
-    sky_view : array, shape (...)
-        1 on an open plain. [1]
-
-    Notes
-    -----
-    The integral is exact for a horizon of great circles between the directions, such as the horizon of any plane.
-
-    References
-    ----------
-    [DozierFrew1990]_, Eq. 7b
+    """
+    Sky view factor of slopes under a known horizon, 1 on an open plain, [DozierFrew1990]_, Eq. 7b. [1] Arguments as in
+    `sky_vector`: the integral is exact for a horizon of great circles between the directions.
     """
     return sky_factor(Vector(*sky_vector(tangents, directions, east, north)), east, north)
 

@@ -228,10 +228,15 @@ class Sunlight(NamedTuple):
     horizon: xr.DataArray | None = None  # as in `sky_view`. [degree]
 
 
+# History of results, and name of Kt.
+_KT = "kt: Eq. 4", "kt"
+_EQUATIONS = {True: "terrain: Kt (Eq. 4) and view cosine (Eq. 5)", False: "terrain: Kt (Eq. 4)"}
+
+
 def kt_on_slopes(reflectance, light):
     """Topographic correction factor Kt [1] of each band, for a level reflectance (band, y, x) and its Sunlight."""
     level = reflectance.transpose("band", "y", "x")
-    return _labelled_kt(_lit(slope_factor, level, light), level, light)
+    return labelled_slopes(_lit(slope_factor, level, light), level, light, *_KT)
 
 
 def terrain_reflectance(reflectance, light, upwelling=True):
@@ -240,7 +245,7 @@ def terrain_reflectance(reflectance, light, upwelling=True):
     # at the resolution of the source of the elevation, and interpolated.
     cf.check_units(reflectance, "surface_reflectance")
     level = reflectance.transpose("band", "y", "x")
-    return _labelled_reflectance(_lit(slope_reflectance, level, light, upwelling), level, light, upwelling)
+    return labelled_slopes(_lit(slope_reflectance, level, light, upwelling), level, light, _EQUATIONS[upwelling])
 
 
 def slope_kt_and_reflectance(reflectance, light, upwelling=True):
@@ -248,7 +253,7 @@ def slope_kt_and_reflectance(reflectance, light, upwelling=True):
     cf.check_units(reflectance, "surface_reflectance")
     level = reflectance.transpose("band", "y", "x")
     kt, seen = chunking.along_first(_lit(slope_factor_and_reflectance, level, light, upwelling, leading=(2,)))
-    return _labelled_kt(kt, level, light), _labelled_reflectance(seen, level, light, upwelling)
+    return labelled_slopes(kt, level, light, *_KT), labelled_slopes(seen, level, light, _EQUATIONS[upwelling])
 
 
 def _lit(kernel, level, light, *options, leading=()):
@@ -260,21 +265,7 @@ def _lit(kernel, level, light, *options, leading=()):
     return on_slopes(kernel_in_light, light.dem, light.horizon, light.geometry, level, leading=leading)
 
 
-def labelled_slopes(data, level, light, history):
-    """Label reflectance on slopes, made from the ground on level ground and the light on its slopes."""
-    return _labelled(data, level, light, "surface_reflectance", history)
-
-
-def _labelled_kt(data, level, light):
-    return _labelled(data, level, light, "kt", "kt: Eq. 4")
-
-
-def _labelled_reflectance(data, level, light, upwelling):
-    equations = "Kt (Eq. 4) and view cosine (Eq. 5)" if upwelling else "Kt (Eq. 4)"
-    return _labelled(data, level, light, "surface_reflectance", f"terrain: {equations}")
-
-
-def _labelled(data, level, light, name, history):
+def labelled_slopes(data, level, light, history, name="surface_reflectance"):
     """Label a band raster made from the reflectance of level ground and the light on its slopes."""
     out = directions.with_geometry(grids.place(level.copy(data=data), grids.geobox(level)), light.geometry)
     return cf.label(out, name, source=level, history=history, references=REFERENCE)

@@ -54,7 +54,8 @@ def slope_light(dem, sky, cell, geometry):
     """
     rows, columns = dem.shape
     light = SlopeLight(*np.empty((len(SlopeLight._fields), rows - 2, columns - 2)))
-    _slope_light(*_contiguous(dem, sky), _setting(cell, geometry), light)
+    sky = sky._replace(layers=np.ascontiguousarray(sky.layers, float))
+    _slope_light(np.ascontiguousarray(dem, float), sky, _setting(cell, geometry), light)
     return light
 
 
@@ -103,10 +104,6 @@ def _pass_over(reflectance, dem, sky, cell, geometry, direct, total, upwelling, 
             light.upwelling[:] = 1.0
         _slope_factors(rho, first, light, geometry.mu_s, *air, reflected, kt, out)
     return out
-
-
-def _contiguous(dem, sky):
-    return np.ascontiguousarray(dem, float), sky._replace(layers=np.ascontiguousarray(sky.layers, float))
 
 
 def _setting(cell, geometry):

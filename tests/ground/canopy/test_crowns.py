@@ -96,10 +96,6 @@ def test_spheres_full_of_leaves_are_nearer_with_crowns_than_without():
     assert abs(np.mean(found) - 1) < 0.03
 
 
-def test_leaves_are_within_the_crowns():
-    np.testing.assert_array_equal(lai_in_crowns([1.0, 1.0, np.nan], [0.5, 0.0, 0.0]), [2.0, 0.0, np.nan])
-
-
 @pytest.mark.parametrize(
     "lai, cover, message",
     [

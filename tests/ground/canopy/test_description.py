@@ -119,20 +119,8 @@ def test_other_fields_are_refused_by_name(field, error, message):
 
 def test_the_default_is_tallgrass_of_which_nothing_was_given():
     assert TALLGRASS.given == frozenset() and repr(TALLGRASS) == "Canopy()"
-    assert {name: getattr(Canopy(), name) for name in PROPERTIES} == {
-        "leaf_optics": None,
-        "leaf_angles": "spherical",
-        "model": "sail",
-        "hotspot": 0.0,
-        "brown": 0.0,
-        "dissociation": 0.0,
-        "brown_leaf": None,
-        "crown_cover": 1.0,
-        "crown_shape": 1.0,
-        "background": None,
-        "soil": 0.0,
-        "moisture": 0.0,
-    }
+    assert all(getattr(Canopy(), name) == known.default for name, known in PROPERTIES.items())
+    assert (Canopy().leaf_angles, Canopy().model) == ("spherical", "sail")
     assert fifesim.Setup().canopy is TALLGRASS and fifesim.CoverClass("grass").canopy is TALLGRASS
 
 

@@ -12,7 +12,6 @@ from fifesim import Canopy
 from fifesim.base.geometry import Geometry
 from fifesim.grids import directions
 from fifesim.grids import grid as grids
-from fifesim.ground.canopy import labels as canopy_labels
 from fifesim.ground.canopy import layers
 from fifesim.ground.canopy.labels import BandCanopy, Light, canopy_kernel, level_reflectance, reflectance_of_classes
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance
@@ -132,27 +131,6 @@ def test_each_class_is_its_canopy_alone(lai, cover):
         np.testing.assert_array_equal(made.values[:, cover == code], alone.values[:, cover == code])
     assert made.name == "surface_reflectance" and made.attrs["atmosphere"] == "none"
     assert made.attrs["leaf_angles"] == alone.attrs["leaf_angles"] and made.attrs["background"] == "by class"
-
-
-def test_classes_of_one_canopy_are_evaluated_together(lai, cover, monkeypatch):
-    """What differs by a number, or by another raster of the same values, is not."""
-    asked = []
-    real = canopy_labels.canopy_kernel
-    monkeypatch.setattr(
-        canopy_labels, "canopy_kernel", lambda *args, **given: asked.append(args) or real(*args, **given)
-    )
-    share = lai.drop_attrs(deep=False) / 10
-    alike = STANDS[3]._replace(canopy=Canopy(crown_cover=share, hotspot=0.1))
-    for other, kinds in (({}, 1), ({"hotspot": 0.2}, 2), ({"crown_cover": share.copy()}, 2), ({"crown_cover": 0.5}, 2)):
-        asked.clear()
-        changed = alike._replace(
-            canopy=alike.canopy.replace(**other), leaf=(np.array([0.07, 0.46]), np.array([0.04, 0.41]))
-        )
-        pair = {3: changed._replace(canopy=alike.canopy, leaf=tuple(map(np.copy, changed.leaf))), 8: changed}
-        made = reflectance_of_classes(lai, cover, BANDS, pair, LIGHT)
-        assert len(asked) == kinds
-        alone = level_reflectance(lai, BANDS, pair[8], LIGHT)
-        np.testing.assert_array_equal(made.values[:, cover == 8], alone.values[:, cover == 8])
 
 
 NAMES = ["red", "nir"]

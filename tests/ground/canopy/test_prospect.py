@@ -54,7 +54,9 @@ def test_nothing_is_lost_without_absorption(structure):
 @pytest.mark.parametrize("layers", [2, 5])
 def test_pile_is_its_layers_added_one_by_one(k, layers):
     """Also where absorption all but vanishes and Stokes' solution becomes 0 / 0: the layers lose at least k."""
-    r, t = prospect.plate(1.4, prospect.layer_transmissivity(k), 90.0)
+    entering = float(prospect.interface_transmissivity(1.4, 90.0))
+    surfaces = entering, entering / 1.4**2
+    r, t = prospect.plate(*surfaces, prospect.layer_transmissivity(k))
     reflectance, transmittance = r, t
     for _ in range(layers - 1):
         multiple = 1 - reflectance * r

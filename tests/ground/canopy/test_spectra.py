@@ -134,13 +134,6 @@ def test_spectra_need_responses():
         fifesim.Background(0.2)
 
 
-def test_dataset_without_reflectance_is_refused(lai):
-    with pytest.raises(ValueError, match="background: the Dataset has no reflectance"):
-        fifesim.surface_reflectance(
-            lai, "TM", canopy=fifesim.Canopy(background=xr.Dataset(coords={"wavelength": [0.4, 2.5]}))
-        )
-
-
 def at(wavelength):
     """Spectra of the library at a wavelength, shape (leaf, spectrum)."""
     known, spectra = library_spectra()

@@ -185,7 +185,7 @@ def test_field_is_that_of_the_paper_without_a_word_and_takes_limits():
         ({"arp": -0.01}, ValueError, "arp must be in"),
         ({"coarser": 0}, ValueError, "coarser must be in 1 to 100, got 0"),
         ({"coarser": 2.5}, TypeError, "coarser must be a whole number"),
-        ({"arp": 0.2499}, ValueError, "Field: arp must be at most 0.2498, got 0.2499"),
+        ({"arp": 0.2499}, ValueError, "arp must be at most 0.2498 for the streaming field, got 0.2499"),
         ({"sd": True}, TypeError, "sd must be a number"),
         ({"mean": "0.2"}, TypeError, r"Field: mean must be a number, got .*: type Field\(mean=0.2, sd=0.1\)"),
         ({"arp": None}, TypeError, "arp must be a number"),

@@ -62,18 +62,6 @@ def test_fields_correlate_as_asked(fields):
         assert r == pytest.approx(asked, abs=4 * standard_error(ARPS[one], ARPS[other], 600**2)), (one, other)
 
 
-def test_each_keeps_its_own_scale(fields):
-    """Mixtures of noise have the spectrum of the field's own arp."""
-    for name, arp in ARPS.items():
-        z = fields[name].values
-        assert z.std() == pytest.approx(1, abs=4 * standard_error(arp, arp, z.size))
-        found = np.mean(z[:, 1:] * z[:, :-1])
-        u = 2 * np.pi * np.arange(1024) / 1024
-        power = response(arp, u[:, None], u) ** 2
-        expected = np.mean(power * np.cos(u)) / power.mean()
-        assert found == pytest.approx(expected, abs=4 * standard_error(arp, arp, z.size))
-
-
 def test_a_name_has_the_same_field_beside_any_others(grid, fields):
     alone = correlated_fields(grid, {"sand": 0.1, "moisture": 0.05}, seed=7)
     beside = correlated_fields(grid, {"moisture": 0.05, "lai": 0.1}, seed=7)

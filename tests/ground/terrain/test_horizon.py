@@ -81,17 +81,6 @@ def test_cell_has_the_same_bits_in_every_window():
     np.testing.assert_array_equal(part, whole[:, 7:12, 3:5])
 
 
-@pytest.mark.parametrize("count", [0, 15, 16.5])
-def test_too_few_directions_are_refused(count):
-    with pytest.raises(ValueError, match="from 16 up"):
-        horizons.azimuths(count)
-
-
-def test_reach_below_a_cell_is_refused():
-    with pytest.raises(ValueError, match="at least one cell of 30 x 30 m, got 10 m"):
-        horizons.horizon_margin(30, 30, 10)
-
-
 def sky_of(slope, aspect, horizon):
     """Sky factor of slopes under a horizon of zenith angles [degree]."""
     directions = np.arange(len(horizon)) * (360 / len(horizon))

@@ -8,9 +8,7 @@ from oracles_terrain import hills, plane
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.grids import grid as grids
 from fifesim.ground.terrain import sky_labels as sky_raster
-from fifesim.ground.terrain.sky_labels import places_of
 
 SUN = Geometry(70.0, 117.0, 20.0, 40.0)
 
@@ -90,32 +88,3 @@ def test_small_and_coarse_rasters_have_horizons_too():
     np.testing.assert_allclose(fifesim.sky_view(tiny), 1, rtol=1e-12)
     wide = labelled(fifesim.grid_at("EPSG:26914", 700000, 4330000, 80000, 60000, 10000), np.full((6, 8), 7.0))
     np.testing.assert_allclose(fifesim.sky_view(wide), 1, rtol=1e-12)
-
-
-def test_windows_share_their_places():
-    """In metres; their cells are those of a coarse grid, and the nearest of the elevation."""
-    grid = fifesim.fife_site(30 / 9, window=((30, 195), (120, 294)))
-    whole, part = places_of(grid, 25.0), places_of(grid[50:120, 31:99], 25.0)
-    there = grids.coordinates(whole.coarse)
-    for axis, centres in grids.coordinates(part.coarse).items():
-        assert axis == "spatial_ref" or np.isin(centres, there[axis]).all()
-    rows, columns = part.cells
-    cells, coarse = grids.coordinates(part.grid), grids.coordinates(part.coarse)
-    np.testing.assert_allclose(cells["y"][rows], coarse["y"], rtol=0, atol=1e-6)
-    np.testing.assert_allclose(cells["x"][columns], coarse["x"], rtol=0, atol=1e-6)
-    assert part.cell == pytest.approx((80 / 3, 80 / 3)) and part.step == (8.0, 8.0)
-
-
-def test_cells_lie_between_places_by_their_distance():
-    """What rises evenly from place to place is met at every cell, in blocks as in the whole."""
-    grid = fifesim.fife_site(30 / 9, window=((30, 95), (120, 174)))
-    places = places_of(grid, 25.0)
-    values = (places.rows[:, None] * 2 - places.columns)[None].repeat(4, 0)
-    between = places.between((3, 5), (40, 30))
-    reads, (rows, columns) = between.reads(values), (slice(7, 29), slice(0, 11))
-    sky = between.sky(values[(..., *reads.window(rows, columns))], rows, columns)
-    layer = np.pad(sky.layers[0], ((0, 1), (0, 1)), mode="edge")
-    by_row = (1 - sky.row_share)[:, None] * layer[sky.row] + sky.row_share[:, None] * layer[sky.row + 1]
-    found = (1 - sky.column_share) * by_row[:, sky.column] + sky.column_share * by_row[:, sky.column + 1]
-    expected = 2 * (3 + np.arange(7, 29))[:, None] - (5 + np.arange(11))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
