@@ -123,7 +123,7 @@ def cloud_field(
         return each[0].assign(optical_thickness=joined(cells))
     grid = grids.check_grid(grid)
     base, top = _base_and_top(height)
-    mean, deviation = _pair(thickness, lambda single: (single, single))
+    mean, deviation = _pair(thickness)
     _check_range("cover", cover, 0, 1, "")
     _check_range("length", length, SHORTEST, LONGEST, " m")
     _check_range("margin", margin, 0, 200_000, " m")
@@ -165,12 +165,12 @@ def _day_and_seconds(time):
     return stamp.normalize().toordinal(), (stamp - stamp.normalize()).total_seconds()
 
 
-def _pair(value, doubled):
-    return tuple(map(float, value)) if np.ndim(value) else doubled(float(value))
+def _pair(value):
+    return tuple(map(float, value)) if np.ndim(value) else (float(value), float(value))
 
 
 def _base_and_top(height):
-    base, top = _pair(height, lambda single: (single, single))
+    base, top = _pair(height)
     _check_range("base", base, 0, HIGHEST_CLOUD, " m above the ground")
     _check_range("top", top, 0, HIGHEST_CLOUD, " m above the ground")
     if base > top:
@@ -263,7 +263,8 @@ def cast_clouds(
     text = f"cast_clouds: from optical thickness {least:g}"
     grid, names = grids.geobox(scene), {"shadow": "cloud_shadow"}
     for name, data in made.items():
-        cells = grids.place(xr.DataArray(data, dims=("y", "x")), grid)
+        # Toward nadir, the data are a window of the field.
+        cells = grids.place(xr.DataArray(data, dims=("y", "x")), grid).copy()
         made[name] = cf.label(cells, names.get(name, name), history=text, source=clouds[COLUMNS[0]])
     return directions.with_geometry(xr.Dataset(made), geometry)
 
@@ -304,11 +305,8 @@ def _checked(clouds, scene):
         )
     for name, quantity in quantities.items():
         cf.check_units(clouds[name], quantity)
-    thickness, base, top = (
-        with_crs_of(clouds[name].transpose("y", "x"), scene) if np.ndim(clouds[name]) else clouds[name]
-        for name in quantities
-    )
-    return thickness, base, top
+    fields = (clouds[name].astype(float, copy=False) for name in quantities)
+    return [with_crs_of(each.transpose("y", "x"), scene) if each.ndim else each for each in fields]
 
 
 def _layers(thickness, base, top, per_metre):

@@ -238,8 +238,7 @@ def _table(co_albedo):
         if number >= _FIRST - 1:
             reflectance, transmittance, direct = layer
             once = _scattered_once(thickness, co_albedo, mu, mu[:, None], backward)
-            fluxes = (weights @ each[:, 0] for each in (transmittance, reflectance))
-            passed, reflected = fluxes
+            passed, reflected = (weights @ each[:, 0] for each in (transmittance, reflectance))
             found.append(((reflectance - once)[..., :zeniths, :zeniths], direct[:, 0, 0] + passed, reflected))
             depths.append(thickness[:, 0, 0, 0])
     rescattered, passed, reflected = (np.concatenate(each) for each in zip(*found, strict=True))

@@ -295,6 +295,9 @@ def test_lazy_scene_has_the_bits_of_the_scene_in_memory(site, reflectance):
     xr.testing.assert_identical(lazy.compute(), whole)
     cells = reflectance.fifesim.cast_clouds(sky)
     xr.testing.assert_identical(reflectance.fifesim.to_toa(clouds=cells), whole)
+    before = sky.copy(deep=True)
+    cells["overhead_thickness"] += 1
+    xr.testing.assert_identical(sky, before)
 
 
 def test_dates_have_their_own_sun_and_sky(site):
