@@ -39,24 +39,6 @@ def test_summary_reads_rows_that_the_benchmarks_write(load):
     assert {summary.EACH, summary.INTERPOLATED} <= set(peers.ROWS)
 
 
-# A speed, floors, or how long a Landsat scene takes.
-_SPEED = re.compile(
-    r"million cells/s|\d[\d.,]* million (ground )?cells (a|per) second|\d[\d.,]* (times the )?floors?\b"
-    r"|185 km[^#]{0,120}?\b(\d+ s\b|\d+ min|minutes)"
-)
-
-
-def test_pages_state_no_other_speed(load):
-    summary = load("summary")
-    pages = [ROOT / "README.md", BENCHMARKS / "README.md", *(ROOT / "docs").rglob("*.md")]
-    pages += (ROOT / "docs" / "gallery_src").rglob("*.py")
-    found = []
-    for page in set(pages) - {ROOT / "docs" / "changes.md"}:
-        text = re.sub(f"{summary.FIRST}.*?{summary.LAST}", "", page.read_text("utf-8"), flags=re.DOTALL)
-        found += [(page.name, match[0]) for match in _SPEED.finditer(text)]
-    assert found == []
-
-
 def errors(peers, name, side):
     """Numbers of the errors of fifesim and of the other package."""
     make, module, _ = peers.ROWS[name]

@@ -18,6 +18,7 @@ TABLE = pd.read_csv(Path(__file__).parents[1] / "data" / "prosail_inversion.csv"
 CASES = [rows for _, rows in TABLE.groupby("case")]
 NANOMETRES = CASES[0].wavelength_nm.to_numpy()
 STEP = 1e-30
+SOILS = prosail.spectral_library.get_spectra().soil
 # Eighteen classes of prosail, whose fractions differ from exact ones by up to 0.001.
 ANGLES = LeafAngles((np.arange(18) + 0.5) * 5, campbell(57.3, 18))
 
@@ -41,8 +42,7 @@ def gap_in_twenty_steps(lai, ks, ko, alpha):
 def canopy(rows, lai):
     """Reflectance of canopies with the leaves, soil and directions of a case, shape (n, m)."""
     own = rows.iloc[0]
-    soils = prosail.spectral_library.get_spectra().soil
-    dry, wet = soils.rsoil1[NANOMETRES - 400], soils.rsoil2[NANOMETRES - 400]
+    dry, wet = SOILS.rsoil1[NANOMETRES - 400], SOILS.rsoil2[NANOMETRES - 400]
     ground = own.soil_brightness * (own.soil_moisture * dry + (1 - own.soil_moisture) * wet)
     leaf = rows.leaf_reflectance.to_numpy()[:, None], rows.leaf_transmittance.to_numpy()[:, None]
     directions = {"sza": own.sza, "vza": own.vza, "raa": own.raa}
@@ -53,7 +53,7 @@ def canopy(rows, lai):
 def test_lai_of_known_leaves_and_soil(monkeypatch):
     """Without prosail's approximate hot spot, LAI would differ by up to 0.011, because reflectance differs by 3e-4."""
     monkeypatch.setattr(sail_model, "bidirectional_gap", gap_in_twenty_steps)
-    for rows in (each for each in CASES if each.lai.iloc[0] <= 4):
+    for rows in [each for each in CASES if each.lai.iloc[0] <= 4]:
         found = optimal_estimation(
             rows.canopy_reflectance.to_numpy()[None],
             lambda states, pixels, rows=rows: slope_of(lambda lai: canopy(rows, lai), states),

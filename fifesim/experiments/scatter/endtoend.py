@@ -12,6 +12,7 @@ from fifesim.analysis.scaling_labels import aggregate_blocks
 from fifesim.chain.steps import ndvi as ndvi_of
 from fifesim.experiments.scatter import errors
 from fifesim.experiments.scatter import shares as scatter
+from fifesim.experiments.scatter.report import draw_bars, finish_bars
 from fifesim.experiments.scatter.stages import IDEAL_PROPERTIES, scene_of
 from fifesim.grids import cf
 from fifesim.grids import grid as grids
@@ -88,21 +89,9 @@ def error_chart(table, target):
     axes = figure.subplots(1, 2, sharey=True)
     labels = {"bias": f"bias [% of the mean {_word(target)}]", "variance": "variance [% of the total variance]"}
     for axis, (kind, label) in zip(axes, labels.items(), strict=True):
-        share, error = rows[kind].to_numpy(float), np.nan_to_num(rows[f"{kind}_error"].to_numpy(float))
-        at = np.arange(len(rows))
-        axis.barh(at, np.nan_to_num(share), 0.6, color=_COLOURS[kind])
-        axis.errorbar(np.nan_to_num(share), at, xerr=error, fmt="none", ecolor="#222222", elinewidth=1, capsize=2.5)
-        for y, value, spread in zip(at, share, error, strict=True):
-            text = "cannot be switched off" if np.isnan(value) else report.fixed(value, 1)
-            axis.annotate(text, (max(np.nan_to_num(value) + spread, 0), y), (4, 0), textcoords="offset points",
-                          va="center", fontsize=7.5)  # fmt: skip
-        axis.axvline(0, color="#222222", linewidth=0.8)
-        axis.margins(x=0.16)
-        axis.set_xlabel(label, fontsize=9)
-        axis.tick_params(labelsize=8.5)
-        axis.spines[["top", "right", "left"]].set_visible(False)
-    axes[0].set_yticks(np.arange(len(rows)), rows["stage"])
-    axes[0].invert_yaxis()
+        share, error = (rows[name].to_numpy(float) for name in (kind, f"{kind}_error"))
+        draw_bars(axis, np.arange(len(rows)), share, error, 0.6, "cannot be switched off", color=_COLOURS[kind])
+        finish_bars(axis, rows["stage"], label)
     return figure
 
 

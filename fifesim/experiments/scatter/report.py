@@ -48,30 +48,38 @@ def bar_chart(table):
         label = f"{variable.upper()}: {fixed(total['share'], 1)}{plus_minus(total['share_error'], 1)} % in total"
         at = np.arange(len(names)) + 0.2 * (2 * k - 1)
         share, error = (100 * rows.loc[list(names), name].to_numpy(float) for name in ("share", "share_error"))
-        axis.barh(at, share, 0.38, color=color, hatch=hatch, edgecolor="white", linewidth=0, label=label)
-        axis.errorbar(share, at, xerr=np.nan_to_num(error), fmt="none", ecolor="#222222", elinewidth=1, capsize=2.5)
-        longest = np.nanmax(np.abs(share))
-        for y, value, spread in zip(at, share, np.nan_to_num(error), strict=True):
-            if np.isnan(value):
-                axis.barh(y, longest, 0.38, color="none", edgecolor="#999999", hatch="xxxx", linewidth=0)
-                axis.annotate("unknown", (longest, y), (5, 0), textcoords="offset points", va="center", fontsize=7)
-                continue
-            # A stage without any effect is already ideal.
-            text = "0" if value == 0 else fixed(value, 1)
-            # Beyond the end of bar and whisker.
-            end = max(value + spread, 0), y
-            axis.annotate(text, end, (5, 0), textcoords="offset points", va="center", fontsize=7)
-    axis.axvline(0, color="#222222", linewidth=0.8)
-    axis.set_yticks(np.arange(len(names)), names)
-    axis.invert_yaxis()
-    axis.margins(x=0.08)
-    axis.set_xlabel("share of the variance not explained by a line on NDVI [%]", fontsize=9)
-    axis.tick_params(labelsize=8.5)
-    axis.tick_params(axis="y", length=0)
-    axis.spines[["top", "right", "left"]].set_visible(False)
+        draw_bars(axis, at, share, error, 0.38, "unknown", color=color, hatch=hatch, label=label)
+    finish_bars(axis, names, "share of the variance not explained by a line on NDVI [%]")
     # Above the axes, clear of long bars.
     figure.legend(frameon=False, fontsize=8.5, loc="outside upper center", ncols=2)
     return figure
+
+
+def draw_bars(axis, at, share, error, height, missing, **style):
+    """Horizontal bars with whiskers and numbers; a hatched bar and a text where a share is NaN."""
+    error, longest = np.nan_to_num(error), np.nanmax(np.abs(share))
+    axis.barh(at, share, height, edgecolor="white", linewidth=0, **style)
+    axis.errorbar(share, at, xerr=error, fmt="none", ecolor="#222222", elinewidth=1, capsize=2.5)
+    for y, value, spread in zip(at, share, error, strict=True):
+        if np.isnan(value):
+            axis.barh(y, longest, height, color="none", edgecolor="#999999", hatch="xxxx", linewidth=0)
+        # A stage without any effect is already ideal.
+        text = missing if np.isnan(value) else "0" if value == 0 else fixed(value, 1)
+        # Beyond the end of bar and whisker.
+        end = longest if np.isnan(value) else max(value + spread, 0)
+        axis.annotate(text, (end, y), (5, 0), textcoords="offset points", va="center", fontsize=7)
+
+
+def finish_bars(axis, names, label):
+    """Names of the bars from top to bottom, the label of their axis, and its frame."""
+    axis.axvline(0, color="#222222", linewidth=0.8)
+    axis.set_yticks(np.arange(len(names)), names)
+    axis.yaxis.set_inverted(True)
+    axis.margins(x=0.16)
+    axis.set_xlabel(label, fontsize=9)
+    axis.tick_params(labelsize=8.5)
+    axis.tick_params(axis="y", length=0)
+    axis.spines[["top", "right", "left"]].set_visible(False)
 
 
 def _shown(table):

@@ -18,6 +18,7 @@ from fifesim.experiments.verification import areas, atmosphere
 DATA = Path(__file__).parents[2] / "data"
 
 
+@pytest.mark.slow
 def test_successive_orders_without_polarization_are_scalar_6s(monkeypatch):
     """Scalar 6S is not always consistent in itself: its table has fewer cases."""
     scalar, table = pd.read_csv(DATA / "sixs_scalar.csv", comment="#"), files.table
