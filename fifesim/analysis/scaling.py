@@ -376,7 +376,7 @@ def shapley(values, causes):
     for cause in range(causes):
         added = np.diff(values, axis=cause).squeeze(axis=cause)
         # Number of other causes at work in each set.
-        others = np.indices((2,) * (causes - 1)).sum(axis=0) if causes > 1 else np.zeros((), int)
+        others = np.indices((2,) * (causes - 1)).sum(axis=0)
         weights = np.array([factorial(n) * factorial(causes - n - 1) / factorial(causes) for n in range(causes)])
         shares.append(np.tensordot(weights[others], added, axes=causes - 1))
     return np.array(shares).reshape(causes, *values.shape[causes:])

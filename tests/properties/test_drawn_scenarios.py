@@ -1,7 +1,7 @@
 """
 Whatever is typed into a scenario: it is refused in a few lines, or it runs.
 
-Keys are drawn from the schema, a new one without a change here. A few hundred scenarios in the suite; ten thousand by
+Keys are drawn from the schema, a new one without a change here. 150 scenarios in the suite; ten thousand by
 
     FIFESIM_DRAWS=10000 pytest tests/properties/test_drawn_scenarios.py --hypothesis-show-statistics
 """

@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-import xarray as xr
 from elevations import write
 
 import fifesim
@@ -80,11 +79,6 @@ def test_what_varies_is_found(sections, found):
     assert tuple(name for name in working_stages(case) if name in IDEAL_PROPERTIES) == found
 
 
-def test_with_all_at_work_the_ground_is_as_it_is(ideal, whole):
-    xr.testing.assert_identical(ideal(), whole)
-    assert all(each.chunks is None for each in ideal().data_vars.values())
-
-
 def test_without_a_property_only_that_is_even(ideal, whole):
     """As `PROPERTIES` says; all else has the same bits, of the same random numbers."""
     changed = {"soil": {"soil", "moisture"}, "dead leaves": {"brown"}, "cover": {"cover"}, "clumping": {"crown_cover"}}
@@ -138,23 +132,3 @@ def test_pixels_without_a_property_are_those_of_a_scenario_without_it():
         ndvi, fpar = seen.ndvi[at], np.broadcast_to(seen.truth["fpar"], seen.ndvi.shape)[at]
         np.testing.assert_array_equal(ndvi, run["image"]["ndvi"].values.ravel(), err_msg=str(own))
         np.testing.assert_array_equal(fpar, run["truth"]["fpar"].values.ravel(), err_msg=str(own))
-
-
-@pytest.fixture(scope="module")
-def found():
-    """Budget of soil over two classes."""
-    land = {"cover": "voronoi", "size": 60.0, "deviations": {"soil": 0.05}, "arps": {"soil": 0.24}}
-    litter = {"background_spectra": {"dead_grass": 0.6, "shade": 0.4}, "distribution": "unburned-ungrazed"}
-    case = case_of(ground={"brown": 0.2}, landscape=land, classes={"grass": {}, "litter": litter})
-    return case, fifesim.budget(case, realisations=1)
-
-
-def test_soil_and_cover_scatter_and_what_does_not_vary_has_exactly_nothing(found):
-    case, budget = found
-    assert varying_ground(case) == ("soil", "cover")
-    for name in ("share", "alone", "first"):
-        nothing = budget[name].sel(stage=["dead leaves", "covariance", "clumping", "topography"])
-        assert (nothing == 0).all()
-        assert (budget[name].sel(stage=["soil", "cover"]) != 0).all()
-    assert (budget["share"].sel(stage="soil") > 0).all() and (budget["first"].sel(stage="soil") > 0).all()
-    assert (budget["share"].sel(stage="cover") > 0).all()

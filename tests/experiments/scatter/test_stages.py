@@ -171,29 +171,12 @@ def cells(scene):
     return np.stack([red, nir, (nir - red) / (nir + red)])
 
 
-def blocks(cells):
-    return cells.reshape(len(cells), 10, 9, 10, 9).mean((2, 4))
-
-
-def test_scaling_is_the_ndvi_of_the_mean_reflectances(scene, cells):
-    found = images_of(scene, cells, ((False, True), *IDEAL[1:]))
-    red, nir, of_cells = blocks(cells)[:, : scene.shape[0], : scene.shape[1]]
-    assert found.shape == (2, 1, 1, 1, 1, *scene.shape)
-    np.testing.assert_allclose(found[0, 0, 0, 0, 0], of_cells, atol=1e-12)
-    np.testing.assert_allclose(found[1, 0, 0, 0, 0], (nir - red) / (nir + red), atol=1e-12)
-
-
 def test_counts_move_an_ideal_image_by_what_they_move_that_of_the_means(scene, cells):
     """Whether NDVI is of cells or of means, the detector's steps are the same, and not larger than a count or two."""
     found = images_of(scene, cells, ((False, True), (False,), (False,), (False, True), (False,)))[:, 0, 0, :, 0]
     steps = found[:, 1] - found[:, 0]
     np.testing.assert_allclose(steps[0], steps[1], atol=1e-12)
     assert 1e-4 < np.abs(steps).max() < 0.03
-
-
-def test_a_displaced_image_sees_the_pixel_beside(scene, cells):
-    found = images_of(scene, cells, ((False,), (False,), (False, True), (False,), (False,)))[0, 0, :, 0, 0]
-    np.testing.assert_allclose(found[1, :, :-1], found[0, :, 1:], atol=1e-12)
 
 
 # Seven cells of 10 m along each axis: two blocks of 30 m, and a cell of none.
