@@ -17,6 +17,7 @@ from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.response.scan import Orbit, passes
 
+_LOWEST_SUN = 85.0  # zenith angle up to which a pass is by day [degree]
 _EPOCH = pd.Timestamp("1970-01-01", tz="UTC")
 
 
@@ -74,6 +75,38 @@ def overpasses(
     [16.0, 16.0]
     """
     description = find_instrument(instrument)
+    orbit = _orbit_of(description)
+    first, last = utc(start, "start")[0], utc(end, "end")[0]
+    if not first < last:
+        raise ValueError(f"end must be after start, got {end} and {start}: swap them")
+    latitude, longitude = map(float, place)
+    if not (-85 <= latitude <= 85 and -180 <= longitude <= 360):
+        raise ValueError(f"place must be latitude, from -85 to 85, and longitude, got {tuple(place)}: swap them?")
+    if not np.isfinite(phase):
+        raise ValueError(f"phase must be a finite number of days, got {phase:g}")
+    # Phases count from 1970, so that parts of a period have the dates of the whole.
+    origin = _EPOCH + pd.Timedelta(days=phase)
+    since, until = ((each - origin).total_seconds() for each in (first, last))
+    seconds, vza, vaa, ascending = passes(orbit, since, until, latitude, longitude, description.max_angle)
+    times = (origin + pd.to_timedelta(seconds, unit="s")).round("s").tz_localize(None)
+    by_day = np.zeros(0, int)
+    if len(times):
+        sun = sun_position(list(times), latitude, longitude)
+        by_day = np.flatnonzero(sun["sza"].values < _LOWEST_SUN)
+    if not by_day.size:
+        raise ValueError(
+            f"{description.name} has no pass by day over {latitude:g}, {longitude:g} in this period: choose a longer "
+            "one"
+        )
+    view = {"vza": vza, "vaa": vaa}
+    out = sun.assign({name: ("time", each, cf.attributes(name)) for name, each in view.items()})
+    out = out.assign(ascending=("time", ascending, {"long_name": "whether the satellite flies north"}))
+    out.attrs = {"instrument": description.name, "altitude": description.altitude}
+    return out.isel(time=by_day)
+
+
+def _orbit_of(description):
+    """Nominal orbit of an instrument."""
     table = files.table("orbits.csv").set_index("instrument")
     if description.name not in table.index:
         raise ValueError(
@@ -81,40 +114,8 @@ def overpasses(
             "make dates with fifesim.sun_position"
         )
     row = table.loc[description.name]
-    first, last = utc(start, "start")[0], utc(end, "end")[0]
-    if not first < last:
-        raise ValueError(f"end must be after start, got {end} and {start}: swap them")
-    latitude, longitude = map(float, place)
-    if not (-85 <= latitude <= 85 and -180 <= longitude <= 360):
-        raise ValueError(f"place must be latitude, from -85 to 85, and longitude, got {tuple(place)}: swap them?")
-    orbit = Orbit(
-        row["orbits"] / row["days"],
-        row["crossing"],
-        row["node"] == "ascending",
-        row["inclination"],
-        description.altitude,
-    )
-    if not np.isfinite(phase):
-        raise ValueError(f"phase must be a finite number of days, got {phase:g}")
-    # Phases count from 1970, so that parts of a period have the dates of the whole.
-    origin = _EPOCH + pd.Timedelta(days=phase)
-    since, until = ((each - origin).total_seconds() for each in (first, last))
-    seconds, vza, vaa, ascending = passes(orbit, since, until, latitude, longitude, description.max_angle)
-    nothing = (
-        f"{description.name} has no pass by day over {latitude:g}, {longitude:g} in this period: choose a longer one"
-    )
-    if not len(seconds):
-        raise ValueError(nothing)
-    times = (origin + pd.to_timedelta(seconds, unit="s")).round("s").tz_localize(None)
-    sun = sun_position(list(times), latitude, longitude)
-    view = {"vza": vza, "vaa": vaa}
-    out = sun.assign({name: ("time", each, cf.attributes(name)) for name, each in view.items()})
-    out = out.assign(ascending=("time", ascending, {"long_name": "whether the satellite flies north"}))
-    out.attrs = {"instrument": description.name, "altitude": description.altitude}
-    by_day = np.flatnonzero(out["sza"].values < 85)
-    if not by_day.size:
-        raise ValueError(nothing)
-    return out.isel(time=by_day)
+    ascending = row["node"] == "ascending"
+    return Orbit(row["orbits"] / row["days"], row["crossing"], ascending, row["inclination"], description.altitude)
 
 
 def to_gac(swath: Annotated[xr.DataArray, Kind("a swath of AVHRR, from sense_swath", dimensions=0)]) -> xr.DataArray:
