@@ -54,8 +54,14 @@ def slope_light(dem, sky, cell, geometry):
     """
     rows, columns = dem.shape
     light = SlopeLight(*np.empty((len(SlopeLight._fields), rows - 2, columns - 2)))
-    sky = sky._replace(layers=np.ascontiguousarray(sky.layers, float))
-    _slope_light(np.ascontiguousarray(dem, float), sky, _setting(cell, geometry), light)
+    # The sky at the columns of cells, in the rows of places that these cells need.
+    first, last = sky.row.min(initial=sky.layers.shape[1]), sky.row.max(initial=0)
+    places = np.moveaxis(np.asarray(sky.layers, float)[:, first : last + 2], 1, 0)
+    after = np.minimum(sky.column + 1, places.shape[2] - 1)
+    lines = np.ascontiguousarray(_between(places[..., sky.column], places[..., after], sky.column_share))
+    below = np.minimum(sky.row + 1 - first, len(lines) - 1)
+    rows = sky.row - first, below, sky.row_share
+    _slope_light(np.ascontiguousarray(dem, float), lines, *rows, _setting(cell, geometry), light)
     return light
 
 
@@ -67,14 +73,16 @@ def slope_reflectance(reflectance, dem, sky, cell, geometry, direct_transmittanc
     """
     out = np.empty(reflectance.shape)
     air = direct_transmittance, transmittance_down
-    return _pass_over(reflectance, dem, sky, cell, geometry, *air, upwelling, True, out, out)
+    _pass_over(reflectance, dem, sky, cell, geometry, *air, upwelling, True, out, out)
+    return out
 
 
 def slope_factor(reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down):
     """Topographic correction factor Kt, shape (band, rows, columns), NaN where elevation or reflectance is. [1]"""
     out = np.empty(reflectance.shape)
     air = direct_transmittance, transmittance_down
-    return _pass_over(reflectance, dem, sky, cell, geometry, *air, False, False, out, out)
+    _pass_over(reflectance, dem, sky, cell, geometry, *air, False, False, out, out)
+    return out
 
 
 def slope_factor_and_reflectance(
@@ -88,11 +96,11 @@ def slope_factor_and_reflectance(
 
 
 # Cells of a strip of rows, whose light stays in the cache for all bands.
-_STRIP = 2**14
+_STRIP = 2**15
 
 
 def _pass_over(reflectance, dem, sky, cell, geometry, direct, total, upwelling, reflected, kt, out):
-    """Fill in Kt and, on request, reflectance, which may share the array of Kt; the array of reflectance."""
+    """Fill in Kt and, on request, reflectance, which may share the array of Kt."""
     rho, air = np.ascontiguousarray(reflectance, float), (np.asarray(direct, float), np.asarray(total, float))
     _, rows, columns = rho.shape
     step = max(_STRIP // max(columns, 1), 1)
@@ -103,7 +111,6 @@ def _pass_over(reflectance, dem, sky, cell, geometry, direct, total, upwelling, 
         if not upwelling:
             light.upwelling[:] = 1.0
         _slope_factors(rho, first, light, geometry.mu_s, *air, reflected, kt, out)
-    return out
 
 
 def _setting(cell, geometry):
@@ -116,14 +123,13 @@ def _setting(cell, geometry):
 
 # Divided as numpy does: a check of each divisor for 0 would keep a loop from taking several cells at once.
 @compiled
-def _slope_light(dem, sky, setting, light):
-    columns = light.cosine.shape[1]
-    above, below, gradient = np.empty((4, columns)), np.empty((4, columns)), np.empty((2, columns))
-    for i in range(light.cosine.shape[0]):
-        _sky_beside(sky, i, above, below)
+def _slope_light(dem, lines, before, after, share, setting, light):
+    """Fill in the light of rows of cells, below the sky of lines of places before and after each row."""
+    gradient = np.empty((2, light.cosine.shape[1]))
+    for i in range(before.size):
         _gradient_of_row(dem[i], dem[i + 1], dem[i + 2], setting, gradient[0], gradient[1])
         line = SlopeLight(light.cosine[i], light.sky_view[i], light.mu_s_local[i], light.upwelling[i])
-        _light_of_row(gradient[0], gradient[1], above, below, sky.row_share[i], setting, line)
+        _light_of_row(gradient[0], gradient[1], lines[before[i]], lines[after[i]], share[i], setting, line)
 
 
 @compiled
@@ -145,32 +151,6 @@ def _slope_factors(rho, first, light, mu_s, direct, total, reflected, kt, out):
 @jitable
 def _between(before, after, share):
     return (1 - share) * before + share * after
-
-
-@jitable
-def _sky_beside(sky, i, above, below):
-    """Fill in the sky at the columns of a row of cells, for the rows of places above and below; unchanged rows stay."""
-    row, last = sky.row[i], sky.layers.shape[1] - 1
-    if i > 0 and row == sky.row[i - 1]:
-        return
-    if i > 0 and row == sky.row[i - 1] + 1:
-        # A slice assignment of arrays would compile numba's error texts, which takes as long as all the rest.
-        for layer in range(above.shape[0]):
-            for j in range(above.shape[1]):
-                above[layer, j] = below[layer, j]
-    else:
-        _sky_of_places(sky, row, above)
-    _sky_of_places(sky, min(row + 1, last), below)
-
-
-@jitable
-def _sky_of_places(sky, row, out):
-    last = sky.layers.shape[2] - 1
-    for layer in range(out.shape[0]):
-        places = sky.layers[layer, row]
-        for j in range(out.shape[1]):
-            before = sky.column[j]
-            out[layer, j] = _between(places[before], places[min(before + 1, last)], sky.column_share[j])
 
 
 @jitable
