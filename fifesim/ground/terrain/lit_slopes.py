@@ -58,7 +58,9 @@ def slope_light(dem, sky, cell, geometry):
     first, last = sky.row.min(initial=sky.layers.shape[1]), sky.row.max(initial=0)
     places = np.moveaxis(np.asarray(sky.layers, float)[:, first : last + 2], 1, 0)
     after = np.minimum(sky.column + 1, places.shape[2] - 1)
-    lines = np.ascontiguousarray(_between(places[..., sky.column], places[..., after], sky.column_share))
+    # An infinite horizon without weight is NaN, which is in shadow.
+    with np.errstate(invalid="ignore"):
+        lines = np.ascontiguousarray(_between(places[..., sky.column], places[..., after], sky.column_share))
     below = np.minimum(sky.row + 1 - first, len(lines) - 1)
     rows = sky.row - first, below, sky.row_share
     _slope_light(np.ascontiguousarray(dem, float), lines, *rows, _setting(cell, geometry), light)
