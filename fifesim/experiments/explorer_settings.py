@@ -93,10 +93,10 @@ class Sweep:
 
 
 def sweep_of(scenario=None):
-    """Sliders of a scenario, with its values and others around them."""
+    """Sliders of a scenario, with its values and others around them; by default of the paper's largest patches."""
     # Where more than eight stages share the scatter, as in a landscape of classes, haze, sun and instrument have two
     # values.
-    scenario = explorer_scenario() if scenario is None else scenario
+    scenario = scenario or Scenario(ground={"arp": 0.24}, terrain={"dem": "flat"})
     scenario.complete()
     scenario = scenario.model_copy(update={"grid": _window(scenario)})
     scenario = parse_scenario(scenario.model_dump(exclude_unset=True))
@@ -138,11 +138,6 @@ def _with_fewer_values(sweep):
 def _farthest(values, own):
     far = max(values, key=lambda value: abs(value - own))
     return tuple(value for value in values if value in (own, far))
-
-
-def explorer_scenario():
-    """Scenario of the paper with its largest patches, on level ground."""
-    return Scenario(ground={"arp": 0.24}, terrain={"dem": "flat"})
 
 
 def _with_own(name, own):

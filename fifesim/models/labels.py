@@ -56,11 +56,6 @@ class LandModel(NamedTuple):
     """Whether the leaf area is of green leaves, and FPAR has no effect."""
 
 
-def vapour_deficit(temperature, humidity):
-    """Vapour pressure deficit of air. [Pa]"""
-    return evaporation.saturation_pressure(temperature)[0] * (1 - humidity)
-
-
 def photon_flux(weather):
     """Photosynthetically active photon flux, mean over the daylight hours. [umol m-2 s-1]"""
     return PHOTONS * PAR_OF_SHORTWAVE * weather.shortwave
@@ -68,7 +63,7 @@ def photon_flux(weather):
 
 def _light_use(lai, fpar, weather, sza):
     energy = PAR_OF_SHORTWAVE * weather.shortwave * weather.day_length * 3600e-6
-    deficit = vapour_deficit(weather.temperature, weather.humidity)
+    deficit = evaporation.saturation_pressure(weather.temperature)[0] * (1 - weather.humidity)
     return production.light_use_gpp(weather.temperature_min - 273.15, deficit, fpar, energy)
 
 

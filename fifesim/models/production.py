@@ -59,50 +59,6 @@ def light_use_gpp(tmin_c, vpd_pa, fpar, par_mj, lue_kg_mj=LIGHT_USE, tmin_ramp=T
     return 1000 * lue_kg_mj * limits * (np.asarray(fpar, float) * par_mj)
 
 
-class Respiration(NamedTuple):
-    """Maintenance respiration of a day. [g m-2 d-1], of carbon"""
-
-    leaf: np.ndarray
-    root: np.ndarray
-
-
-@in_range
-def maintenance_respiration(lai, tmean_c, sla=38.0, root_per_leaf=2.6, leaf_rate=0.0098, root_rate=0.00819):
-    r"""
-    Maintenance respiration of leaves and fine roots, after MOD17.
-
-    .. math::
-
-        R_l = \frac{1000 \, L}{\mathrm{SLA}} \, r_l \, (3.22 - 0.046 \, T)^{(T - 20) / 10}, \qquad
-        R_r = \frac{1000 \, L}{\mathrm{SLA}} \, f \, r_r \, 2^{(T - 20) / 10}
-
-    Parameters
-    ----------
-    lai : array
-        [m2 m-2]
-    tmean_c : array
-        Mean air temperature of the day, below 70. [degC]
-    sla : float, optional
-        Leaf area per carbon, by default of grassland, as the others. [m2 kg-1]
-    root_per_leaf : float, optional
-        Carbon of fine roots divided by carbon of leaves. [1]
-    leaf_rate, root_rate : float, optional
-        Respired share of the carbon at 20 degC. [d-1]
-
-    Returns
-    -------
-    respiration : Respiration
-
-    References
-    ----------
-    [Running2004]_
-    """
-    warmth = (np.asarray(tmean_c, float) - 20) / 10
-    carbon = 1000 / sla * np.asarray(lai, float)
-    leaf = carbon * leaf_rate * (3.22 - 0.046 * np.asarray(tmean_c, float)) ** warmth
-    return Respiration(leaf, carbon * root_per_leaf * root_rate * 2.0**warmth)
-
-
 @in_range
 def canopy_photosynthesis(lai, extinction, par, quantum_yield, p_max):
     r"""

@@ -53,7 +53,7 @@ _DAILY = Limits("MJ m-2 d-1", 0, 50, "a mean over the day in W m-2 is multiplied
 _AT_LEAST_0 = Limits("", 0, np.inf, "it is not negative")
 FORMULA_LIMITS = {
     **dict.fromkeys(("ta_k", "tmin_k"), _KELVIN),
-    **dict.fromkeys(("tmin_c", "tmean_c", "tmin", "tmax"), _CELSIUS),
+    **dict.fromkeys(("tmin_c", "tmin", "tmax"), _CELSIUS),
     "rh_percent": Limits("%", 0, 100, "air that holds more water is fog"),
     "pressure_pa": WEATHER_LIMITS["pressure"],
     "vpd_pa": Limits("Pa", 0, 5e4, "it is not negative, and less than the saturation pressure"),

@@ -15,13 +15,10 @@ DATA = Path(__file__).parents[1] / "data"
 
 
 def mod17(table):
-    breath = production.maintenance_respiration(table["lai"], table["tmean_c"])
     return {
         "tmin_scalar": production.ramp(table["tmin_c"], *production.TMIN_RAMP),
         "vpd_scalar": 1 - production.ramp(table["vpd_pa"], *production.VPD_RAMP),
         "gpp_g": production.light_use_gpp(*given(table, "tmin_c vpd_pa fpar par_mj")),
-        "leaf_respiration_g": breath.leaf,
-        "root_respiration_g": breath.root,
     }
 
 
@@ -186,7 +183,7 @@ def test_missing_cells_stay_missing_and_bare_ground_is_quiet():
             lambda: production.light_use_gpp(15.0, 650.0, 50.0, 10.0),
             r"fpar must be in \[0, 1\], got 50: .*percent by 100",
         ),
-        (lambda: production.maintenance_respiration(-1.0, 20.0), r"lai must be in \[0, 100\] m2 m-2, got -1"),
+        (lambda: canopy_photosynthesis(-1.0, 0.5, 9.0, 0.05, 20.0), r"lai must be in \[0, 100\] m2 m-2, got -1"),
         (
             lambda: canopy_photosynthesis(3.0, 0.5, -1.0, 0.05, 20.0),
             r"par must be in \[0, inf\], got -1: it is not neg",
