@@ -346,3 +346,11 @@ def test_a_recorded_scene_is_the_same_in_any_chunks(msi):
         return raster.fifesim.as_seen_by("TM", bands=["TM3", "TM4"], recorded=True)
 
     check_raster_function(seen, scene, quantity="dn")
+
+
+def test_coarser_cells_are_means_of_pixels_and_finer_ones_repeat_them():
+    msi = fifesim.instrument("MSI")
+    ten, twenty = msi.select(["MSI4", "MSI11"])
+    for band, cells, widths in ((ten, (10, 10), [10]), (ten, (20, 20), [20, 20]), (twenty, (10, 10), [20])):
+        for spread, *boxes in adjustment._parts(msi, band, cells):
+            assert spread in msi.line_spreads(band) and [box.width for box in boxes] == widths
