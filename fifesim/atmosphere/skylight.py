@@ -12,9 +12,9 @@ from fifesim.atmosphere.successive_orders import LAYERS, STREAMS, leaving_light,
 from fifesim.base.caches import cached
 from fifesim.base.geometry import scattering_angle_cosine
 
-# Edges of the zenith panels on both sides of the sun, and of the azimuth panels from the sun [degree]; Gauss points
-# in each panel. The bright sky around the sun needs the small ones.
-_ASIDE, _AROUND, _POINTS = (4.0, 14.0), (0.0, 6.0, 30.0, 90.0, 180.0), 3
+# Edges of the zenith panels on both sides of the sun, and of the azimuth panels from the sun [degree], and Gauss points
+# in each panel of both. The bright sky around the sun needs small panels.
+_ASIDE, _AROUND, _POINTS = (4.0, 14.0), (0.0, 6.0, 30.0, 90.0, 180.0), (5, 3)
 
 # Zenith angles and azimuths of pairs of directions of the sky, whose light is 1 to 10 % of the image.
 _COARSE, _TURNS = 12, 24
@@ -295,8 +295,8 @@ def weighted_sky(radiance, returned, sza):
     sky : SkyWeights
     """
     aside = {edge for step in (*_ASIDE, 0) for edge in (sza - step, sza + step) if 2 < edge < 80}
-    zenith, zenith_weights = _panels(sorted({0.0, 80.0, 90.0, *aside}))
-    azimuth, azimuth_weights = _panels(_AROUND)
+    zenith, zenith_weights = _panels(sorted({0.0, 80.0, 90.0, *aside}), _POINTS[0])
+    azimuth, azimuth_weights = _panels(_AROUND, _POINTS[1])
     at = np.radians(zenith)
     solid = (np.cos(at) * np.sin(at) * zenith_weights)[:, None] * azimuth_weights
     light, back = radiance(zenith, azimuth) * solid, returned(zenith)[:, None] * solid
@@ -357,9 +357,9 @@ def atmospheric_sky(atmosphere, wavelength, sza):
     return mixed_sky(*map(float, depths), albedo, moments, optics, float(sza), vertical=vertical)
 
 
-def _panels(edges):
+def _panels(edges, count):
     """Gauss points and weights of intervals, in degrees."""
-    points, weights = leggauss(_POINTS)
+    points, weights = leggauss(count)
     edges = np.asarray(edges, float)
     half = np.diff(edges)[:, None] / 2
     return (edges[:-1, None] + half * (points + 1)).ravel(), (half * weights).ravel()
