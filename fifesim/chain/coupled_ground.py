@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import xarray as xr
+from numpy.polynomial import chebyshev
 from scipy.spatial import cKDTree
 
 from fifesim.atmosphere import adjacency_labels, engines
@@ -28,9 +29,10 @@ from fifesim.grids.classes import by_class
 from fifesim.grids.inputs import check_reflectance
 from fifesim.grids.windows import origin_of
 from fifesim.ground.canopy import interpolation
-from fifesim.ground.canopy.labels import EvenCanopy, checked_scene, uniform_kernel
+from fifesim.ground.canopy.crowns import lai_in_crowns
+from fifesim.ground.canopy.labels import CELL_SHARES, EvenCanopy, checked_scene, uniform_kernel
 from fifesim.ground.canopy.leaf_area import check_map
-from fifesim.ground.canopy.reflectance_table import cell_canopy, decay
+from fifesim.ground.canopy.reflectance_table import cell_canopy, check_cells, decay
 from fifesim.ground.canopy.sail_model import Surface, over_background
 
 STREAMS_OF = {
@@ -45,6 +47,9 @@ _TOLERANCE = 1e-5
 
 # Leaf areas among which the one of a cell is found, denser for thin canopies. [m2 m-2]
 _LEAF_AREAS = 8.0 * (np.arange(1025) / 1024) ** 2
+
+# Number of tables over shares between which streams are interpolated: within 5e-5 for crowns, 1e-7 for dead leaves.
+_SHARES = {"brown": 9, "crown_cover": 17}
 
 # Backgrounds for which a table of streams is tested.
 _GROUNDS = (0.0, 0.5, 1.0)
@@ -125,10 +130,7 @@ def _over(terms, background):
 def scene_streams(lai, background, scene, skies):
     """Streams of cells, shape (stream x band,) + lai.shape, from leaf area, a background and a Scene. [1]"""
     if scene.varies():
-        raise ValueError(
-            "brown, dissociation or crown_cover vary by cell, streams need numbers: use coupling='lambert', or give "
-            "each class its own canopy"
-        )
+        return _varied_streams(lai, background, scene, skies)
     return streams_over_background(lai, background, scene, skies).reshape(-1, *lai.shape)
 
 
@@ -139,6 +141,31 @@ def streams_over_background(lai, background, scene, skies):
     below = np.broadcast_to(background, (len(scene.sky), *lai.shape) if np.ndim(background) > 1 else len(scene.sky))
     below = below if below.ndim > 1 else below.reshape(-1, *(1,) * lai.ndim)
     return _over(by_band, below)
+
+
+def _varied_streams(lai, background, scene, skies):
+    """`scene_streams` where the dead share or the crown cover varies by cell: polynomials between tables."""
+    names = [name for name in CELL_SHARES if isinstance(getattr(scene, name), np.ndarray)]
+    if len(names) > 1 or names == ["dissociation"]:
+        raise ValueError(
+            f"{' and '.join(names)} vary by cell, streams need numbers but for one of brown and crown_cover: use "
+            "coupling='lambert', or give each class its own canopy"
+        )
+    (name,), cells, bands = names, lai.reshape(-1), len(scene.sky)
+    ground = np.broadcast_to(np.reshape(background, (bands, -1)), (bands, cells.size))
+    check_cells(cells, ground, scene)
+    # In the fourth root of the gap fraction, powers of the gap fraction have no kink.
+    power, count = 4 if name == "crown_cover" else 1, _SHARES[name]
+    nodes = chebyshev.chebpts1(count)
+    at_nodes, at_cells = (
+        chebyshev.chebvander(each, count - 1) for each in (nodes, 2 * (1 - getattr(scene, name)) ** (1 / power) - 1)
+    )
+    weights = np.linalg.solve(at_nodes.T, at_cells.T)
+    inside, out = lai_in_crowns(cells, scene.crown_cover), 0.0
+    for node, weight in zip((nodes / 2 + 0.5).tolist(), weights, strict=True):
+        own = scene._replace(**{name: 1 - node**power})
+        out = out + weight * streams_over_background(inside * own.crown_cover, ground, own, skies)
+    return out.reshape(-1, *lai.shape)
 
 
 def reflectance_streams(land, bands, canopies, light, skies, level):

@@ -128,40 +128,49 @@ def _seen(lai, table, terms, out):
     return refused
 
 
-def upright_plants(level, stand, light, lai, sun):
-    """Reflectance of upright plants on the slopes of a Sunlight, dims (band, y, x). [1]"""
-    even = None if stand is None else even_canopy(lai, stand, light, False)
-    if even is None or even.scene.model != "sail":
-        raise ValueError(
-            "slopes='upright' needs cells that differ in leaf area only, and SAIL: leave out classes, dead leaves, "
-            "crowns and rasters of the canopy, or take slopes='kt'"
-        )
-
-    def kernel(cells, elevation, sky, cell, seen):
-        return _upright(cells, slope_light(elevation, sky, cell, seen), even, seen)
-
-    plain = unpacked(lai).transpose("y", "x")
-    data = terrain_labels.on_slopes(kernel, sun.dem, sun.horizon, sun.geometry, plain, leading=(level.sizes["band"],))
+def upright_plants(level, land, canopies, light, sun):
+    """Reflectance of upright plants on the slopes of a Sunlight, dims (band, y, x), with the cells of each class."""
+    data, cells = None, unpacked(land.lai).transpose("y", "x")
+    for code, stand in canopies.items():
+        even = even_canopy(land.lai, stand, light, False)
+        if even is None or even.scene.model != "sail":
+            raise ValueError(
+                "slopes='upright' needs cells of a class that differ in leaf area only, and SAIL: leave out dead "
+                "leaves, crowns and rasters of the canopy, or take slopes='kt'"
+            )
+        own = cells if land.cover is None else cells.where(land.cover.transpose("y", "x") == code)
+        given = sun.dem, sun.horizon, sun.geometry, own
+        found = terrain_labels.on_slopes(partial(_upright, even), *given, leading=(level.sizes["band"],))
+        data = found if data is None else np.where(np.isnan(data), found, data)
     return terrain_labels.labelled_slopes(data, level, sun, "terrain: upright plants (SAIL on slopes)")
 
 
-def _upright(lai, light, canopy, seen):
+# Cells of upright plants at once, so that intermediate results stay in the processor cache.
+_AT_ONCE = 2**14
+
+
+def _upright(canopy, lai, elevation, sky, cell, seen):
     """Reflectance of upright plants in cells, shape (band, rows, columns). [1]"""
-    scene, known = canopy.scene, ~np.isnan(check_map(lai) + light.cosine)
-    slope = {
-        "cosine": light.cosine[known],
-        "mu_s_local": light.mu_s_local[known],
-        "mu_v_local": light.upwelling[known] * seen.mu_v,
-        "sky_view": light.sky_view[known],
-        "terrain_view": horizon_terrain_view(light.sky_view[known], light.cosine[known]),
-    }
-    bands = (np.array(each)[:, None] for each in (scene.leaf_reflectance, scene.leaf_transmittance, canopy.background))
-    angles = {name: getattr(scene, name) for name in ("sza", "vza", "raa", "leaf_angles", "hotspot")}
-    out = np.full((len(scene.sky), *lai.shape), np.nan)
-    out[:, known] = upright_reflectance(
-        lai[known], *bands, **angles, **slope, diffuse_fraction=np.array(scene.sky)[:, None]
-    )
-    return out
+    light, scene = slope_light(elevation, sky, cell, seen), canopy.scene
+    known = np.flatnonzero(~np.isnan(check_map(lai) + light.cosine))
+    bands = [np.array(each)[:, None] for each in (scene.leaf_reflectance, scene.leaf_transmittance, canopy.background)]
+    given = {name: getattr(scene, name) for name in ("sza", "vza", "raa", "leaf_angles", "hotspot")}
+    given["diffuse_fraction"] = np.array(scene.sky)[:, None]
+    out = np.full((len(scene.sky), lai.size), np.nan)
+    for start in range(0, known.size, _AT_ONCE):
+        part = known[start : start + _AT_ONCE]
+        cosine, mu_s_local, sky_view = (each.flat[part] for each in (light.cosine, light.mu_s_local, light.sky_view))
+        out[:, part] = upright_reflectance(
+            lai.flat[part],
+            *bands,
+            **given,
+            cosine=cosine,
+            mu_s_local=mu_s_local,
+            mu_v_local=light.upwelling.flat[part] * seen.mu_v,
+            sky_view=sky_view,
+            terrain_view=horizon_terrain_view(sky_view, cosine),
+        )
+    return out.reshape(-1, *lai.shape)
 
 
 class Land(NamedTuple):

@@ -362,7 +362,7 @@ def surface_reflectance(
         Whether to apply the cosine of the view angle on slopes, Eq. 5.
     slopes : {"kt", "upright"}, optional
         Model of slopes: reflectance of level ground times Kt, as in the paper, or SAIL on each slope with upright
-        plants and the sum of the light between slopes, without Eq. 5, where cells differ in leaf area only.
+        plants and the sum of the light between slopes, without Eq. 5, where cells of a class differ in leaf area only.
     atmosphere : Atmosphere, optional
         Determines the diffuse fraction; saved with the result. The default is midlatitude summer, continental aerosol,
         45 km visibility and 0.4 km altitude, with a warning for rasters from other sources.
@@ -444,8 +444,7 @@ def surface_reflectance(
     if dem is not None:
         sun = sunlight(dem, horizon, atmosphere, responses, geometry, "surface_reflectance on slopes")
         if slopes == "upright":
-            stand = None if land.cover is not None else canopies[None]
-            reflectance = landscapes.upright_plants(level, stand, light, lai, sun)
+            reflectance = landscapes.upright_plants(level, land, canopies, light, sun)
         else:
             reflectance = terrain_labels.terrain_reflectance(level, sun, upwelling)
     if not streams:

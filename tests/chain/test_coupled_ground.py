@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 import xarray as xr
 from lazy import in_chunks, no_compute
+from numpy.polynomial.chebyshev import chebpts1
 from odc.geo.xr import wrap_xr
 
 import fifesim
 from fifesim.atmosphere.coupling import apparent_reflectance
 from fifesim.atmosphere.engines import band_terms
 from fifesim.atmosphere.skylight import GroundStreams, atmospheric_sky, directional_coupling, ground_streams
+from fifesim.chain import coupled_ground
 from fifesim.chain.coupled_ground import STREAMS_OF
 from fifesim.ground.canopy.sail_model import sail, with_background
 
@@ -89,6 +91,31 @@ def test_streams_of_a_landscape_and_of_varying_soil():
         np.testing.assert_allclose(both[..., part], one[..., part], rtol=1e-12)
 
 
+def sides(values):
+    """Raster of one value in the west and another in the east."""
+    return LAI.copy(data=np.where(np.arange(72) < 36, *values) * np.ones((60, 1))).drop_attrs()
+
+
+@pytest.mark.parametrize("given", [{"brown": (0.15, 0.6)}, {"crown_cover": (0.4, 0.8), "crown_shape": 0.5}])
+def test_streams_of_a_varying_share_are_those_of_numbers(given):
+    (name, values), *others = given.items()
+    canopy = GRASS.replace(brown_leaf=(0.2, 0.1), **dict(others))
+    both = ground(streams=True, canopy=canopy.replace(**{name: sides(values)}))
+    for value, part in zip(values, (slice(0, 36), slice(36, 72)), strict=True):
+        one = ground(streams=True, canopy=canopy.replace(**{name: value}))
+        np.testing.assert_allclose(both[..., part], one[..., part], rtol=0, atol=2e-5)
+
+
+def test_directional_streams_of_a_varying_share_are_those_of_its_tables(monkeypatch):
+    """At the shares of two tables."""
+    monkeypatch.setitem(coupled_ground._SHARES, "brown", 2)
+    canopy, values = GRASS.replace(brown_leaf=(0.2, 0.1)), (1 - (chebpts1(2) / 2 + 0.5)).tolist()
+    both = ground(streams="directional", canopy=canopy.replace(brown=sides(values)))
+    for value, part in zip(values, (slice(0, 36), slice(36, 72)), strict=True):
+        one = ground(streams="directional", canopy=canopy.replace(brown=value))
+        np.testing.assert_allclose(both[..., part], one[..., part], rtol=0, atol=1e-8)
+
+
 @pytest.mark.parametrize("surface", [fifesim.RossLi(0.3, 0.0, 0.0), fifesim.RPV([0.1] * 6, 1.0, 0.0, 1.0)])
 def test_lambertian_kernels_have_the_equation_of_the_atmosphere(surface):
     terms = band_terms(HAZE, [b.response for b in fifesim.instrument("TM").select(None)], 50.0, 30.0, SLANT.raa)
@@ -128,8 +155,9 @@ def test_refusals():
         ground(LAI.chunk(y=31)).fifesim.to_toa(coupling="directional", adjacency=True)
     with pytest.raises(ValueError, match="leaf area"):
         ground((LAI - 5).chunk(y=31)).fifesim.to_toa(coupling="four-stream").compute()
-    with pytest.raises(ValueError, match="brown"):
-        ground(streams=True, canopy=GRASS.replace(brown=(0.1 + 0 * LAI).rename("brown")))
+    by_cell = (0.1 + 0 * LAI).drop_attrs()
+    with pytest.raises(ValueError, match="brown and crown_cover vary"):
+        ground(streams=True, canopy=GRASS.replace(brown=by_cell, crown_cover=by_cell + 0.7))
     with pytest.raises(ValueError, match="no geometry"):
         fifesim.to_toa(fifesim.RPV(0.1, 0.8, -0.1, 0.1), HAZE, instrument="TM")
     with pytest.raises(ValueError, match="reflectance must not be negative"):

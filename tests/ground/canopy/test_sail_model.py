@@ -336,5 +336,14 @@ def test_scene_of_a_dem():
     np.testing.assert_allclose(lazy.compute(), upright, rtol=1e-12)
     with pytest.raises(ValueError, match="upright"):
         scene(DEM, brown=0.3)
+    sizes = {"grass": 0.0, "wood": 0.1}
+    classes = [fifesim.CoverClass(name, lai=1.0, canopy=fifesim.Canopy(hotspot=h)) for name, h in sizes.items()]
+    land = fifesim.landscape(GRID, cover=fifesim.Patches("voronoi", 80), classes=classes, seed=2)
+    land = land.assign(lai=HILL_LAI)
+    both = land.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], dem=DEM, slopes="upright")
+    for code, size in enumerate(sizes.values(), 1):
+        inside = land.cover == code
+        assert inside.any()
+        np.testing.assert_array_equal(both.where(inside), scene(DEM, hotspot=size).where(inside))
     with pytest.raises(ValueError, match="needs an elevation"):
         scene(None)
