@@ -91,16 +91,15 @@ def overpasses(
     times = (origin + pd.to_timedelta(seconds, unit="s")).round("s").tz_localize(None)
     by_day = np.zeros(0, int)
     if len(times):
-        sun = sun_position(list(times), latitude, longitude)
-        by_day = np.flatnonzero(sun["sza"].values < _LOWEST_SUN)
+        view = {name: ("time", each, cf.attributes(name)) for name, each in (("vza", vza), ("vaa", vaa))}
+        view["ascending"] = ("time", ascending, {"long_name": "whether the satellite flies north"})
+        out = sun_position(list(times), latitude, longitude).assign(view)
+        by_day = np.flatnonzero(out["sza"].values < _LOWEST_SUN)
     if not by_day.size:
         raise ValueError(
             f"{description.name} has no pass by day over {latitude:g}, {longitude:g} in this period: choose a longer "
             "one"
         )
-    view = {"vza": vza, "vaa": vaa}
-    out = sun.assign({name: ("time", each, cf.attributes(name)) for name, each in view.items()})
-    out = out.assign(ascending=("time", ascending, {"long_name": "whether the satellite flies north"}))
     out.attrs = {"instrument": description.name, "altitude": description.altitude}
     return out.isel(time=by_day)
 
