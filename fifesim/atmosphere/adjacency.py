@@ -53,11 +53,6 @@ def environment_function(radius, vza=0.0):
     molecules, aerosol : array, shape of the broadcast inputs
         :math:`F_R'` and :math:`F_A'`, from 0 at the target to 1. [1]
 
-    Raises
-    ------
-    ValueError
-        If vza is not from 0 to below 90 degrees.
-
     Notes
     -----
     Fits to Monte Carlo runs for molecules with a scale height of 8 km and aerosol with 2 km, seen from space. The
@@ -68,13 +63,10 @@ def environment_function(radius, vza=0.0):
     ----------
     [Tanre1981]_ for nadir; [Vermote1997]_ for the view angle
     """
-    vza = np.asarray(vza, float)
-    if not np.all((vza >= 0) & (vza < 90)):
-        raise ValueError(f"vza must be from 0 to below 90 degrees, got {vza}: it is the angle from the zenith")
     r = np.asarray(radius, float) / 1000  # the fits are in km
     molecules = -0.930 * np.expm1(-0.080 * r) - 0.070 * np.expm1(-1.10 * r)
     aerosol = -0.448 * np.expm1(-0.27 * r) - 0.552 * np.expm1(-2.83 * r)
-    log_mu_v = np.log(np.cos(np.radians(vza)))
+    log_mu_v = np.log(np.cos(np.radians(np.asarray(vza, float))))
     a = (1.3347 + 0.57757 * log_mu_v) * log_mu_v
     b = (-1.479 - 1.5275 * log_mu_v) * log_mu_v
     molecules = molecules * (1 + log_mu_v * (1 - molecules))

@@ -211,12 +211,6 @@ def test_weights_of_the_plane_sum_to_one():
     assert weights.min() > -1e-17
 
 
-@pytest.mark.parametrize("vza", [-1.0, 90.0, np.nan])
-def test_view_from_below_is_refused(vza):
-    with pytest.raises(ValueError, match="vza must be from 0 to below 90 degrees"):
-        environment_function(1.0, vza)
-
-
 # ------------------------------------------------------------------------------------------ environment on blocks
 
 
