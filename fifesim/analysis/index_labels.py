@@ -87,7 +87,6 @@ def _wavelengths(reflectance):
     )
 
 
-_METHODS = ("maximum-value", "median", "nadir-most", "mean-of-clear")
 _REFERENCE = "Holben (1986), doi:10.1080/01431168608948945"
 
 
@@ -152,8 +151,6 @@ def composite(
     >>> bool((best.date == dates[1])[1:-1, 1:-1].all())
     True
     """
-    if method not in _METHODS:
-        raise ValueError(f"method must be one of {', '.join(map(repr, _METHODS))}, got {method!r}")
     if images.dtype.kind != "f" or cf.QUANTITIES["toa_radiance"].units == images.attrs.get("units"):
         raise ValueError(
             "a composite needs reflectance or NDVI, as digital numbers and radiance depend on the sun of each date: "

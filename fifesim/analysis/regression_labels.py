@@ -312,8 +312,6 @@ def invert(
     ['flag', 'high', 'lai', 'low']
     >>> clear = estimate["lai"].where(estimate["flag"] == 0)  # without clipped and extrapolated pixels
     """
-    if quantity not in _RANGES:
-        raise ValueError(f"quantity must be 'lai' or 'fpar', got {quantity!r}")
     _check_names(ndvi, fit, quantity)
     if not 0 < level < 1:
         raise ValueError(f"level must be between 0 and 1, got {level:g}: 0.95 holds 95 % of new values")

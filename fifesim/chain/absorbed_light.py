@@ -106,8 +106,6 @@ def fpar(
     >>> round(float(lai.fifesim.fpar(method="energy").mean()), 2)
     0.33
     """
-    if leaves not in ("all", "green"):
-        raise ValueError(f"leaves must be 'all' or 'green', got {leaves!r}: which of them absorb the light")
     if method == "energy":
         if fpar_inf != layers.FPAR_INF:
             raise ValueError(
@@ -117,8 +115,6 @@ def fpar(
         absorbed, history, source = _absorbed(lai, leaves, canopy, atmosphere, geometry, time)
         quantity = "green_fpar" if leaves == "green" else "fpar"
         return cf.label(absorbed.isel(band=0), quantity, source=source, history=f"fpar: {history}")
-    if method != "beer":
-        raise ValueError(f"method must be 'beer' or 'energy', got {method!r}")
     land, canopy = land_of(lai), canopy or TALLGRASS
     check_used(land, canopy)
 

@@ -102,8 +102,6 @@ def topographic_correction(
     >>> bool(abs(corrected - level).max() < 1e-6)
     True
     """
-    if method not in _REFERENCES:
-        raise ValueError(f"method must be one of {', '.join(_REFERENCES)}, got {method!r}")
     for name, value, methods in (("c", c, ("c", "scs+c")), ("k", k, ("minnaert",))):
         if value is not None and method not in methods:
             raise ValueError(f"{name} is for method {' or '.join(methods)}, got method={method!r}: leave {name} out")

@@ -415,8 +415,6 @@ def surface_reflectance(
     >>> rho.mean(["y", "x"]).round(3).values
     array([0.089, 0.229])
     """
-    if slopes not in ("kt", "upright"):
-        raise ValueError(f"slopes must be 'kt' or 'upright', got {slopes!r}")
     if dem is None and (horizon is not None or slopes != "kt"):
         what = "a horizon" if horizon is not None else f"slopes={slopes!r}"
         raise ValueError(f"{what} needs an elevation: give dem= too")
@@ -544,8 +542,6 @@ def to_toa(
     >>> (toa - rho).mean(["y", "x"]).round(3).values
     array([ 0.01, -0.03])
     """
-    if coupling not in (None, "lambert", *coupled_ground.STREAMS_OF):
-        raise ValueError(f"coupling must be 'directional', 'four-stream' or 'lambert', got {coupling!r}")
     if isinstance(reflectance, RossLi | RPV):
         given = {"elevation": elevation, "surroundings": surroundings, "clouds": clouds, "time": time}
         given |= {"adjacency": True} if adjacency else {}

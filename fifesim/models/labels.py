@@ -266,8 +266,6 @@ def evapotranspiration(
 
 def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time):
     """Labelled result of a model, dims (y, x)."""
-    if name not in LAND_MODELS[quantity]:
-        raise ValueError(f"model must be one of {', '.join(LAND_MODELS[quantity])}, got {name!r}")
     land, model = land_of(lai), LAND_MODELS[quantity][name]
     area = checked_scene(north_up(land.lai))
     weather = fife_weather() if weather is None else weather

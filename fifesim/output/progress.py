@@ -38,26 +38,19 @@ def memory():
     return total
 
 
-class CellProgress:
-    """Progress of cells, of which an earlier run has done some, as a context manager around the work."""
+class Progress:
+    """Progress of work on cells or chips, some of which are done already, as a context manager around the work."""
 
     # JSON has up to one line per second on standard output; text is a bar, or a line per minute on standard error.
-    # Work and its counted units; decimals of the rate in JSON, and the text of a line with its scale.
-    label, counted, decimals = "simulating", "cells", None
-    text, scale = "{done:.1f} of {cells:.1f} million cells, {rate:.1f} million/s", 1e6
-
-    def __init__(self, cells, done=0, as_json=False):
-        self._cells, self._before, self._done, self._as_json = cells, done, done, as_json
+    def __init__(self, label, counted, total, done=0, as_json=False):
+        self._label, self._counted, self._total, self._as_json = label, counted, total, as_json
+        self._before, self._done = done, done
         self._start, self._last_report = time.monotonic(), -_PAUSE
         self._last_line = self._start
-        columns = (
-            _LABEL,
-            progress.BarColumn(),
-            progress.TaskProgressColumn(),
-            progress.TextColumn("{task.fields[rate]}"),
-        )
-        self._bar = _bar(*columns, progress.TimeRemainingColumn(), disable=as_json)
-        self._task = self._bar.add_task(self.label, total=cells, completed=done, rate="")
+        rate = progress.TextColumn("{task.fields[rate]}")
+        columns = _LABEL, progress.BarColumn(), progress.TaskProgressColumn(), rate, progress.TimeRemainingColumn()
+        self._bar = _bar(*columns, disable=as_json)
+        self._task = self._bar.add_task(label, total=total, completed=done, rate="")
 
     def __enter__(self):
         self._bar.start()
@@ -68,11 +61,11 @@ class CellProgress:
     def __exit__(self, *error):
         self._bar.stop()
 
-    def advance(self, cells):
-        """Report that more cells are done."""
-        self._done += cells
+    def advance(self, number):
+        """Report that more is done."""
+        self._done += number
         now = time.monotonic()
-        if now - self._last_report < _PAUSE and self._done < self._cells:
+        if now - self._last_report < _PAUSE and self._done < self._total:
             return
         self._last_report = now
         if self._as_json:
@@ -82,32 +75,23 @@ class CellProgress:
         elif now - self._last_line >= _LONG_PAUSE and not is_quiet():
             self._last_line, state = now, self.state()
             left = f", {format_time(state['seconds_left'])} left" if state["seconds_left"] else ""
-            print(f"{self.label}: {self._in_words(state)}{left}", file=sys.stderr, flush=True)
+            print(f"{self._label}: {self._in_words(state)}{left}", file=sys.stderr, flush=True)
 
     def _in_words(self, state):
-        done, cells, rate = (state[f"{self.counted}{each}"] / self.scale for each in ("_done", "", "_per_second"))
-        return f"{self.text.format(done=done, cells=cells, rate=rate)}, {state['memory'] / 1e9:.2f} GB"
+        rate, used = state[f"{self._counted}_per_second"], state["memory"] / 1e9
+        return f"{self._done:,} of {self._total:,} {self._counted}, {rate:,.1f}/s, {used:.2f} GB"
 
     def state(self):
-        """State of the progress: cells, rate, seconds left and memory [byte]."""
-        elapsed = max(time.monotonic() - self._start, 1e-9)
-        rate = (self._done - self._before) / elapsed
-        left = (self._cells - self._done) / rate if rate else None
+        """State of the progress: number done, rate, seconds left and memory [byte]."""
+        rate = (self._done - self._before) / max(time.monotonic() - self._start, 1e-9)
         return {
             "event": "progress",
-            f"{self.counted}_done": self._done,
-            self.counted: self._cells,
-            f"{self.counted}_per_second": round(rate, self.decimals),
-            "seconds_left": None if left is None else round(left, 1),
+            f"{self._counted}_done": self._done,
+            self._counted: self._total,
+            f"{self._counted}_per_second": round(rate, 1),
+            "seconds_left": round((self._total - self._done) / rate, 1) if rate else None,
             "memory": memory(),
         }
-
-
-class ChipProgress(CellProgress):
-    """Progress of chips, as `CellProgress` for cells."""
-
-    label, counted, decimals = "making chips", "chips", 1
-    text, scale = "{done:.0f} of {cells:.0f} chips, {rate:.1f}/s", 1
 
 
 def steps(sequence, label):

@@ -25,7 +25,7 @@ from fifesim.grids.reductions import computed
 from fifesim.output import identity, products, report, stac, workers
 from fifesim.output.folders import check_folder, errors_with_their_file, results
 from fifesim.output.maps import write_style
-from fifesim.output.progress import CellProgress, doing, memory, steps
+from fifesim.output.progress import Progress, doing, memory, steps
 from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.simulation import simulate
@@ -124,7 +124,7 @@ def _compute(found, lai, folder, client, threads, as_json):
     sizes = {index: round(per_pixel * (rows[index[-2]] * columns[index[-1]])) for index in np.ndindex(image.numblocks)}
     done = sum(sizes[index] for index in saved["image"])
     LOG.info("%d blocks to make, %d are saved", len(wanted), sum(map(len, saved.values())))
-    with CellProgress(sum(sizes.values()), done, as_json) as progress:
+    with Progress("simulating", "cells", sum(sizes.values()), done, as_json) as progress:
 
         def deliver(name, index, block):
             products.save_block(blocks, name, index, block)

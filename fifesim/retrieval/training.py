@@ -109,7 +109,7 @@ def train(
     ('lookup', ('TM3', 'TM4'), ('lai', 'fpar'))
     """
     names = (quantities,) if isinstance(quantities, str) else tuple(quantities)
-    _check(method, names, levels, level, pixels)
+    _check(names, levels)
     dataset = (
         source
         if isinstance(source, xr.Dataset)
@@ -158,13 +158,7 @@ def train(
     return retrieval
 
 
-def _check(method, names, levels, level, pixels):
-    for argument, value, allowed in (
-        ("method", method, methods.ESTIMATORS), ("level", level, ("toa", "surface")),
-        ("pixels", pixels, ("chain", "uniform")),
-    ):  # fmt: skip
-        if value not in allowed:
-            raise ValueError(f"{argument} must be one of {', '.join(allowed)}, got {value!r}")
+def _check(names, levels):
     wrong = [name for name in names if name not in RETRIEVED]
     if wrong or not names or len(set(names)) < len(names):
         raise ValueError(f"quantities must be different names among {', '.join(RETRIEVED)}, got {described(names)}")

@@ -19,7 +19,7 @@ from fifesim.output.chips import datasheet, store
 from fifesim.output.chips.makers import made_shards, processes, workers_of
 from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, errors_with_their_file, results
 from fifesim.output.products import has_blocks, save_block, saved_block
-from fifesim.output.progress import ChipProgress
+from fifesim.output.progress import Progress
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.studies import Study, StudyLike, read_study
@@ -212,7 +212,7 @@ def _compute(chips, layout, shards, folder, as_json, makers):
     blocks, names = folder / "blocks", list(layout.variables)
     wanted = [shard for shard in range(len(shards)) if not _is_written(folder, blocks, names, shard)]
     done = len(chips) - sum(np.diff(shards.range_of(shard)).item() for shard in wanted)
-    with ChipProgress(len(chips), done, as_json) as progress:
+    with Progress("making chips", "chips", len(chips), done, as_json) as progress:
         for shard, arrays in made_shards(chips, layout, shards, wanted, progress.advance, makers):
             store.write_shard(folder, shards.range_of(shard)[0], arrays)
             save_block(blocks, _SAVED, (shard,), store.checksums(folder, names, shard))
