@@ -403,7 +403,7 @@ def test_a_function_that_looks_is_still_a_function(name):
 
 def test_what_a_user_typed(calls):
     """Messages that were raw: each names the argument and what to type."""
-    lai, rho, grid = calls["fpar"]["lai"], calls["to_toa"]["reflectance"], calls["lai_scene"]["grid"]
+    lai, rho = calls["fpar"]["lai"], calls["to_toa"]["reflectance"]
     masked = np.ma.masked_less(lai.values, 1)
     typed = [
         (lambda: fifesim.Geometry([30, 40], 100.0), "sza of a Geometry is one number, got an array: .*xarray.Dataset"),
@@ -417,7 +417,6 @@ def test_what_a_user_typed(calls):
             r"dem must be .* variables, such as dataset\['lai'\]",
         ),
         (lambda: fifesim.slope("dem.tif"), "dem must be .*rioxarray.open_rasterio"),
-        (lambda: lai.fifesim.aggregate(grid), "pixel must be a size in metres, such as 30.0, got GeoBox"),
         (lambda: lai.fifesim.aggregate("30"), "pixel must be a size in metres, such as 30.0, got '30'"),
         (lambda: lai[:0].fifesim.fpar(), "lai has no cells, its sizes are y: 0, x: 12"),
         (lambda: rho.fifesim.to_toa(surroundings="lake", adjacency=True), "surroundings must be a reflectance.*'lake'"),
@@ -427,18 +426,12 @@ def test_what_a_user_typed(calls):
         ),
         (lambda: rho.fifesim.sense("TM", noise=True), r"noise must .*such as \['shot', 'thermal'\].*got True"),
         (lambda: fifesim.psf("TM", ["TM3"]), "band must be a name, got a list of 1"),
-        (lambda: fifesim.regress(np.ones(3), lai), "y must be an xarray.DataArray over"),
-        (lambda: lai.fifesim.regress(np.ones(3)), "x must be an xarray.DataArray over"),
         (lambda: fifesim.lai_scene(lai), "grid must be .*GeoBox.*type raster.odc.geobox"),
         (
             lambda: lai.fifesim.surface_reflectance(canopy=fifesim.Canopy(hotspot=lai)),
             "hotspot must be a number, got an xarray.DataArray",
         ),
         (lambda: lai.fifesim.surface_reflectance(exact="no"), "exact must be True or False, got 'no'"),
-        (lambda: fifesim.to_geotiff(lai, "lai.tif", overwrite="no"), "overwrite must be True or False, got 'no'"),
-        (lambda: fifesim.open_landsat("x_MTL.txt", quality="yes"), "quality must be True or False, got 'yes'"),
-        (lambda: fifesim.open_sentinel2("x.SAFE", quality=1), "quality must be True or False, got 1"),
-        (lambda: lai.fifesim.surface_reflectance("TM", dems=1), r"no argument 'dems': did you mean 'dem'"),
         (
             lambda: rho.drop_vars(["band", "wavelength"]).drop_attrs(deep=False).fifesim.to_toa(),
             "no instrument and no wavelength",

@@ -49,11 +49,11 @@ def dense(operator, n_cells):
     return matrix
 
 
-def operator(n_cells, n_pixels, pixel=30.0, origin=0.0, width=TM_WIDTH):
+def operator(n_cells, n_pixels, pixel=30.0, origin=0.0, width=TM_WIDTH, cell=CELL, cell_origin=0.0):
     return axis_operator(
         CosineSpread(width),
-        cell_origin=0.0,
-        cell_size=CELL,
+        cell_origin=cell_origin,
+        cell_size=cell,
         n_cells=n_cells,
         pixel_origin=origin,
         pixel_size=pixel,
@@ -84,18 +84,7 @@ def test_sinusoid_is_reduced_by_the_mtf(wavelength, interval):
     cell, n_cells, n_pixels, k = 5e-4, 200_000, 2, 2 * np.pi / wavelength
     edges = np.arange(n_cells + 1) * cell
     scene = np.diff(np.sin(k * edges)) / (k * cell)
-    columns = axis_operator(
-        CosineSpread(TM_WIDTH),
-        cell_origin=0.0,
-        cell_size=cell,
-        n_cells=n_cells,
-        pixel_origin=17.3,
-        pixel_size=interval,
-        n_pixels=n_pixels,
-    )
-    row = axis_operator(
-        CosineSpread(1.0), cell_origin=0, cell_size=1, n_cells=1, pixel_origin=0, pixel_size=1, n_pixels=1
-    )
+    columns, row = operator(n_cells, n_pixels, interval, 17.3, cell=cell), operator(1, 1, 1.0, width=1.0, cell=1.0)
     mtf = quad(lambda x: density(x, TM_WIDTH) * np.cos(k * x), -TM_WIDTH / 2, TM_WIDTH / 2, epsabs=1e-13)[0]
     centers = 17.3 + (np.arange(n_pixels) + 0.5) * interval
     np.testing.assert_allclose(regularize(scene[None], row, columns), [mtf * np.cos(k * centers)], rtol=0, atol=1e-9)
@@ -182,15 +171,7 @@ def test_window_holds_only_the_cells_that_are_needed():
 
 def test_rows_of_a_north_up_grid_count_from_the_north():
     """Negative sizes mirror the axis; coordinates of millions of metres keep their digits."""
-    north = axis_operator(
-        CosineSpread(TM_WIDTH),
-        cell_origin=4334211.0,
-        cell_size=-CELL,
-        n_cells=90,
-        pixel_origin=4334211.0 - 7.5,
-        pixel_size=-30.0,
-        n_pixels=9,
-    )
+    north = operator(90, 9, -30.0, 4334211.0 - 7.5, cell=-CELL, cell_origin=4334211.0)
     plain = operator(90, 9, origin=7.5)
     np.testing.assert_array_equal(north.start, plain.start)
     np.testing.assert_allclose(north.weights, plain.weights, rtol=0, atol=1e-12)

@@ -297,28 +297,6 @@ def test_rasters_without_a_crs_take_that_of_their_cells_alone(lai, site):
             lai.fifesim.surface_reflectance(bands=TM34, canopy=fifesim.Canopy(background=other * 0.01))
 
 
-def test_every_combination_of_rasters_takes_one(lai):
-    """Background, elevation, angles, surroundings and pairs; to the bit as with the CRS."""
-    soil, dem = (lai * 0.01).clip(0, 1), lai * 20 + 300
-    rho = lai.fifesim.surface_reflectance(bands=TM34)
-
-    def steps(of):
-        sza = of(30 + lai.drop_attrs(deep=False))
-        yield lai.fifesim.surface_reflectance(bands=TM34, canopy=fifesim.Canopy(background=of(soil)))
-        yield lai.fifesim.surface_reflectance(bands=TM34, dem=of(dem.drop_attrs(deep=False)))
-        yield lai.fifesim.surface_reflectance(bands=TM34, geometry=xr.Dataset({"sza": sza, "saa": 100.0}))
-        yield rho.fifesim.kt(of(dem.drop_attrs(deep=False)))
-        yield rho.fifesim.to_toa(elevation=of(dem.drop_attrs(deep=False)))
-        yield rho.fifesim.to_toa(adjacency=True, surroundings=of(rho.drop_attrs(deep=False)))
-        yield xr.DataArray(fifesim.regress(lai, of(soil)).slope)
-        yield xr.DataArray(fifesim.regress(of(soil), lai).slope)
-
-    for kept, without in zip(steps(lambda raster: raster), steps(lost), strict=True):
-        xr.testing.assert_equal(without, kept)
-        if kept.ndim:
-            assert grids.same_grid(grids.geobox(without), grids.geobox(kept))
-
-
 GRID = fifesim.fife_site(cell=10, window=((0, 60), (0, 60)))
 WINDOW = fifesim.fife_site(cell=10, window=((10, 40), (10, 40)))
 

@@ -250,8 +250,7 @@ def composite(lai_values):
 
 
 @EAGER_OR_LAZY
-@pytest.mark.parametrize("dtype", ["float64", "float32"])
-@pytest.mark.parametrize("bands", [True, False], ids=["bands", "ndvi"])
+@pytest.mark.parametrize(("dtype", "bands"), [("float64", True), ("float32", False)], ids=["bands", "ndvi"])
 def test_dates_of_a_composite_come_back(composite, tmp_path, dtype, chunks, bands):
     dates = composite["date"]
     assert np.unique(dates).size == 3 and dates.isnull().any()
