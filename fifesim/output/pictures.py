@@ -109,7 +109,7 @@ def plot(
             middle = middle if cmap is None else None
             limits = colours.percentile_limits(shown, stretch or colours.PERCENTILES, middle)
         low, high = map(float, limits)
-        drawn = _draw(axes, shown, cmap=own if cmap is None else cmap, vmin=low, vmax=high)
+        drawn = _draw(axes, shown, own if cmap is None else cmap, (low, high))
         beyond = bool((shown < low).any()), bool((shown > high).any())
         extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(beyond, "neither")
         words = f"{colours.short_name(shown)} {colours.unit(shown)}".strip()
@@ -320,7 +320,7 @@ def plot_comparison(images: xr.DataTree, *, limits: tuple[float, float] | None =
         axes.set_axis_off()
     for axes, (name, array) in zip(panels.ravel(), maps.items(), strict=False):
         axes.set_facecolor(colours.NO_DATA)
-        drawn = _draw(axes, array, cmap=colours.colours_of("ndvi")[0], vmin=limits[0], vmax=limits[1])
+        drawn = _draw(axes, array, colours.colours_of("ndvi")[0], limits)
         pixel = grids.cell_size(grids.geobox(recorded[name]))[0]
         mean, deviation = float(array.mean()), float(array.std())
         blur = image_origins(recorded[name])["blur"]
@@ -349,9 +349,10 @@ def _checked(raster, band):
     return raster.transpose(..., *(swaths.DIMS if "line" in raster.dims else ("y", "x")))
 
 
-def _draw(axes, array, rgba=None, **style):
-    """Draw a raster as a map with equal scales in metres or kilometres."""
-    values = array.values if rgba is None else rgba
+def _draw(axes, array, cmap=None, limits=(None, None), rgba=None):
+    """Draw a raster as a map with equal scales in metres or kilometres, by a colour map or in given colours."""
+    values, (low, high) = array.values if rgba is None else rgba, limits
+    style = {"cmap": cmap, "vmin": low, "vmax": high}
     if "line" in array.dims and "x" not in array.coords:
         latitude, longitude, values = _mesh(array, ("latitude", "longitude"), values)
         drawn = axes.pcolormesh(longitude, latitude, values, **style)
