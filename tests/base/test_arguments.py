@@ -93,7 +93,8 @@ ACCEPTED = {
     # Names of three bands, which a raster without bands does not need; two limits; None where it says something.
     ("plot", "composite"): LIST, ("plot", "limits"): LIST, ("plot_comparison", "limits"): LIST,
     ("plot", "stretch"): LIST,
-    **{("cloud_field", name): LIST for name in ("thickness", "height", "drift")}, ("overpasses", "place"): LIST,
+    **{("cloud_field", name): LIST for name in ("thickness", "height", "drift")},
+    ("cloud_field", "time"): {"list", "1-d"}, ("overpasses", "place"): LIST,
     ("train", "levels"): LIST, ("retrieve", "intervals"): LIST, ("train", "path"): {"str"},
     ("score", "by"): LIST, ("score", "truth"): {"crs"}, ("rgb", "stretch"): LIST,
     ("calibrate", "saturated"): {"none"}, ("simulate", "chunks"): {"none"},

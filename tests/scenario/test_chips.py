@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fifesim.ground.landscape.autoregression import FIELD_TILE
-from fifesim.scenario.chips import chips_of, first_cell_of_chip
+from fifesim.scenario.chips import chips_of, first_cell_of_chip, ring_place
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.studies import Study
 
@@ -117,3 +117,20 @@ def test_chips_fill_a_tile_before_the_next():
     for number in range(9):
         row, column = first_cell_of_chip(number, (333, 333), (211491, 5000), 1008)
         assert (row + 332) // 1008 == row // 1008 and (column + 332) // 1008 == column // 1008
+
+
+def test_the_spiral_goes_step_by_step_through_all_places():
+    places = [ring_place(number) for number in range(15**2)]
+    assert set(places) == set(itertools.product(range(-7, 8), repeat=2))
+    steps = [abs(a - c) + abs(b - d) for (a, b), (c, d) in itertools.pairwise(places)]
+    assert set(steps) == {1}
+    # A ring begins up its right side; chips that are larger than a tile lie in such rings, north above south.
+    assert [first_cell_of_chip(number, (13, 14), (0, 0), 10) for number in (0, 1, 2)] == [(0, 0), (0, 14), (-13, 14)]
+
+
+def test_a_tile_holds_the_margins_of_its_chips():
+    """With 24 cells around them only four chips of 333 fit into a tile of 1008."""
+    places = [first_cell_of_chip(number, (333, 333), (211491, 5000), 1008, (24, 24)) for number in range(8)]
+    for row, column in places:
+        assert (row - 24) // 1008 == (row + 356) // 1008 and (column - 24) // 1008 == (column + 356) // 1008
+    assert len({(row // 1008, column // 1008) for row, column in places}) == 2
