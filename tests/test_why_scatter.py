@@ -23,14 +23,14 @@ def why(monkeypatch):
 @pytest.fixture
 def case(why):
     """A small part of the scene without hills, which take more time than all else."""
-    sections = why.scenario(cells=108).model_dump(exclude_unset=True)
+    sections = why.scenario(cells=90).model_dump(exclude_unset=True)
     sections["terrain"], sections["landscape"]["covary"] = {"dem": "flat"}, {"soil": -0.3}
     return fifesim.Scenario(**sections)
 
 
 def test_panels_are_the_budget_of_their_scene(why, case):
     found = why.panels(case)
-    budget = fifesim.budget(case, realisations=1, cells=108).isel(realisation=0).sel(variable="lai")
+    budget = fifesim.budget(case, realisations=1, cells=90).isel(realisation=0).sel(variable="lai")
     assert found[0].r2 == pytest.approx(1 - float(budget["curvature"]), abs=1e-9)
     assert found[-1].r2 == pytest.approx(1 - float(budget["total"]), abs=1e-9)
     assert len({panel.r2 for panel in found}) >= 5
