@@ -278,22 +278,7 @@ def _modes(sky, weights, points):
 
 
 def weighted_sky(radiance, returned, sza):
-    """
-    SkyWeights of a radiance.
-
-    Parameters
-    ----------
-    radiance : callable
-        ``radiance(zenith, azimuth)`` of shape (n, m), for zenith angles (n,) and azimuths from the sun (m,) [degree].
-    returned : callable
-        ``returned(zenith)``, radiance of the light that the atmosphere returns, shape (n,).
-    sza : float
-        Zenith angle of the sun. [degree]
-
-    Returns
-    -------
-    sky : SkyWeights
-    """
+    """SkyWeights of ``radiance(zenith, azimuth)``, shape (n, m), and of ``returned(zenith)``, shape (n,) [degree]."""
     aside = {edge for step in (*_ASIDE, 0) for edge in (sza - step, sza + step) if 2 < edge < 80}
     zenith, zenith_weights = _panels(sorted({0.0, 80.0, 90.0, *aside}), _POINTS[0])
     azimuth, azimuth_weights = _panels(_AROUND, _POINTS[1])
@@ -304,28 +289,7 @@ def weighted_sky(radiance, returned, sza):
 
 
 def mixed_sky(tau_molecules, tau_aerosol, single_scattering_albedo, moments, optics, sza, **options):
-    """
-    SkyWeights of molecules and aerosol by successive orders.
-
-    Parameters
-    ----------
-    tau_molecules, tau_aerosol, single_scattering_albedo, moments
-        As in `fifesim.atmosphere.successive_orders.stokes_reflectance`.
-    optics : callable
-        Phase function and degree of polarization of the aerosol, for cosines of scattering angles.
-    sza : float
-        [degree]
-    **options
-        ``vertical`` and ``depolarization``, as in `fifesim.atmosphere.successive_orders.stokes_reflectance`.
-
-    Returns
-    -------
-    sky : SkyWeights
-
-    References
-    ----------
-    [Lenoble2007]_
-    """
+    """SkyWeights by `stokes_reflectance`; ``optics(cosine)`` is phase function and polarization of the aerosol."""
     matter = tau_molecules, tau_aerosol, single_scattering_albedo, moments
 
     def radiance(zenith, azimuth):
