@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.arguments import Interval, NoiseKinds, NumberByBand, Offset, Time, WholeNumber
+from fifesim.base.arguments import Interval, NoiseKinds, NumberByBand, Offset, Time, WholeNumber, described
 from fifesim.base.bands import check_counts
 from fifesim.base.geometry import ANGLES
 from fifesim.base.lattice import check_seed
@@ -330,23 +330,29 @@ def _history(description, interval, offset, gain_drift, noise, seed, quantise, s
     return ", ".join(filter(None, parts))
 
 
+def numbers_of_bands(given, bands, name):
+    """One number for each band, from one for all, one for each, or a mapping or raster by names of bands."""
+    names = [band.name for band in bands]
+    if isinstance(given, xr.DataArray) and "band" in given.dims:
+        given = dict(zip(given["band"].values.tolist(), given.values, strict=True))
+    if isinstance(given, Mapping):
+        if missing := [each for each in names if each not in given]:
+            raise ValueError(f"{name} has no number for {', '.join(missing)}: it has {', '.join(map(str, given))}")
+        given = [given[each] for each in names]
+    values = np.asarray(given, float)
+    if values.shape not in ((), (len(names),)) or not np.isfinite(values).all():
+        raise ValueError(f"{name} must be a number, or one for each of {len(names)} bands, got {described(given)}")
+    return np.broadcast_to(values, len(names))
+
+
 def drifted(radiance, bands, gain_drift):
     """Radiance as detectors record it whose response has drifted since the calibration. [W m-2 sr-1 um-1]"""
-    names = [band.name for band in bands]
-    if isinstance(gain_drift, xr.DataArray) and "band" in gain_drift.dims:
-        gain_drift = dict(zip(gain_drift["band"].values.tolist(), gain_drift.values, strict=True))
-    if isinstance(gain_drift, Mapping):
-        if missing := [name for name in names if name not in gain_drift]:
-            raise ValueError(f"gain_drift lacks band {', '.join(missing)}, it has {', '.join(map(str, gain_drift))}")
-        gain_drift = [gain_drift[name] for name in names]
-    factors = np.asarray(gain_drift, float)
-    if factors.shape not in ((), (len(names),)):
-        raise ValueError(f"gain_drift must be a number, or one for each of {', '.join(names)}, got {factors.tolist()}")
-    if not np.all((factors > 0) & np.isfinite(factors)):
-        raise ValueError(f"gain_drift must be a factor above 0, such as 0.98, got {factors.tolist()}")
+    factors = numbers_of_bands(gain_drift, bands, "gain_drift")
+    if not np.all(factors > 0):
+        raise ValueError(f"gain_drift must be a factor above 0, such as 0.98, got {factors.min():g}")
     if np.all(factors == 1):
         return radiance
-    factors = xr.Variable("band", np.broadcast_to(factors, len(names)))
+    factors = xr.Variable("band", factors)
     return radiance.copy(data=(radiance.variable * factors).transpose(*radiance.dims).astype(radiance.dtype).data)
 
 

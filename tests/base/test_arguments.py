@@ -87,6 +87,7 @@ ACCEPTED = {
     **{("sun_position", name): {"list", "1-d"} for name in ("latitude", "longitude", "altitude")},
     # Pairs: down and across, or bottom and top.
     ("grid_at", "cell"): LIST, ("read_aerosol", "layer"): LIST, ("sense", "interval"): LIST, ("sense", "offset"): LIST,
+    ("sense", "gain_drift"): LIST,
     # Statistics need no places, and chunks of a raster elsewhere are chunks.
     ("density", "array"): {"1-d", "crs"}, ("share_kept", "pixels"): {"1-d", "crs"}, ("share_kept", "cells"): {"crs"},
     ("horizon", "beside"): {"crs"}, ("scale_bias", "array"): {"crs"}, ("landscape", "dem"): {"crs"},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from functools import partial
 from typing import Annotated, Literal, TypeAlias
 
@@ -197,7 +196,9 @@ def calibrate(
         compression = [band.compressed_count(bits) for band in bands]
         full = bits
     else:
-        gain, offset = (_by_band(given, bands, name) for name, given in (("gain", gain), ("offset", offset)))
+        gain, offset = (
+            sensor_labels.numbers_of_bands(given, bands, name) for name, given in (("gain", gain), ("offset", offset))
+        )
         bits = 16 if dn.dtype.itemsize > 1 else 8
         # Products of instruments of up to 8 bits have 8, also where they are stored in wider numbers.
         full = 8 if description.bits <= 8 else bits
@@ -236,16 +237,3 @@ def _saturation(given, full, largest):
     if isinstance(given, bool | str) or not 0 < given <= largest:
         raise ValueError(f"saturated must be 'largest', None, or a digital number from 1 to {largest}, got {given!r}")
     return given
-
-
-def _by_band(given, bands, name):
-    """One number for each band."""
-    if isinstance(given, Mapping):
-        missing = [band.name for band in bands if band.name not in given]
-        if missing:
-            raise ValueError(f"{name} has no number for {', '.join(missing)}: it has {', '.join(map(str, given))}")
-        given = [given[band.name] for band in bands]
-    values = np.asarray(given, float)
-    if values.shape not in ((), (len(bands),)) or not np.isfinite(values).all():
-        raise ValueError(f"{name} must be a number, or one for each of {len(bands)} bands, got {given!r}")
-    return np.broadcast_to(values, (len(bands),))
