@@ -79,7 +79,7 @@ def test_dates_have_their_own_registration_error_and_response(toa):
     for wrong, message in (
         (0.0, "gain_drift must be a factor above 0"),
         ({"TM3": 1.0}, "gain_drift has no number for TM4: it has TM3"),
-        ([1.0, 2.0, 3.0], "one for each of TM3, TM4"),
+        ([1.0, 2.0, 3.0], "one for each of 2 bands, got a list of 3"),
     ):
         with pytest.raises(ValueError, match=message):
             toa.fifesim.sense("TM", gain_drift=wrong)
