@@ -133,8 +133,10 @@ def test_fused_reflectance_is_rho_kt_and_the_view_factor(lit):
 
 
 @pytest.mark.parametrize("upwelling", [True, False])
-def test_fused_factor_has_the_bits_of_the_formula_and_comes_with_reflectance(lit, upwelling):
+def test_fused_factor_has_the_bits_of_the_formula_and_comes_with_reflectance(lit, upwelling, monkeypatch):
+    """Also in strips of two rows."""
     arguments, _, kt = lit
+    monkeypatch.setattr(lights, "_STRIP", 70)
     assert lights.slope_factor(*arguments).tobytes() == kt.tobytes()
     factor, reflectance = lights.slope_factor_and_reflectance(*arguments, upwelling)
     assert factor.tobytes() == kt.tobytes()
@@ -149,12 +151,16 @@ def test_bands_last_in_memory_are_no_other_bands(lit, make):
 
 
 def test_places_between_are_interpolated():
-    """A sky that varies evenly is met exactly between its places, and beyond them."""
+    """A sky that varies evenly is met exactly between its places, and beyond them; some rows are those of the whole."""
     rows, columns = np.arange(20.0), np.arange(24.0)
     value = 0.6 + 0.01 * rows[:, None] + 0.005 * columns
-    layers = np.zeros((4, 3, 3))
-    layers[2] = value[4:17:6, 5:18:6]
-    row, column = (np.clip((axis - first).astype(int) // 6, 0, 1) for axis, first in ((rows, 4), (columns, 5)))
-    sky = lights.Sky(layers, row, (rows - 4 - 6 * row) / 6, column, (columns - 5 - 6 * column) / 6)
+    layers = np.zeros((4, 5, 3))
+    layers[2] = value[4:17:3, 5:18:6]
+    row = np.clip((rows - 4).astype(int) // 3, 0, 3)
+    column = np.clip((columns - 5).astype(int) // 6, 0, 1)
+    sky = lights.Sky(layers, row, (rows - 4 - 3 * row) / 3, column, (columns - 5 - 6 * column) / 6)
     light = lights.slope_light(np.zeros((22, 26)), sky, (1.0, 1.0), Geometry(30.0, 0.0))
     np.testing.assert_allclose(light.sky_view, np.clip(value, 0, 1), rtol=1e-12)
+    some = sky._replace(row=row[9:14], row_share=sky.row_share[9:14])
+    part = lights.slope_light(np.zeros((7, 26)), some, (1.0, 1.0), Geometry(30.0, 0.0))
+    np.testing.assert_array_equal(part.sky_view, light.sky_view[9:14])
