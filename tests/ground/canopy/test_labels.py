@@ -240,6 +240,19 @@ def test_green_leaves_absorb_less_than_all(lai, rasters):
     np.testing.assert_allclose(whole, fifesim.fpar(lai).where(brown.notnull()), rtol=1e-14)
 
 
+@pytest.mark.parametrize("exact", [False, True])
+@pytest.mark.parametrize("by_cell", [False, True])
+def test_leaf_area_that_crowns_cannot_hold_is_refused(lai, by_cell, exact):
+    cover = xr.full_like(lai, 1e-3).drop_attrs(deep=False) if by_cell else 1e-3
+    with pytest.raises(ValueError, match="within the crowns is lai / crown_cover, at most 100"):
+        shared_reflectance(lai, Canopy(crown_cover=cover), exact=exact)
+
+
+def test_one_band_has_one_layer(lai):
+    found = fifesim.surface_reflectance(lai, bands=["TM4"], canopy=Canopy(hotspot=0.1))
+    np.testing.assert_array_equal(found[0], shared_reflectance(lai, Canopy(hotspot=0.1))[1])
+
+
 def test_shares_of_another_unit_are_refused(lai, rasters):
     brown, _ = rasters
     with pytest.raises(ValueError, match="units '%'"):
