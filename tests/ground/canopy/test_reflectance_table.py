@@ -5,12 +5,14 @@ import pytest
 
 from fifesim.ground.canopy import interpolation
 from fifesim.ground.canopy.interpolation import LARGEST_TABLE_LAI
+from fifesim.ground.canopy.layers import light_budget
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.reflectance_table import (
     Scene,
     canopy_reflectance,
     cell_by_cell,
     directional_reflectance,
+    scene_light,
     varied_reflectance,
 )
 from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
@@ -173,3 +175,20 @@ def test_canopies_beyond_the_table_are_the_models_themselves(varied_cells):
     np.testing.assert_array_equal(found[:, 2:4], exact[:, 2:4])
     given = given._replace(dissociation=cover)
     np.testing.assert_array_equal(varied_reflectance(lai, ground, given), cell_by_cell(lai, ground, given))
+
+
+@pytest.mark.parametrize("part", ["all", "green", "light"])
+@pytest.mark.parametrize("by_cell", [False, True])
+def test_absorbed_light_of_cells_is_the_budget_of_each_averaged_over_bands(varied_cells, part, by_cell):
+    lai, brown, _, ground = (each[..., :40] for each in varied_cells)
+    brown, below = (brown, ground) if by_cell else (0.3, np.array([[0.1], [0.25]]))
+    scene, weights = varied_scene(35, 0, 0, 0, "spherical", brown=brown, dissociation=0.4), (0.3, 0.7)
+    background = below.reshape(2, 5, 8) if by_cell else below[:, 0]
+    found = scene_light(lai.reshape(5, 8), background, scene, weights, part)
+    optics = zip(*BOTH_LEAVES.values(), below, weights, strict=True)
+    total = sum(
+        weight * np.array(light_budget(lai, *leaves, soil, brown=brown, dissociation=0.4, sza=35, diffuse_fraction=sky))
+        for *leaves, sky, soil, weight in optics
+    )
+    expected = {"all": total[:1] + total[1:2], "green": total[:1], "light": total}[part]
+    np.testing.assert_allclose(found, expected.reshape(-1, 5, 8), rtol=0, atol=1e-6)
