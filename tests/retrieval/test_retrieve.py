@@ -60,6 +60,10 @@ def test_retrieved_map_is_near_the_truth_and_on_its_grid(retrieval, image):
     inside = found.where(found.flag >= 0)
     assert bool((inside.lai_low <= inside.lai_high).where(inside.lai.notnull(), True).all())
     assert bool((inside.lai_low.diff("level") <= 0).where(inside.lai.notnull(), True).all())
+    if retrieval.method == "line":
+        # Normal errors, where the lower end is not clipped.
+        width = (found.lai_high - found.lai_low).sel(level=0.8).where(found.lai_low.sel(level=0.8) > 0)
+        np.testing.assert_allclose(width / (2 * 1.28155 * found.lai_sd), np.where(width > 0, 1, np.nan), rtol=0.01)
     assert found.flag.dtype == np.int8
     missing = light.isnull().any("band")
     assert np.array_equal(found.flag.values == -1, missing.values) and np.array_equal(found.lai.isnull(), missing)
@@ -110,6 +114,10 @@ def test_foreign_spectra_and_the_edge_of_the_prior_are_flagged(retrieval, image)
     # Dense grass: brighter in the near infrared and darker in red than any pixel of the training.
     dense = light.where(light.band == "MSI8", 0.04).where(light.band != "MSI8", 0.42)
     assert (dense.fifesim.retrieve(retrieval).flag.values[1:-1, 1:-1] > 0).all()
+
+
+def test_ends_of_intervals_are_ordered_around_the_median():
+    np.testing.assert_allclose(methods.probabilities_of((0.5, 0.8)), [0.1, 0.25, 0.5, 0.75, 0.9])
 
 
 def test_stretch_gives_every_landscape_the_same_weight():
