@@ -101,7 +101,10 @@ def pastures(seed, down, across, class_of=None):
             for (top, left, bottom, right), number in _fenced(seed, row, column):
                 within = rows[(down[rows] - row >= top) & (down[rows] - row < bottom)]
                 beside = columns[(across[columns] - column >= left) & (across[columns] - column < right)]
-                out[within[:, None], beside] = number if class_of is None else class_of(number)
+                if within.size and beside.size:
+                    # Places are in order, so that a pasture is a rectangle of cells.
+                    rectangle = slice(within[0], within[-1] + 1), slice(beside[0], beside[-1] + 1)
+                    out[rectangle] = number if class_of is None else class_of(number)
     return out
 
 

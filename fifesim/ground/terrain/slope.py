@@ -46,9 +46,23 @@ def terrace_step(values):
 def bilinear(layer, rows, columns):
     """Bilinear interpolation between places, constant after the last place, shape (rows, columns)."""
     (row, down), (column, across) = rows, columns
-    lines = layer[row] * (1 - down[:, None]) + layer[np.minimum(row + 1, layer.shape[0] - 1)] * down[:, None]
-    after = np.minimum(column + 1, layer.shape[1] - 1)
-    return lines[:, column] * (1 - across) + lines[:, after] * across
+    out = np.empty((row.size, column.size))
+    _bilinear(np.asarray(layer, float), row, down, column, across, out)
+    return out
+
+
+@compiled
+def _bilinear(layer, row, down, column, across, out):
+    line = np.empty(layer.shape[1])
+    last = layer.shape[0] - 1, layer.shape[1] - 1
+    for i in range(row.size):
+        one, other = row[i], min(row[i] + 1, last[0])
+        share = down[i]
+        for k in range(line.size):
+            line[k] = layer[one, k] * (1 - share) + layer[other, k] * share
+        for j in range(column.size):
+            before = column[j]
+            out[i, j] = line[before] * (1 - across[j]) + line[min(before + 1, last[1])] * across[j]
 
 
 class Vector(NamedTuple):
@@ -158,17 +172,17 @@ def slope_angles(east, north):
     """Slope and aspect of a gradient. [degree]"""
     # 0 - x and not -x: level ground must not face -0.
     aspect = np.degrees(np.arctan2(0 - east, 0 - north)) % 360
-    return _slope_angle(east, north), np.where(aspect == 360, 0.0, aspect)
-
-
-def _slope_angle(east, north):
     # np.hypot foresees overflow, and takes five times as long for the same digits but the last.
-    return np.degrees(np.arctan(np.sqrt(east * east + north * north)))
+    slope = np.degrees(np.arctan(np.sqrt(east * east + north * north)))
+    return slope, np.where(aspect == 360, 0.0, aspect)
 
 
 def steepness(dem, cell_y, cell_x):
     """Slope without aspect, with the bits of `slope_aspect`, shape (rows, columns). [degree]"""
-    return _slope_angle(*gradient(dem, cell_y, cell_x))
+    dem = np.ascontiguousarray(dem, float)
+    out = np.empty((dem.shape[0] - 2, dem.shape[1] - 2))
+    _tangent(dem, 2.0 * cell_y, 2.0 * cell_x, out)
+    return np.degrees(np.arctan(out, out=out), out=out)
 
 
 @compiled
@@ -182,6 +196,18 @@ def _gradient(dem, rows, columns, over_y, over_x, out):
                 continue
             out[0, i, j] = rise(dem[row, column - 1], here, dem[row, column + 1]) / over_x
             out[1, i, j] = rise(dem[row + 1, column], here, dem[row - 1, column]) / over_y
+
+
+# Divided as numpy does: a check of each divisor for 0 would keep a loop from taking several cells at once.
+@compiled
+def _tangent(dem, over_y, over_x, out):
+    """Tangent of the slope."""
+    for i in range(out.shape[0]):
+        above, here, below, line = dem[i], dem[i + 1], dem[i + 2], out[i]
+        for j in range(line.size):
+            east = rise(here[j], here[j + 1], here[j + 2]) / over_x
+            north = rise(below[j + 1], here[j + 1], above[j + 1]) / over_y
+            line[j] = np.nan if np.isnan(here[j + 1]) else np.sqrt(east * east + north * north)
 
 
 def direction_vector(zenith, azimuth):
