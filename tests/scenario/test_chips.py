@@ -1,4 +1,4 @@
-"""Chips: by landscape apart, drawn as the study says, and each a scenario of its own."""
+"""Chips: landscapes lie apart, draws follow the study, and each chip is a scenario."""
 
 import itertools
 
@@ -18,32 +18,32 @@ DRAWS = {
 }
 
 
-def study_of(sections=(), **plan):
+def make_study(sections=(), **plan):
     return Study(parse_scenario(SMALL | dict(sections)), DRAWS, **{"landscapes": 8} | plan)
 
 
 @pytest.fixture(scope="module")
 def chips():
-    return chips_of(study_of(), 300)
+    return chips_of(make_study(), 300)
 
 
 @pytest.mark.parametrize("sequence", ["sobol", "random"])
-def test_chips_are_the_same_however_many_there_are(sequence):
-    few, many = (chips_of(study_of(sequence=sequence), count).table() for count in (13, 200))
+def test_chips_do_not_depend_on_their_number(sequence):
+    few, many = (chips_of(make_study(sequence=sequence), count).table() for count in (13, 200))
     assert few.equals(many.isel(chip=slice(13)))
-    other = chips_of(study_of(sequence=sequence, seed=1), 200).table()
+    other = chips_of(make_study(sequence=sequence, seed=1), 200).table()
     assert (other["atmosphere.visibility"] != many["atmosphere.visibility"]).all()
     assert (other.landscape != many.landscape).any()
 
 
-def test_no_landscape_is_in_two_parts(chips):
+def test_each_landscape_belongs_to_one_part(chips):
     parts = {name: set(chips.landscape[chips.split == name].tolist()) for name in ("train", "validation", "test")}
     assert [len(each) for each in parts.values()] == [6, 1, 1]
     assert set.union(*parts.values()) == set(range(8))
 
 
-def test_the_first_chips_lie_in_the_tile_of_the_scenario(chips):
-    """Upper left corners: the first is that of a place in the tile of 1008 cells that holds the scenario's own."""
+def test_first_chips_lie_in_the_tile_of_the_scenario(chips):
+    """The eight landscapes start at the same upper left corner, in the scenario's tile of 1008 cells."""
     table, grid = chips.table(), chips.study.scenario.geobox()
     cell, side = grid.resolution.x, FIELD_TILE * grid.resolution.x
     first = table.isel(chip=slice(8))
@@ -62,15 +62,15 @@ def test_a_landscape_has_one_seed_and_one_arp(chips):
     assert table["ground.seed"].values.min() == chips.study.scenario.ground.seed
 
 
-def test_every_landscape_sees_the_whole_range_of_what_is_drawn_by_chip():
-    """Points of a Sobol sequence that are eight apart lie in an eighth of the first dimension."""
-    table = chips_of(study_of(), 8 * 40).table()
+def test_every_landscape_covers_the_range_of_chip_parameters():
+    """Points of a Sobol sequence that are eight apart lie within an eighth of the first dimension."""
+    table = chips_of(make_study(), 8 * 40).table()
     for _, each in table.groupby("landscape"):
         assert np.ptp(each["atmosphere.visibility"].values) > 35
         assert len(set(each["ground.distribution"].values.tolist())) == 2
 
 
-def test_a_chip_is_its_row_of_the_table(chips):
+def test_scenario_of_a_chip_matches_its_row_of_the_table(chips):
     table = chips.table()
     for chip in (0, 17, 299):
         scenario, row = chips.scenario(chip), table.isel(chip=chip)
@@ -82,18 +82,18 @@ def test_a_chip_is_its_row_of_the_table(chips):
         assert scenario.ground.distribution == str(row["ground.distribution"].values)
 
 
-def test_hills_and_noise_have_seeds_of_their_own():
+def test_hills_and_noise_have_separate_seeds():
     sections = {"terrain": {"dem": "flint-hills", "seed": 100}, "sensor": {"instrument": "MSI", "noise": ["shot"]}}
-    table = chips_of(study_of(sections), 24).table()
+    table = chips_of(make_study(sections), 24).table()
     np.testing.assert_array_equal(table["terrain.seed"], 100 + table.landscape)
     np.testing.assert_array_equal(table["sensor.seed"], np.arange(24))
-    assert "terrain.seed" not in chips_of(study_of(), 2).table()
+    assert "terrain.seed" not in chips_of(make_study(), 2).table()
 
 
 @pytest.mark.parametrize("count", [0, -1, 2.5, True])
-def test_a_number_of_chips_is_a_whole_one(count):
+def test_number_of_chips_must_be_a_positive_integer(count):
     with pytest.raises(ValueError, match="n must be an integer of at least 1"):
-        chips_of(study_of(), count)
+        chips_of(make_study(), count)
 
 
 @pytest.mark.parametrize("size", [(4, 5), (3, 5), (10, 3), (13, 4)])
@@ -107,8 +107,8 @@ def test_no_two_chips_share_a_cell(size, corner):
         cells |= own
 
 
-def test_chips_fill_a_tile_before_the_next():
-    """333 cells fit thrice along a tile of 1008."""
+def test_chips_fill_one_tile_before_the_next():
+    """A tile of 1008 cells holds three chips of 333 cells along each side."""
     tiles = [
         tuple(at // 1008 for at in first_cell_of_chip(number, (333, 333), (211491, 5000), 1008)) for number in range(27)
     ]
@@ -119,17 +119,17 @@ def test_chips_fill_a_tile_before_the_next():
         assert (row + 332) // 1008 == row // 1008 and (column + 332) // 1008 == column // 1008
 
 
-def test_the_spiral_goes_step_by_step_through_all_places():
+def test_spiral_visits_every_place_in_unit_steps():
     places = [ring_place(number) for number in range(15**2)]
     assert set(places) == set(itertools.product(range(-7, 8), repeat=2))
     steps = [abs(a - c) + abs(b - d) for (a, b), (c, d) in itertools.pairwise(places)]
     assert set(steps) == {1}
-    # A ring begins up its right side; chips that are larger than a tile lie in such rings, north above south.
+    # A ring starts up its right side. Chips larger than a tile lie in such rings, with north above south.
     assert [first_cell_of_chip(number, (13, 14), (0, 0), 10) for number in (0, 1, 2)] == [(0, 0), (0, 14), (-13, 14)]
 
 
-def test_a_tile_holds_the_margins_of_its_chips():
-    """With 24 cells around them only four chips of 333 fit into a tile of 1008."""
+def test_tile_includes_the_margins_of_its_chips():
+    """With a margin of 24 cells, only four chips of 333 cells fit into a tile of 1008 cells."""
     places = [first_cell_of_chip(number, (333, 333), (211491, 5000), 1008, (24, 24)) for number in range(8)]
     for row, column in places:
         assert (row - 24) // 1008 == (row + 356) // 1008 and (column - 24) // 1008 == (column + 356) // 1008

@@ -1,4 +1,4 @@
-"""Distributions beside those of scipy, and what is none."""
+"""Distributions compared with scipy, and invalid distributions."""
 
 import numpy as np
 import pytest
@@ -20,8 +20,8 @@ SHARES = np.linspace(0, 1, 1001)[:-1]
     ],
     ids=lambda each: next(iter(each)) if isinstance(each, dict) else "",
 )
-def test_draws_have_the_distribution_that_they_are_said_to_have(table, oracle):
-    """The distribution function at a draw is its share; of whole numbers it steps over it."""
+def test_draws_follow_their_distribution(table, oracle):
+    """The CDF at a draw equals its probability; for integers it steps across the probability."""
     values = np.array(distribution_of(table).quantile(SHARES))
     below = oracle.cdf(values)
     if "integers" in table:
@@ -30,14 +30,14 @@ def test_draws_have_the_distribution_that_they_are_said_to_have(table, oracle):
         np.testing.assert_allclose(below, SHARES, atol=1e-9)
 
 
-def test_choices_have_their_weights():
+def test_choices_occur_with_their_weights():
     drawn = distribution_of({"choice": ["a", "b", "c"], "weights": [1, 0, 3]}).quantile(SHARES)
     assert [drawn.count(each) for each in "abc"] == [250, 0, 750]
     even = distribution_of({"choice": [True, False]}).quantile(SHARES)
     assert even.count(True) == 500
 
 
-def test_ends_are_never_passed():
+def test_draws_stay_within_the_limits():
     almost = np.array([0.0, np.nextafter(1, 0)])
     for table in ({"uniform": [0.1, 0.3]}, {"log-uniform": [0.1, 0.3]}, {"normal": [0, 1], "within": [0.1, 0.3]}):
         low, high = distribution_of(table).quantile(almost)
@@ -45,18 +45,18 @@ def test_ends_are_never_passed():
     assert distribution_of({"integers": [3, 7]}).quantile(almost) == [3, 7]
 
 
-def test_a_table_is_read_back():
+def test_table_survives_a_round_trip():
     for table in ({"normal": [0.2, 0.1], "within": [0.0, 1.0]}, {"choice": ["a", "b"], "weights": [1.0, 2.0]}):
         assert distribution_of(table).table == table
 
 
-def test_words_name_the_numbers():
+def test_description_lists_the_parameters():
     assert distribution_of({"log-uniform": [5, 45]}).in_words == "log-uniform, 5 to 45"
     assert distribution_of({"choice": ["a", "b"], "weights": [1, 2]}).in_words == "one of a, b, weights 1, 2"
 
 
 @pytest.mark.parametrize("sequence", ["sobol", "random"])
-def test_points_are_a_function_of_seed_and_stream(sequence):
+def test_points_depend_on_seed_and_stream_alone(sequence):
     found = points(sequence, 7, 3, 16, 2)
     assert found.shape == (16, 2) and (found >= 0).all() and (found < 1).all()
     np.testing.assert_array_equal(found, points(sequence, 7, 3, 16, 2))
@@ -64,18 +64,18 @@ def test_points_are_a_function_of_seed_and_stream(sequence):
 
 
 @pytest.mark.parametrize("sequence", ["sobol", "random"])
-def test_more_points_leave_the_first_as_they_are(sequence):
+def test_more_points_do_not_change_the_first(sequence):
     np.testing.assert_array_equal(points(sequence, 7, 3, 5, 3), points(sequence, 7, 3, 500, 3)[:5])
 
 
-def test_every_slice_of_a_dimension_has_one_point():
-    """2**k points of a Sobol sequence are a net."""
+def test_every_stratum_of_a_dimension_has_one_point():
+    """The first 2**k points of a Sobol sequence form a net."""
     slices = np.sort(np.floor(points("sobol", 7, 3, 64, 4) * 64), axis=0)
     np.testing.assert_array_equal(slices, np.arange(64)[:, None] * np.ones(4))
 
 
 @pytest.mark.parametrize(("stage", "table", "said"), mistakes("distribution"), ids=str)
-def test_what_is_no_distribution_is_refused(stage, table, said):
+def test_invalid_distributions_are_rejected(stage, table, said):
     with pytest.raises(ValueError) as caught:
         distribution_of(table)
     check_message(str(caught.value), said)

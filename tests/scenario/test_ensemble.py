@@ -9,7 +9,7 @@ SMALL = {"width": 300.0, "height": 240.0, "west": 708000.0, "north": 4331000.0}
 FLAT = {"dem": "flat"}
 NOISE = {"noise": ["thermal"], "seed": 3}
 
-# Each changes what others leave at its default.
+# Each case changes settings that the others leave at their defaults.
 CASES = {
     "flat": {},
     "periodic": {"ground": {"method": "periodic", "arp": 0.24}},
@@ -43,7 +43,7 @@ def scenario(**tables):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_a_realisation_has_the_bits_and_the_coordinates_of_the_same_scene_simulated_alone(case):
+def test_realisation_is_identical_to_simulating_its_scenario(case):
     one = scenario(**CASES[case])
     alone, found = simulate(one), realise(one)
     assert list(found) == ["image", "truth"]
@@ -54,7 +54,7 @@ def test_a_realisation_has_the_bits_and_the_coordinates_of_the_same_scene_simula
             got = node.variables[key]
             assert got.dtype == variable.dtype and got.dims == variable.dims
             np.testing.assert_array_equal(got, variable)
-            # What it says, it says as the scene alone.
+            # Attributes of a realisation are a subset of the attributes of the single simulation.
             assert {each: variable.attrs.get(each) for each in got.attrs} == got.attrs
         assert node.odc.geobox == expected.odc.geobox
     image, truth = realise_arrays(one)

@@ -1,4 +1,4 @@
-"""The ground of a scenario against the same written out, and limits at which it is the plain one."""
+"""Ground of a scenario compared with explicit calls, and limits at which it equals the uniform ground."""
 
 import re
 import warnings
@@ -65,7 +65,7 @@ def scenario():
 
 @pytest.fixture(scope="module")
 def by_hand(scenario):
-    """The landscape of `OWN`, each key in its place."""
+    """The landscape of `OWN`, built by explicit calls."""
     return fifesim.landscape(
         scenario.geobox(),
         cover=fifesim.Patches("voronoi", 80, {"grass": 0.7, "wood": 0.3}),
@@ -83,16 +83,16 @@ def by_hand(scenario):
     )
 
 
-def given_by(canopy):
+def explicit_fields(canopy):
     return {name: getattr(canopy, name) for name in canopy.given}
 
 
-def scene_of(**sections):
+def make_scene(**sections):
     case = parse_scenario(SMALL | sections)
     return ground_scene(case, case.geobox())
 
 
-def test_landscape_of_a_scenario_is_that_written_out(scenario, by_hand):
+def test_landscape_matches_explicit_calls(scenario, by_hand):
     land = ground_scene(scenario, scenario.geobox())
     assert set(land) == {"lai", "cover", "brown", "soil"}
     for name in land:
@@ -100,7 +100,7 @@ def test_landscape_of_a_scenario_is_that_written_out(scenario, by_hand):
         assert land[name].attrs["history"] == by_hand[name].attrs["history"]
 
 
-def test_light_and_truth_of_a_scenario_are_those_written_out(scenario, by_hand):
+def test_reflectance_and_truth_match_explicit_calls(scenario, by_hand):
     bands, sun = ["TM3", "TM4"], scenario.sun_and_view()
     shares = fifesim.Canopy(dissociation=0.5, crown_cover=0.8)
     canopy = shares.replace(hotspot=0.1, crown_shape=0.7, moisture=0.2, background=BACKGROUND)
@@ -125,12 +125,12 @@ def test_light_and_truth_of_a_scenario_are_those_written_out(scenario, by_hand):
     np.testing.assert_allclose(tree["truth"]["green_fpar"], green, rtol=1e-12)
     for name, each in truth.items():
         np.testing.assert_array_equal(tree["truth"][name], fifesim.aggregate(each, 30.0), err_msg=name)
-    # Of the leaf area of a pixel, not of its ground.
+    # The truth is the dead fraction of a pixel's leaf area, not of its ground area.
     dead = fifesim.aggregate(by_hand["lai"] * by_hand["brown"], 30.0) / fifesim.aggregate(by_hand["lai"], 30.0)
     np.testing.assert_allclose(tree["truth"]["brown"], dead, rtol=1e-12)
 
 
-def test_leaf_area_goes_with_the_hills_of_a_scenario():
+def test_leaf_area_follows_the_hills_of_a_scenario():
     sections = {
         "terrain": {"dem": "flint-hills", "seed": 3, "horizon_reach": 300},
         "landscape": {"covary": {"elevation": 0.3, "wetness": 0.4, "illumination": -0.3}},
@@ -153,15 +153,15 @@ def test_leaf_area_goes_with_the_hills_of_a_scenario():
     assert heights > 0.1
 
 
-def test_map_of_leaf_area_keeps_it_and_has_what_varies(tmp_path):
-    lai = scene_of(ground={"seed": 5})["lai"]
+def test_mapped_leaf_area_is_kept_while_other_properties_vary(tmp_path):
+    lai = make_scene(ground={"seed": 5})["lai"]
     ground = {"lai_file": str(write(tmp_path / "lai.tif", lai.values, parse_scenario(SMALL).geobox().affine))}
-    land = scene_of(ground=ground, landscape={"deviations": {"soil": 0.02}})
+    land = make_scene(ground=ground, landscape={"deviations": {"soil": 0.02}})
     np.testing.assert_array_equal(land["lai"], lai)
-    np.testing.assert_array_equal(land["soil"], scene_of(landscape={"deviations": {"soil": 0.02}})["soil"])
+    np.testing.assert_array_equal(land["soil"], make_scene(landscape={"deviations": {"soil": 0.02}})["soil"])
 
 
-def test_drawn_properties_are_about_their_means_with_the_arp_of_the_ground():
+def test_drawn_properties_take_mean_and_arp_from_the_ground():
     deviations = {"soil": 0.03, "moisture": 0.1, "brown": 0.05, "crown_cover": 0.07}
     arps = {"soil": 0.24, "brown": 0.0}
     case = parse_scenario(
@@ -176,17 +176,17 @@ def test_drawn_properties_are_about_their_means_with_the_arp_of_the_ground():
     }
 
 
-def test_what_every_class_says_and_what_is_drawn_is_not_passed(scenario):
-    """It would change nothing, which `surface_reflectance` refuses."""
+def test_fields_set_by_classes_or_drawn_are_not_passed(scenario):
+    """They would have no effect, and `surface_reflectance` rejects arguments without effect."""
     expected = {"hotspot": 0.1, "dissociation": 0.5, "crown_cover": 0.8, "crown_shape": 0.7, "moisture": 0.2}
     expected |= {"background": BACKGROUND, "brown_leaf": fifesim.Leaf(brown=1.0), "model": "sail"}
-    assert given_by(canopy_of(scenario)) == expected
+    assert explicit_fields(canopy_of(scenario)) == expected
     alone = canopy_of(parse_scenario({"ground": OWN["ground"]}))
-    assert given_by(alone) == expected | {"leaf_angles": "planophile", "brown": 0.2, "soil": 0.0}
+    assert explicit_fields(alone) == expected | {"leaf_angles": "planophile", "brown": 0.2, "soil": 0.0}
 
 
 @pytest.mark.parametrize("key", ["leaf", "background_spectra"])
-def test_leaf_and_spectra_of_every_class_are_theirs(key):
+def test_ground_leaf_and_spectra_are_passed_unless_every_class_sets_them(key):
     value = {"leaf": {"chlorophyll": 30.0}, "background_spectra": {"shade": 1.0}}[key]
     field = {"leaf": "leaf_optics", "background_spectra": "background"}[key]
     sections = {"ground": {key: value}, "landscape": {"cover": "voronoi"}}
@@ -208,7 +208,7 @@ def test_leaf_and_spectra_of_every_class_are_theirs(key):
     ],
     ids=str,
 )
-def test_green_leaves_are_told_apart_where_some_are_dead(sections, dead):
+def test_green_fpar_is_output_only_where_some_leaves_are_dead(sections, dead):
     case = parse_scenario(SMALL | sections)
     land = ground_scene(case, case.geobox(), 50)
     land = land if isinstance(land, xr.Dataset) else land.to_dataset(name="lai")
@@ -230,20 +230,20 @@ LEVEL_LAND = [
 
 
 @pytest.fixture(scope="module")
-def plain():
+def uniform_run():
     return fifesim.simulate(parse_scenario(SMALL)).compute()
 
 
 @pytest.mark.parametrize("sections", LEVEL_LAND, ids=str)
-def test_limits_of_what_varies_are_the_plain_ground(plain, sections):
-    """To the bit: what is nothing is not computed beside."""
+def test_zero_variation_gives_the_uniform_ground(uniform_run, sections):
+    """Results are identical to the bit."""
     found = fifesim.simulate(parse_scenario(SMALL | sections))
     for node, name in (("scene", "lai"), ("scene", "surface_reflectance"), ("image", "dn"), ("truth", "fpar")):
-        np.testing.assert_array_equal(found[node][name], plain[node][name], err_msg=name)
+        np.testing.assert_array_equal(found[node][name], uniform_run[node][name], err_msg=name)
 
 
-def test_number_of_a_property_that_is_not_drawn_stays_beside_what_is():
-    """A deviation of 0 says nothing: the number of [ground] is still that of its leaves."""
+def test_undrawn_properties_keep_their_value_when_others_are_drawn():
+    """With a deviation of 0, the value in [ground] still applies to the leaves."""
     ground = {"brown": 0.15, "crown_cover": 0.8, "moisture": 0.3}
     asked = {"deviations": {"soil": 0.02, "brown": 0.0, "crown_cover": 0.0}}
     both = (
@@ -281,7 +281,7 @@ LEAF, SOIL = {"leaf": {"chlorophyll": 40}}, {"background_spectra": {"soil_dry": 
         ),
     ],
 )
-def test_tallgrass_in_a_scenario_from_elsewhere_is_a_warning(keys, taken):
+def test_tallgrass_defaults_outside_the_site_give_a_warning(keys, taken):
     scenario = parse_scenario(keys)
     with warnings.catch_warnings(record=True, action="always", category=UserWarning) as said:
         warn_of_canopy(scenario)
@@ -291,7 +291,7 @@ def test_tallgrass_in_a_scenario_from_elsewhere_is_a_warning(keys, taken):
 GRID = {"west": 707970.0, "north": 4331220.0, "width": 300.0, "height": 240.0}
 
 
-def test_hills_reach_a_cell_past_the_grid_and_their_horizon_as_far_as_asked():
+def test_hills_extend_one_cell_and_the_horizon_its_given_reach():
     hills = parse_scenario({"grid": GRID, "terrain": {"seed": 3, "horizon_reach": 600}})
     grid = hills.geobox()
     dem, horizon, reach = elevation(hills, grid)
@@ -303,18 +303,18 @@ def test_hills_reach_a_cell_past_the_grid_and_their_horizon_as_far_as_asked():
     assert around.bottom <= box.bottom - 600 + 30 and around.top >= box.top + 600 - 30
 
 
-def test_horizon_is_found_on_multiples_of_its_cells_from_the_origin_of_the_crs():
-    """So that windows of a scene share its places."""
+def test_horizon_cells_are_aligned_to_the_origin_of_the_crs():
+    """All windows of a scene then share the same horizon cells."""
     hills = parse_scenario({"grid": GRID, "terrain": {"horizon_reach": 300}})
     affine = grids.geobox(elevation(hills, hills.geobox())[1]).affine
     for origin, cell in ((affine.c, affine.a), (affine.f, affine.e)):
-        # Places are middles of cells of the land around, which lie on whole multiples.
+        # Cell centres of the surrounding land lie on odd multiples of half a cell.
         assert abs(((origin + cell / 2) / (cell / 2)) - round((origin + cell / 2) / (cell / 2))) < 1e-6
 
 
 @pytest.mark.parametrize(("sza", "alone"), [(70.0, True), (73.0, False)])
-def test_where_slopes_may_hide_the_sun_all_of_the_land_is_asked(sza, alone):
-    """The steepest of these hills has 18.8 degrees."""
+def test_whole_land_is_read_where_slopes_may_hide_the_sun(sza, alone):
+    """The steepest of these hills slopes 18.8 degrees."""
     hills = parse_scenario({"grid": GRID, "terrain": {"seed": 7}, "geometry": {"sza": sza, "saa": 95.0}})
     light = scenario_light_on_hills(hills, hills.geobox(), hills.sun_and_view())
     assert (light is not None) is alone

@@ -23,15 +23,15 @@ from fifesim.scenario.keys import (
 from fifesim.scenario.scenario import Scenario
 
 
-def test_spelling_needs_no_physics():
-    """A typo is told before the scientific stack is loaded."""
+def test_spelling_check_does_not_load_physics():
+    """A typo is reported before the scientific stack is loaded."""
     heavy = "scipy", "numba", "rasterio", "odc", "pvlib", "matplotlib", "distributed"
     code = f"import sys, fifesim.scenario.toml; print([name for name in {heavy!r} if name in sys.modules])"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert printed.strip() == "[]"
 
 
-def test_sections_of_a_scenario_are_the_keys_in_their_order():
+def test_scenario_sections_match_the_key_tables_in_order():
     assert list(Scenario.model_fields) == list(Keys.model_fields)
     for place in [*((name,) for name in Keys.model_fields if name != "classes"), ("classes", "grass")]:
         meant, spelled = Scenario.section(place), Keys.section(place)
@@ -47,8 +47,8 @@ def test_sections_of_a_scenario_are_the_keys_in_their_order():
         *("1987-06-06T16:35 US/Central", "0001-01-01T12:00", "9999-12-31T23:59", date(1987, 6, 6)),
     ],
 )
-def test_what_is_no_date_and_time_is_refused(time):
-    """It would be another sun tomorrow, or another date to another reader."""
+def test_incomplete_or_ambiguous_times_are_rejected(time):
+    """They would give another sun tomorrow, or another date to another reader."""
     with pytest.raises(ValidationError, match=r"must be a date and time|is a date alone"):
         SunAndViewKeys(time=time)
 
@@ -83,7 +83,7 @@ def test_number_may_carry_its_unit(written, value):
     assert Shelf(length=written).length == value
 
 
-def test_another_unit_is_a_mistake_and_words_pass_where_they_may():
+def test_wrong_units_are_rejected_and_words_accepted_where_allowed():
     with pytest.raises(ValidationError, match="length is in m; write a number, or a number and 'km' or 'm' or 'cm'"):
         Shelf(length="3 ft")
     assert (Shelf(length="3 km").length, Shelf(length="3 cm").length) == (3000.0, 0.03)
@@ -108,12 +108,12 @@ def test_another_unit_is_a_mistake_and_words_pass_where_they_may():
         ("unknown", "a.csv", False),
     ],
 )
-def test_a_key_says_whether_its_value_is_a_file(key, value, answer):
+def test_key_tells_whether_its_value_is_a_file(key, value, answer):
     assert Shelf.names_a_file(key, value) == answer
 
 
 @pytest.mark.parametrize("value", [-1, 2**63, 1.0, "1", True])
-def test_seed_is_a_whole_number_that_toml_holds(value):
+def test_seed_is_an_integer_that_toml_can_hold(value):
     with pytest.raises(ValidationError, match="grain"):
         Shelf(grain=value)
     assert Shelf(grain=2**63 - 1).grain == 2**63 - 1
@@ -139,7 +139,7 @@ def test_numbers_come_with_their_unit_and_limits_are_allowed():
         ({"covary": {"elevation": -0.3}}, False),
     ],
 )
-def test_one_stand_is_where_nothing_varies_but_leaf_area(values, is_one):
+def test_landscape_is_one_stand_if_only_leaf_area_varies(values, is_one):
     assert LandscapeKeys(**values).is_one() is is_one
     is_file = values.get("cover", "none").endswith(".tif")
     assert LandscapeKeys(**values).files == ({"cover": "cover.tif"} if is_file else {})

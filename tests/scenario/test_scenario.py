@@ -1,4 +1,4 @@
-"""The scenario: units, ranges, one line a mistake, and a round trip through its own text."""
+"""Scenario: units, ranges, one line per mistake, and a round trip through TOML."""
 
 import re
 import tomllib
@@ -43,7 +43,7 @@ def read_text(tmp_path, text):
     return fifesim.read_scenario(path)
 
 
-def test_default_is_the_paper_case_on_the_whole_site():
+def test_default_scenario_is_the_paper_case_on_the_whole_site():
     default = Scenario()
     assert grids.same_grid(default.geobox(), fifesim.fife_site(30 / 9))
     assert default.model_atmosphere() == fifesim.Atmosphere()
@@ -77,7 +77,7 @@ def test_default_is_the_paper_case_on_the_whole_site():
     ],
 )
 @pytest.mark.parametrize("complete", [False, True])
-def test_text_of_a_scenario_reads_as_the_same(tmp_path, values, complete):
+def test_scenario_survives_a_round_trip_through_text(tmp_path, values, complete):
     scenario = parse_scenario(values)
     scenario = scenario.complete() if complete else scenario
     again = read_text(tmp_path, write_scenario(scenario))
@@ -85,7 +85,7 @@ def test_text_of_a_scenario_reads_as_the_same(tmp_path, values, complete):
     assert write_scenario(again) == write_scenario(scenario)
 
 
-def test_complete_scenario_runs_the_same():
+def test_completing_a_scenario_does_not_change_its_meaning():
     scenario = parse_scenario(SMALL | {"geometry": {"vza": 5}})
     complete = scenario.complete()
     assert complete.geobox() == scenario.geobox()
@@ -95,8 +95,8 @@ def test_complete_scenario_runs_the_same():
     assert complete.complete() == complete
 
 
-def test_complete_scenario_keeps_what_the_ground_is_made_of():
-    """Chemistry and spectra stay, with their defaults; optics by band would hide them."""
+def test_complete_scenario_keeps_leaf_chemistry_and_background_spectra():
+    """They are written with their defaults; optics by band would override them."""
     values = {"ground": {"leaf": {"brown": 0.1}, "background_spectra": {"soil_dry": 1.0}}}
     ground = parse_scenario(SMALL | values).complete().ground
     assert ground.leaf_optics() == fifesim.Leaf(brown=0.1)
@@ -106,7 +106,7 @@ def test_complete_scenario_keeps_what_the_ground_is_made_of():
 
 
 def test_every_key_has_a_meaning_and_every_number_a_unit():
-    """Text beside each key: `key = value  # unit; meaning`."""
+    """The comment after each key has the form `key = value  # unit; meaning`."""
     text = write_scenario(Scenario().complete())
     tomllib.loads(text)
     for line in text.splitlines():
@@ -116,8 +116,8 @@ def test_every_key_has_a_meaning_and_every_number_a_unit():
                 assert re.search(r"# (m|km|degree|1); |seed", line), line
 
 
-def test_lengths_are_taken_in_any_of_their_units():
-    """In decimals as they are written."""
+def test_lengths_may_be_given_in_any_length_unit():
+    """Conversion is exact in decimal."""
     lengths = {"width": "3 km", "height": "1.1km", "cell": "333 cm", "west": "709.0 km"}
     grid = parse_scenario({"grid": lengths}).grid
     assert (grid.width, grid.height, grid.cell, grid.west) == (3000.0, 1100.0, 3.33, 709000.0)
@@ -156,7 +156,7 @@ def test_scene_of_a_map_covers_the_map(tmp_path):
 SOUTH = {"crs": "EPSG:32735", "west": 620000.0, "north": 7220000.0, "width": 300.0, "height": 300.0, "cell": 10.0}
 
 
-def test_place_of_a_grid_is_its_own_and_what_holds_for_fife_is_asked_for():
+def test_grid_outside_fife_needs_time_altitude_and_elevation():
     with pytest.raises(ValueError) as caught:
         parse_scenario({"grid": SOUTH}).complete()
     said = str(caught.value)
@@ -179,12 +179,12 @@ def test_place_of_a_grid_is_its_own_and_what_holds_for_fife_is_asked_for():
     assert given.geometry.time is None and given.sun_and_view().earth_sun_distance == 1.0
 
 
-def test_crs_alone_has_no_corner():
+def test_crs_without_a_corner_is_rejected():
     with pytest.raises(ValueError, match=r"grid.crs = 'EPSG:32614' is given without west and north: give the upper"):
         parse_scenario({"grid": {"crs": "EPSG:32614"}}).geobox()
 
 
-def test_a_map_of_real_ground_lies_on_no_invented_hills():
+def test_mapped_leaf_area_defaults_to_flat_terrain():
     assert parse_scenario({}).terrain.dem == "flint-hills"
     assert parse_scenario({"ground": {"lai_file": "lai.tif"}}).terrain.dem == "flat"
     given = {"ground": {"lai_file": "lai.tif"}, "terrain": {"dem": "flint-hills"}}
@@ -192,14 +192,14 @@ def test_a_map_of_real_ground_lies_on_no_invented_hills():
     assert Scenario(ground=Ground(lai_file="lai.tif")).terrain.dem == "flat"
 
 
-def test_engine_that_is_not_installed_is_told_at_once(monkeypatch):
+def test_missing_engine_is_reported_at_once(monkeypatch):
     monkeypatch.setattr(six_s, "Py6S", None)
     engine = parse_scenario(SMALL | {"atmosphere": {"engine": "6S"}})
     with pytest.raises(ImportError, match="engine='6S' needs the 6S engine: type pip install"):
         engine.complete()
 
 
-def test_a_class_without_leaf_area_has_that_of_the_ground():
+def test_class_without_leaf_area_takes_it_from_the_ground():
     scenario = Scenario(
         ground={"distribution": "unburned-ungrazed", "arp": 0.2},
         landscape={"cover": "voronoi"},
@@ -219,7 +219,7 @@ def test_a_class_without_leaf_area_has_that_of_the_ground():
         ("[sensor]\nxyzzy = 1\nbands = ['XX']\n", "sensor: unknown band of TM 'XX'"),
     ],
 )
-def test_a_misspelt_key_does_not_hide_another_mistake(text, second, tmp_path):
+def test_misspelt_key_does_not_hide_another_mistake(text, second, tmp_path):
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(ValueError, match="unknown key") as caught:
         fifesim.read_scenario(tmp_path / "mine.toml")
@@ -239,7 +239,7 @@ def test_a_misspelt_key_does_not_hide_another_mistake(text, second, tmp_path):
         ("deviations.soil", "landscape.deviations.soil"),
     ],
 )
-def test_a_key_is_found_by_its_name(name, whole):
+def test_key_is_found_by_short_or_full_name(name, whole):
     assert find_key(name).name == whole
 
 
@@ -258,13 +258,13 @@ def test_a_key_is_found_by_its_name(name, whole):
         ("classes.grass", "not a key of a scenario"),
     ],
 )
-def test_what_is_no_key_is_refused(name, message):
+def test_unknown_or_ambiguous_key_names_are_rejected(name, message):
     with pytest.raises(ValueError, match=message):
         find_key(name)
 
 
-def test_replaced_keys_are_those_of_a_new_scenario():
-    """Keys of several sections, of a class and of a table, and two that must be given together."""
+def test_replacing_keys_equals_writing_them_in_the_scenario():
+    """Replace keys of several sections, of a class and of a table, and two keys that must be given together."""
     values = {
         "ground": {"arp": 0.1, "seed": 5},
         "landscape": {"cover": "voronoi"},
@@ -302,7 +302,7 @@ def test_replaced_keys_are_those_of_a_new_scenario():
         ({"bands": ["OLI4"]}, "OLI4"),
     ],
 )
-def test_impossible_replacements_are_refused(changes, message):
+def test_invalid_replacements_are_rejected(changes, message):
     scenario = Scenario(landscape={"cover": "voronoi"}, classes={"grass": {"brown": 0.1}})
     with pytest.raises(ValueError, match=message):
         scenario.replace(**changes)
@@ -316,13 +316,13 @@ DEFAULT = (
 OVERPASS = "Hypothetical overpass, 6 June 1987 16:35 UTC."
 PASTURES = {"landscape": {"cover": "pastures"}}
 GIVEN = {"ground": {"lai_file": "lai.tif"}, "terrain": {"dem": "dem.tif"}}
-# On the site of FIFE; a scene that covers a LAI file has the grid of the file.
+# Grid on the FIFE site; a scene that covers a LAI file has the grid of the file.
 PLACE = {"grid": {"west": 704970.0, "north": 4334220.0, "width": 900.0, "height": 900.0}}
 ELSEWHERE = {"grid": {"west": 600_000.0}, "geometry": {"time": "2022-06-01T10:05:00Z"}}
 
 
 def test_default_landscape_is_called_synthetic():
-    """Also once every default is written out and read again."""
+    """The same holds once every default is written out and read again."""
     found = default_scenario()
     for scenario in (found, found.complete(), parse_scenario(PASTURES)):
         assert statement(scenario) == scenario.provenance() == DEFAULT
@@ -330,7 +330,7 @@ def test_default_landscape_is_called_synthetic():
 
 
 @pytest.mark.parametrize(("values", "said", "short"), lines("scenario_statements"), ids=str)
-def test_parts_are_told_apart_by_where_they_come_from(values, said, short):
+def test_statement_distinguishes_synthetic_parts_and_files(values, said, short):
     scenario = parse_scenario(values)
     assert statement(scenario) == f"{said} {OVERPASS}"
     assert summary(scenario) == short
@@ -344,14 +344,14 @@ def test_parts_are_told_apart_by_where_they_come_from(values, said, short):
         ({"sza": 30.0, "saa": 120.0}, "Sun angles as given."),
     ],
 )
-def test_a_time_of_ones_own_is_not_called_hypothetical(geometry, said):
+def test_explicit_time_is_not_called_hypothetical(geometry, said):
     scenario = parse_scenario(GIVEN | {"geometry": geometry})
     assert statement(scenario) == f"Leaf area and elevation are from files. {said}"
     assert summary(scenario) == ""
 
 
-def test_another_place_has_no_location_and_no_overpass_of_fife():
-    """There even the same time may be that of a real image."""
+def test_statement_outside_fife_names_no_location_or_overpass():
+    """At another place even the overpass time of FIFE may belong to a real image."""
     said = "Synthetic landscape: fields and hills are synthetic; only the three grass types are FIFE's."
     scenario = parse_scenario(PASTURES | ELSEWHERE)
     assert statement(scenario) == f"{said} Time as given, 1 June 2022 10:05 UTC."
@@ -359,13 +359,13 @@ def test_another_place_has_no_location_and_no_overpass_of_fife():
     assert statement(same) == f"{said} Time as given, 6 June 1987 16:35 UTC." and "overpass" not in summary(same)
 
 
-def test_a_grid_that_only_a_file_or_nobody_knows_is_nowhere():
-    """A scenario that is not complete is written without its files being opened."""
+def test_statement_names_no_location_if_the_grid_is_unknown():
+    """An incomplete scenario is described without opening its files."""
     assert statement(parse_scenario(GIVEN)) == "Leaf area and elevation are from files."
     assert "location" not in statement(parse_scenario({"grid": {"crs": "EPSG:1"}}))
 
 
-def test_scenario_file_states_it_in_its_first_line_and_is_read_back(tmp_path):
+def test_scenario_file_starts_with_the_statement_and_is_read_back(tmp_path):
     scenario = default_scenario().complete()
     text = write_scenario(scenario)
     assert text.splitlines()[0] == f"# {DEFAULT}"
@@ -376,7 +376,7 @@ def test_scenario_file_states_it_in_its_first_line_and_is_read_back(tmp_path):
     assert other.splitlines()[0] == "# Leaf area and elevation are from files."
 
 
-def test_readme_and_the_default_scenario_begin_with_it():
+def test_readme_and_default_scenario_begin_with_the_statement():
     assert files.path("fife.toml").read_text(encoding="utf-8").splitlines()[0] == f"# {DEFAULT}"
     _, first, *_ = (ROOT / "README.md").read_text(encoding="utf-8").split("\n\n")
     assert re.sub(r"\s+", " ", first).endswith(f"shows no real scene. *{DEFAULT}*")
@@ -394,7 +394,7 @@ def test_readme_and_the_default_scenario_begin_with_it():
         ("[ground]\nbackground = { TM2 = 0.1, TM3 = 0.1, TM4 = 0.2 }\n", ["TM2", "TM3", "TM4"]),
     ],
 )
-def test_bands_that_a_file_leaves_out(tmp_path, text, bands):
+def test_default_bands_of_a_file_without_bands(tmp_path, text, bands):
     path = tmp_path / "mine.toml"
     path.write_text(text)
     found = read_scenario(path).sensor.bands
@@ -402,13 +402,13 @@ def test_bands_that_a_file_leaves_out(tmp_path, text, bands):
 
 
 @pytest.mark.parametrize("sensor", [{"instrument": "TN"}, {"instrument": 3}, {"instrument": "missing.toml"}, "TM"])
-def test_what_is_wrong_is_left_to_be_told(sensor):
+def test_invalid_sensors_are_left_unchanged_for_later_checks(sensor):
     values = {"sensor": sensor}
     assert with_false_colour(values) == values
 
 
-def test_noise_that_green_lacks_is_not_asked_of_it():
-    """The noise of SuperDove is not known of any band: two are left, which is told of them."""
+def test_green_band_is_added_only_if_its_noise_is_known():
+    """SuperDove has no known noise in any band; the two default bands remain, and the later error names them."""
     values = {"sensor": {"instrument": "SuperDove", "noise": ["shot"]}}
     assert with_false_colour(values) == values
     noisy = {"sensor": {"instrument": "OLI", "noise": ["shot"]}}
@@ -416,7 +416,7 @@ def test_noise_that_green_lacks_is_not_asked_of_it():
 
 
 @pytest.mark.parametrize(("stage", "values", "said"), mistakes("read", "complete"), ids=str)
-def test_a_mistake_is_named_before_a_run_begins(stage, values, said):
+def test_mistakes_are_reported_before_a_run_begins(stage, values, said):
     with pytest.raises(ValueError) as caught:
         scenario = parse_scenario(values)
         assert stage == "complete"

@@ -1,4 +1,4 @@
-"""What the values of a section mean."""
+"""Physical meaning of the values of a section."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from fifesim.scenario.sections import Ground, Sensor
 from fifesim.sensor.description.instruments import instrument
 
 
-def test_optics_by_band_need_both_of_a_leaf():
+def test_optics_by_band_need_reflectance_and_transmittance():
     assert Ground().leaf_optics() is None and Ground().below_canopy() is None
     both = Ground(leaf_reflectance={"TM3": 0.1}, leaf_transmittance={"TM3": 0.05})
     assert both.leaf_optics() == {"TM3": (0.1, 0.05)}
@@ -16,7 +16,7 @@ def test_optics_by_band_need_both_of_a_leaf():
         Ground(leaf_reflectance={"TM3": 0.1}).leaf_optics()
 
 
-def test_complete_optics_are_those_that_the_chain_takes():
+def test_complete_optics_are_passed_to_the_chain():
     bands = [band.response for band in instrument("TM").select(["TM3", "TM4"])]
     keys = Ground().complete_optics(bands)
     rho = fifesim.ground.canopy.optics.band_leaf_optics(bands)[0]
@@ -24,8 +24,8 @@ def test_complete_optics_are_those_that_the_chain_takes():
     assert Ground(**keys).complete_optics(bands) == keys
 
 
-def test_file_of_an_aerosol_lies_beside_the_scenario(tmp_path, monkeypatch):
-    """It needs an optical thickness, and a run writes its full path."""
+def test_aerosol_file_is_found_next_to_the_scenario(tmp_path, monkeypatch):
+    """An aerosol file needs an optical thickness, and a completed scenario holds its full path."""
     fifesim.aerosol_tables("urban").to_netcdf(tmp_path / "mine.nc")
     (tmp_path / "mine.toml").write_text('[atmosphere]\naerosol = "mine.nc"\naot = 0.3\n')
     scenario = fifesim.read_scenario(tmp_path / "mine.toml")
@@ -44,8 +44,8 @@ def test_file_of_an_aerosol_lies_beside_the_scenario(tmp_path, monkeypatch):
             fifesim.Scenario(atmosphere=wrong)
 
 
-def test_pixels_are_those_of_the_bands_as_in_python():
-    """A scene sensed without onto= has them too."""
+def test_default_pixel_size_is_taken_from_the_bands():
+    """`sense` without `onto` uses the same size."""
     for name, bands, size in (
         ("TM", ["TM3", "TM4"], 30),
         ("MSI", ["MSI4", "MSI8"], 10),
@@ -62,7 +62,7 @@ def test_pixels_are_those_of_the_bands_as_in_python():
         Sensor(instrument="MSI", bands=["MSI4", "MSI11"])
 
 
-def test_response_of_a_scenario_is_that_of_python():
+def test_response_key_equals_the_python_argument():
     sharp = Sensor(response="detector").description
     assert sharp == fifesim.instrument("TM", response="detector") != Sensor().description
     assert Sensor(response="system").description == Sensor().description
@@ -75,7 +75,7 @@ def test_response_of_a_scenario_is_that_of_python():
             Sensor(instrument=name, response=response)
 
 
-def test_noise_of_a_scenario_is_that_of_python():
+def test_noise_key_equals_the_python_argument():
     given = {"thermal": 0.4, "shot": 0.005, "detectors": 16, "gain_spread": 0.005}
     assert Sensor(noise=["shot"], noise_model=given).given_noise() == fifesim.NoiseModel(**given)
     assert Sensor(instrument="OLI", noise=["thermal"], noise_model={"thermal": 1}).given_noise().along == "columns"

@@ -27,7 +27,7 @@ def scenario(**terrain):
 
 @pytest.fixture
 def hill(tmp_path):
-    """A round hill in a file that reaches 300 m past the grid on every side, in metres or feet."""
+    """Writer of a file with a round hill, in metres or feet, that extends 300 m past the grid on every side."""
 
     def written(name="hill.tif", unit=None, per_metre=1.0, hole=False):
         y, x = np.mgrid[:35, :40]
@@ -40,7 +40,7 @@ def hill(tmp_path):
     return written
 
 
-def test_terrain_goes_through_the_chain_written_out(hill):
+def test_terrain_matches_explicit_calls_of_the_chain(hill):
     case = scenario(dem=hill())
     tree = fifesim.simulate(case)
     grid = case.geobox()
@@ -60,7 +60,7 @@ def test_terrain_goes_through_the_chain_written_out(hill):
 
 
 @pytest.mark.parametrize("change", [{"seed": 8}, {"upwelling": False}, {"dem": "flat"}])
-def test_each_key_of_the_hills_changes_the_light(change):
+def test_each_terrain_key_changes_the_image(change):
     options = {"vza": 8.0, "vaa": 100.0}
     cases = [
         parse_scenario({"grid": GRID, "geometry": options, "terrain": {"horizon_reach": 900} | terrain})
@@ -70,7 +70,7 @@ def test_each_key_of_the_hills_changes_the_light(change):
     assert (one != other).any()
 
 
-def test_feet_are_refused_unless_given(hill):
+def test_elevation_in_feet_is_rejected_unless_declared(hill):
     in_feet = hill("feet.tif", unit="ft", per_metre=1 / 0.3048)
     with pytest.raises(ValueError, match="vertical_units"):
         fifesim.simulate(scenario(dem=in_feet))
@@ -79,18 +79,18 @@ def test_feet_are_refused_unless_given(hill):
     np.testing.assert_allclose(feet, metres, rtol=1e-12)
 
 
-def test_a_hole_is_refused_unless_filled(hill):
+def test_missing_elevation_is_rejected_unless_filled(hill):
     holed = hill("holed.tif", hole=True)
     with pytest.raises(ValueError, match="fill"):
         fifesim.simulate(scenario(dem=holed))
     filled = fifesim.simulate(scenario(dem=holed, fill=60))["terrain"]["dem"]
     whole = fifesim.simulate(scenario(dem=hill()))["terrain"]["dem"]
-    # The top of the hill over one cell of 30 m, in a surface of least bending.
+    # The hole is one 30 m cell at the hilltop, filled with a minimum curvature surface.
     assert float(np.abs(filled - whole).max()) < 2.0
 
 
-def test_a_sun_that_reaches_no_slope_is_refused(tmp_path):
-    """A plain that falls 30 degrees to the north, and a sun 10 degrees above the southern horizon."""
+def test_sun_below_every_slope_is_rejected(tmp_path):
+    """A plane slopes 30 degrees to the north, with the sun 21 degrees above the southern horizon."""
     place = rasterio.transform.from_origin(GRID["west"] - 600, GRID["north"] + 600, 30, 30)
     write(tmp_path / "ramp.tif", np.mgrid[:60, :60][0] * 30 * np.tan(np.radians(30.0)), place)
     shaded = {"grid": GRID, "geometry": {"sza": 69.0, "saa": 180.0}, "terrain": {"dem": str(tmp_path / "ramp.tif")}}
@@ -98,7 +98,7 @@ def test_a_sun_that_reaches_no_slope_is_refused(tmp_path):
         fifesim.simulate(parse_scenario(shaded))
 
 
-def test_the_scene_with_terrain_is_lazy_and_on_its_grid(hill):
+def test_scene_with_terrain_is_lazy_and_on_its_grid(hill):
     case = scenario(dem=hill())
     with no_compute():
         tree = fifesim.simulate(case, chunks={"y": 50, "x": 70})
@@ -106,7 +106,7 @@ def test_the_scene_with_terrain_is_lazy_and_on_its_grid(hill):
     assert grids.same_grid(grids.geobox(tree["terrain"]["slope"]), grids.geobox(tree["image"]["dn"]))
 
 
-def test_keys_of_the_sensor_are_those_of_sense():
+def test_sensor_keys_equal_the_arguments_of_sense():
     keys = {"instrument": "L4TM", "interval": 31.0, "offset": [0.25, -0.5], "noise": ["thermal"], "seed": 3}
     case = parse_scenario({"grid": GRID, "terrain": {"dem": "flat"}, "sensor": keys})
     lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
@@ -123,7 +123,7 @@ LEVEL = {
 }
 
 
-def test_scenario_runs_the_chain(whole, site):
+def test_scenario_matches_the_chain(whole, site):
     scenario = fifesim.Scenario.model_validate(LEVEL)
     with no_compute():
         tree = fifesim.simulate(scenario)
@@ -136,7 +136,7 @@ def test_scenario_runs_the_chain(whole, site):
 
 
 def test_every_key_of_a_scenario_reaches_its_stage():
-    """Each key differs from its default, so that one that is left out changes the bits."""
+    """Each key differs from its default, so an ignored key changes the bits."""
     bands = ["TM3", "TM4"]
     leaf, back = {"TM3": (0.1, 0.08), "TM4": (0.5, 0.4)}, {"TM3": 0.1, "TM4": 0.2}
     options = {
@@ -177,7 +177,7 @@ def test_every_key_of_a_scenario_reaches_its_stage():
     np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fpar, 50.0, min_valid=1.0))
 
 
-def test_coupling_slopes_and_model_of_a_scenario_are_arguments_of_the_chain():
+def test_coupling_slopes_and_model_keys_reach_the_chain():
     keys = {"coupling": "directional", "visibility": 10}
     case = parse_scenario({"grid": GRID, "terrain": {"horizon_reach": 300}, "atmosphere": keys})
     dem, horizon, _ = elevation(case, case.geobox())
@@ -201,14 +201,14 @@ def test_coupling_slopes_and_model_of_a_scenario_are_arguments_of_the_chain():
     assert "discrete ordinates" in exact["scene"]["surface_reflectance"].history
 
 
-def test_couplings_and_slopes_that_do_not_fit_are_refused():
+def test_inconsistent_coupling_and_slopes_are_rejected():
     for wrong, message in (({"coupling": "directional", **EXACT}, "needs model"), ({"slopes": "upright"}, "elevation")):
         with pytest.raises(ValueError, match=message):
             fifesim.Scenario(terrain={"dem": "flat"}).replace(**wrong)
 
 
-def test_instrument_and_its_tables_lie_beside_the_scenario(tmp_path, monkeypatch):
-    """Wherever it is run from: the scenario's file, the instrument's beside it, and the table beside that."""
+def test_instrument_path_is_relative_to_the_scenario_and_its_tables_to_the_instrument(tmp_path, monkeypatch):
+    """The working directory has no effect."""
     (tmp_path / "sensors").mkdir()
     description = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
     assert "avhrr_response.csv" in description
@@ -252,8 +252,8 @@ def test_polar_scene_is_simulated(crs, west, north):
 CLASSES = {"thin": {"distribution": "burned-grazed"}, "thick": {"distribution": "unburned-ungrazed", "hotspot": 0.1}}
 
 
-def test_cells_of_a_class_are_those_of_its_own_scenario():
-    """Whatever stands beside it: leaf area and reflectance, to the bit."""
+def test_cells_of_a_class_equal_a_scenario_of_that_class_alone():
+    """Leaf area and reflectance are identical to the bit, whatever the neighbouring classes."""
     small = {"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}}
     both = parse_scenario(small | {"landscape": {"cover": "voronoi", "size": 80}, "classes": CLASSES})
     scene = fifesim.simulate(both)["scene"]
@@ -266,7 +266,7 @@ def test_cells_of_a_class_are_those_of_its_own_scenario():
             np.testing.assert_array_equal(found, meant, err_msg=f"{name} {variable}")
 
 
-def test_a_map_of_cover_is_read_and_shares_are_drawn(tmp_path):
+def test_cover_map_is_read_and_shares_are_drawn(tmp_path):
     grid = parse_scenario({"grid": {"width": 600, "height": 600}}).geobox()
     write(tmp_path / "cover.tif", np.array([[5.0, 9.0], [5.0, 5.0]]), grid.affine * rasterio.Affine.scale(90))
     classes = {"grass": {"code": 5}, "wood": {"code": 9, "distribution": "unburned-ungrazed"}}
@@ -277,11 +277,11 @@ def test_a_map_of_cover_is_read_and_shares_are_drawn(tmp_path):
     drawn = mapped | {"landscape": {"cover": "levels", "size": 20}}
     drawn["classes"] = {"grass": {"share": 0.8}, "wood": {"share": 0.2}}
     cover = fifesim.simulate(parse_scenario(drawn))["scene"]["cover"]
-    # Some 600 patches: the share's standard error is about .02.
+    # There are about 600 patches, so the standard error of the share is about 0.02.
     assert 0.1 < float((cover == 2).mean()) < 0.3
 
 
-def test_clouds_of_a_scenario_are_those_of_its_key_and_the_truth_is_their_share():
+def test_cloud_keys_give_the_cloud_field_and_truth_is_cloud_fraction():
     sky = {"cloud_cover": 0.5, "length": "800 m", "base": 900.0, "top": 900.0, "seed": 4}
     scenario = fifesim.Scenario(grid={"width": 1800, "height": 1800, "cell": 10}, terrain={"dem": "flat"})
     clouded = fifesim.Scenario(grid=scenario.grid, terrain=scenario.terrain, clouds=sky)
@@ -295,7 +295,7 @@ def test_clouds_of_a_scenario_are_those_of_its_key_and_the_truth_is_their_share(
         expected = cells[name].fifesim.aggregate(30)
         np.testing.assert_array_equal(clouded["truth"][name].values, expected.values)
     hidden = cells.optical_thickness + cells.shadow_thickness + cells.overhead_thickness
-    # Footprints of TM reach two pixels.
+    # The footprint of TM extends two pixels.
     far = (hidden.fifesim.aggregate(30).rolling(y=7, x=7, center=True).max() == 0).values
     assert far.any()
     np.testing.assert_array_equal(clouded["image"]["dn"].values[:, far], clear["image"]["dn"].values[:, far])
@@ -305,16 +305,16 @@ def test_clouds_of_a_scenario_are_those_of_its_key_and_the_truth_is_their_share(
         fifesim.Scenario(clouds={"cloud_cover": 0.1, "base": 2000, "top": 1000})
 
 
-def test_a_complete_image_over_relief_with_clouds_has_no_missing_edge():
-    """The elevation around the scene carries the clouds there."""
+def test_complete_image_over_relief_with_clouds_has_no_missing_edge():
+    """Clouds are also cast onto the elevation around the scene."""
     sky = {"cloud_cover": 0.5, "length": "800 m", "base": 900.0, "top": 900.0, "seed": 4}
     run = fifesim.simulate(fifesim.Scenario(grid={"width": 900, "height": 900, "cell": 15}, clouds=sky), complete=True)
     assert run["scene"]["dem"].shape == (60, 60)
     assert run["image"]["ndvi"].notnull().all()
 
 
-def test_sensors_see_the_same_sky():
-    """0.2 points of the cloud fraction, in pixels of each instrument with its footprint and grid; the edge is clear."""
+def test_sensors_see_the_same_clouds():
+    """Cloud fraction agrees to 0.002 in pixels of each instrument, with its footprint and grid; the edge is clear."""
     grid = fifesim.grid_at("EPSG:26914", 690000, 4310000, 12000, 12000, cell=30)
     sky, sun = fifesim.cloud_field(grid, 0.5, length=1500, height=900, seed=3), fifesim.Geometry(30, 140)
     thickness = sky.optical_thickness
@@ -331,5 +331,5 @@ def test_sensors_see_the_same_sky():
     sky = fifesim.cloud_field(grid, 0.4, seed=8, margin=900)
     images = lai.fifesim.compare(["TM", "OLI"], fifesim.Setup(clouds=sky, quantise=False))
     red = [images[name]["toa_radiance"].isel(band=0).values.ravel() for name in ("TM", "OLI")]
-    # The blur differs, the sky does not.
+    # The sensors differ in blur but see the same clouds.
     assert np.corrcoef(*(each[np.isfinite(sum(red))] for each in red))[0, 1] > 0.97

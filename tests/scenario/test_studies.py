@@ -1,4 +1,4 @@
-"""Studies: what may be drawn, and what chips share."""
+"""Studies: parameters that may be drawn, and settings shared by the chips."""
 
 import re
 from pathlib import Path
@@ -44,7 +44,7 @@ def path(tmp_path):
     return tmp_path / "study.toml"
 
 
-def test_a_file_says_what_is_drawn(path):
+def test_study_file_lists_the_drawn_parameters(path):
     study = read_study(path)
     assert (study.sequence, study.seed, study.landscapes, study.split) == (
         "random",
@@ -60,7 +60,7 @@ def test_a_file_says_what_is_drawn(path):
     }
 
 
-def test_a_study_is_written_as_it_is_read(path, tmp_path):
+def test_study_survives_a_round_trip(path, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     again = tmp_path / "elsewhere" / "again.toml"
     again.write_text(read_study(path).to_toml())
@@ -68,13 +68,13 @@ def test_a_study_is_written_as_it_is_read(path, tmp_path):
     assert read_study(again).to_toml() == read_study(path).to_toml()
 
 
-def test_chips_have_the_sun_and_the_air_of_the_study_wherever_they_lie():
-    """The paper's overpass is that of its site, which chips leave."""
+def test_chips_share_sun_and_atmosphere_of_the_study():
+    """The paper's overpass belongs to its site, but chips lie elsewhere."""
     study = Study(parse_scenario(SMALL), DRAWS)
     far = study.scenario_with({("grid", "west"): 600_000.0, ("grid", "north"): 4_200_000.0})
     assert far.sun_and_view() == study.scenario.sun_and_view()
     assert far.model_atmosphere() == study.scenario.model_atmosphere()
-    # Written out, so that no chip looks the sun up.
+    # The angles are stored, so no chip computes the sun position again.
     assert study.values["geometry"]["sza"] == study.scenario.sun_and_view().sza
     dates = Study(parse_scenario(SMALL), {"time": {"choice": ["1987-06-06T16:35Z", "1987-10-06T16:35Z"]}})
     drawn = {("geometry", "time"): "1987-10-06T16:35Z"}
@@ -86,7 +86,7 @@ def test_chips_have_the_sun_and_the_air_of_the_study_wherever_they_lie():
     assert found["TM3"] == 0.07 and found["TM4"] == band.scenario.complete().ground.background["TM4"]
 
 
-def test_unknown_keys_of_the_plan_are_refused(path):
+def test_unknown_keys_of_the_plan_are_rejected(path):
     path.write_text(WHOLE.replace("sequence =", "sequnce ="))
     with pytest.raises(ValueError, match=r"unknown key dataset\.sequnce: did you mean 'sequence'"):
         read_study(path)
@@ -102,12 +102,12 @@ def test_unknown_keys_of_the_plan_are_refused(path):
         (1, {"all": 1.0}, [1]),
     ],
 )
-def test_every_part_has_its_share_of_landscapes_and_one_at_least(landscapes, split, quotas):
+def test_every_part_has_its_share_and_at_least_one_landscape(landscapes, split, quotas):
     study = Study(parse_scenario(SMALL), DRAWS, landscapes=landscapes, split=split)
     assert list(study.quotas().values()) == quotas
 
 
-def test_the_study_of_the_page_is_valid(tmp_path):
+def test_study_in_the_documentation_is_valid(tmp_path):
     page = Path(__file__).parents[2] / "docs" / "howto" / "training_set.md"
     (block,) = re.findall(r"^```toml\n(.*?)^```", page.read_text("utf-8"), re.S | re.M)
     (tmp_path / "study.toml").write_text(block)
@@ -116,7 +116,7 @@ def test_the_study_of_the_page_is_valid(tmp_path):
 
 
 @pytest.mark.parametrize(("stage", "values", "said"), mistakes("study"), ids=str)
-def test_impossible_studies_are_refused(stage, values, said):
+def test_invalid_studies_are_rejected(stage, values, said):
     with pytest.raises(ValueError) as caught:
         scenario = parse_scenario(SMALL | values.get("sections", {}))
         Study(scenario, values.get("draws", DRAWS), **values.get("plan", {}))

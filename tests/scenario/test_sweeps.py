@@ -1,4 +1,4 @@
-"""Sweeps: lazy, labelled, and the same as each scenario by itself."""
+"""Sweeps: lazy, labelled, and identical to each scenario run alone."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def fit(small):
     return lazy.compute()
 
 
-def test_points_are_the_scenarios_by_themselves(small, fit):
+def test_each_point_equals_its_scenario_run_alone(small, fit):
     one = parse_scenario(
         small.model_dump(exclude_unset=True) | {"ground": {"arp": 0.24}, "atmosphere": {"visibility": 10.0}}
     )
@@ -36,13 +36,13 @@ def test_points_are_the_scenarios_by_themselves(small, fit):
 
 def test_coordinates_select_and_plot(fit):
     assert dict(fit.r2.sizes) == {"arp": 2, "visibility": 2, "variable": 2}
-    # Patches larger than a pixel are seen better, whatever the air.
+    # Patches larger than a pixel are better resolved in any atmosphere.
     assert (fit.r2.sel(arp=0.24) > fit.r2.sel(arp=0.05)).all()
     (line,) = fit.r2.sel(arp=0.24, variable="lai").plot()
     assert line.axes.get_xlabel() == "meteorological range [km]"
 
 
-def test_selection_runs_its_own_points_only(small):
+def test_selection_runs_only_the_selected_points(small):
     runs = []
     measures = {"seen": lambda run: runs.append(run["truth"]["lai"].attrs["arp"]) or runs[-1]}
     lazy = fifesim.sweep(small, {"arp": [0.05, 0.15, 0.24], "visibility": [10.0, 45.0]}, measures)
@@ -51,7 +51,7 @@ def test_selection_runs_its_own_points_only(small):
 
 
 def test_axis_may_be_a_function(small):
-    """The correlation length as an axis: 8.3 m is that of arp 0.15."""
+    """Use the correlation length as axis; 8.3 m corresponds to an arp of 0.15."""
 
     def change(scenario, length):
         arp = fifesim.arp_for_length(length, scenario.grid.cell)
@@ -76,7 +76,7 @@ def test_values_of_an_axis_may_be_lists(small, offsets):
     assert float(r2.sel(offset="0.3, 0.0")) < float(r2.sel(offset="0.0, 0.0"))
 
 
-def test_a_key_of_a_class_is_an_axis(small):
+def test_key_of_a_class_can_be_an_axis(small):
     sections = small.model_dump(exclude_unset=True) | {"landscape": {"cover": "voronoi"}, "classes": {"grass": {}}}
     patches, values = parse_scenario(sections), ["burned-grazed", "unburned-ungrazed"]
     fit = fifesim.sweep(patches, {"classes.grass.distribution": values}).compute()
@@ -87,7 +87,7 @@ def test_a_key_of_a_class_is_an_axis(small):
 
 
 @pytest.mark.parametrize(("stage", "axes", "said"), mistakes("sweep"), ids=str)
-def test_impossible_axes_are_refused(small, stage, axes, said):
+def test_invalid_axes_are_rejected(small, stage, axes, said):
     with pytest.raises(ValueError) as caught:
         fifesim.sweep(small, axes)
     check_message(str(caught.value), said)

@@ -1,4 +1,4 @@
-"""Scenarios as text."""
+"""Reading and writing scenarios as TOML."""
 
 import os
 import tomllib
@@ -11,14 +11,14 @@ from fifesim.scenario.scenario import Scenario, parse_scenario, read_scenario
 from fifesim.scenario.toml import check_spelling, load_values, write_scenario, write_tables
 
 
-def written(tmp_path, text):
+def write_toml(tmp_path, text):
     (tmp_path / "s.toml").write_text(text, encoding="utf-8")
     return tmp_path / "s.toml"
 
 
-def test_files_lie_beside_the_text(tmp_path):
-    """Each key that names a file, and none that is a name."""
-    path = written(
+def test_file_paths_are_relative_to_the_scenario(tmp_path):
+    """Only values that name files become paths; other names stay as they are."""
+    path = write_toml(
         tmp_path,
         "[ground]\nlai_file = 'lai.tif'\ndistribution = 'burned-grazed'\n[terrain]\ndem = '/vsizip//a.zip/dem.tif'\n"
         "[sensor]\ninstrument = 'mine.toml'\n",
@@ -29,14 +29,14 @@ def test_files_lie_beside_the_text(tmp_path):
     assert values["sensor"]["instrument"] == str(tmp_path.resolve() / "mine.toml")
 
 
-def test_a_name_that_no_file_can_have_is_a_mistake(tmp_path):
-    path = written(tmp_path, f"[sensor]\ninstrument = '{'a' * 5000}.toml'\n")
+def test_impossible_file_names_are_rejected(tmp_path):
+    path = write_toml(tmp_path, f"[sensor]\ninstrument = '{'a' * 5000}.toml'\n")
     with pytest.raises(ValueError, match="instrument"):
         read_scenario(path)
 
 
-def test_spelling_tells_each_mistake_in_a_line(tmp_path):
-    path = written(tmp_path, "[sensor]\nbandz = ['TM3']\npixel = -1\n[ground]\narp = 0.3\n")
+def test_spelling_check_reports_each_mistake_on_one_line(tmp_path):
+    path = write_toml(tmp_path, "[sensor]\nbandz = ['TM3']\npixel = -1\n[ground]\narp = 0.3\n")
     with pytest.raises(ValueError) as caught:
         check_spelling(path)
     assert [line.partition(" =")[0] for line in str(caught.value).splitlines()] == [
@@ -46,28 +46,28 @@ def test_spelling_tells_each_mistake_in_a_line(tmp_path):
     ]
 
 
-def test_what_physics_alone_knows_passes_spelling(tmp_path):
-    check_spelling(written(tmp_path, "[sensor]\ninstrument = 'TN'\n[ground]\nleaf_angles = 'sphere'\n"))
+def test_spelling_check_leaves_names_of_instruments_and_models_to_physics(tmp_path):
+    check_spelling(write_toml(tmp_path, "[sensor]\ninstrument = 'TN'\n[ground]\nleaf_angles = 'sphere'\n"))
 
 
 @pytest.mark.parametrize(
     "name", ["a\nb.tif", "a\tb", "\x1b[31mred.tif", "a\x7fb.tif", "röd 😀.tif", "a\u202eb", "\"'.tif", "a\\b"]
 )
-def test_any_name_of_a_file_is_read_back(tmp_path, name):
+def test_any_file_name_is_read_back(tmp_path, name):
     scenario = parse_scenario({"ground": {"lai_file": str(tmp_path / name)}})
-    path = written(tmp_path, write_scenario(scenario))
+    path = write_toml(tmp_path, write_scenario(scenario))
     assert read_scenario(path) == scenario
 
 
 @pytest.mark.parametrize("name", ["B 3", "röd", 'b"3', "b.3", "b\\3", "", "=", "3"])
-def test_any_name_of_a_band_is_read_back(tmp_path, name):
+def test_any_band_name_is_read_back(tmp_path, name):
     scenario = parse_scenario({"ground": {"background": {name: 0.1, "TM3": 0.2}}})
-    assert read_scenario(written(tmp_path, write_scenario(scenario))) == scenario
+    assert read_scenario(write_toml(tmp_path, write_scenario(scenario))) == scenario
 
 
 @given(st.text(st.characters(exclude_categories=["Cs"]), max_size=30), st.floats())
 def test_text_and_numbers_are_written_as_toml(text, number):
-    """tomllib reads what was meant."""
+    """tomllib reads the same values back."""
     values = {text: {"text": text, "list": [text, number], "flag": True}, "none": None}
     found = tomllib.loads(write_tables("", {("draw",): values, ("empty",): {}}))
     assert list(found) == ["draw"] and list(found["draw"]) == [text]
@@ -76,10 +76,10 @@ def test_text_and_numbers_are_written_as_toml(text, number):
     assert found["list"][1] == number or number != number
 
 
-def test_a_key_that_is_left_out_can_be_filled_in_where_it_stands(tmp_path):
-    """Each one is a comment of its own section, above the tables inside it."""
+def test_unset_keys_are_comments_that_can_be_filled_in(tmp_path):
+    """The comment stands in its section, above the tables inside the section."""
     text = write_scenario(Scenario()).replace("# lai_file = ", "lai_file = 'lai.tif'")
-    assert load_values(written(tmp_path, text))["ground"]["lai_file"] == str(tmp_path.resolve() / "lai.tif")
+    assert load_values(write_toml(tmp_path, text))["ground"]["lai_file"] == str(tmp_path.resolve() / "lai.tif")
 
 
 @pytest.mark.parametrize(
@@ -89,19 +89,21 @@ def test_a_key_that_is_left_out_can_be_filled_in_where_it_stands(tmp_path):
         ("sensor", "instrument", ".toml"),
     ],
 )
-def test_no_file_of_a_scenario_makes_it_wait(tmp_path, section, key, suffix):
-    """A pipe would, for ever; each is a line that names the key, before anything is loaded."""
+def test_unreadable_files_of_a_scenario_are_rejected_without_waiting(tmp_path, section, key, suffix):
+    """A pipe would block for ever. The error names the key before anything is loaded."""
     os.mkfifo(tmp_path / f"pipe{suffix}")
     (tmp_path / f"folder{suffix}").mkdir()
     (tmp_path / f"loop{suffix}").symlink_to(f"loop{suffix}")
     (tmp_path / f"zero{suffix}").symlink_to("/dev/zero")
     for name in ("pipe", "folder", "loop", "zero", "a" * 5000, "a\0b"):
-        said = refusal(written(tmp_path, f'{section}.{key} = "{name.replace(chr(0), chr(92) + "u0000")}{suffix}"'))
+        said = spelling_error(
+            write_toml(tmp_path, f'{section}.{key} = "{name.replace(chr(0), chr(92) + "u0000")}{suffix}"')
+        )
         assert said.startswith(f"{section}.{key} = "), said
 
 
-def refusal(path):
-    """What is said of a scenario by its spelling, in a few lines that print."""
+def spelling_error(path):
+    """Error message of the spelling check, which must be short and printable."""
     with pytest.raises(ValueError) as caught:
         check_spelling(path)
     said = str(caught.value)
@@ -124,28 +126,30 @@ def refusal(path):
     ],
     ids=["brackets", "tables", "long key", "escape", "many", "digits", "spaces", "dots", "size"],
 )
-def test_a_message_is_short_and_prints(tmp_path, text, said):
-    assert said in refusal(written(tmp_path, text))
+def test_message_is_short_and_printable(tmp_path, text, said):
+    assert said in spelling_error(write_toml(tmp_path, text))
 
 
-def test_what_is_no_file_is_no_scenario(tmp_path):
+def test_paths_that_are_no_regular_file_are_rejected(tmp_path):
     os.mkfifo(tmp_path / "pipe.toml")
     (tmp_path / "loop.toml").symlink_to("loop.toml")
     for name in ("pipe.toml", "loop.toml", ".", "/dev/zero", "a" * 5000, "none.toml"):
-        refusal(tmp_path / name)
+        spelling_error(tmp_path / name)
 
 
-def test_a_link_is_followed_whatever_it_leads_to(tmp_path):
-    """What it leads to has no suffix that tells it from a name."""
+def test_symbolic_link_keeps_its_name(tmp_path):
+    """The target of the link has no suffix that distinguishes a file from a name."""
     (tmp_path / "version1").write_text("lai\n1\n2\n3\n")
     (tmp_path / "samples.csv").symlink_to("version1")
-    assert read_scenario(written(tmp_path, "ground.distribution = 'samples.csv'")).ground.distribution.endswith(".csv")
+    assert read_scenario(write_toml(tmp_path, "ground.distribution = 'samples.csv'")).ground.distribution.endswith(
+        ".csv"
+    )
 
 
-def test_each_class_is_a_table(tmp_path):
-    """Its files lie beside the text, what it says alone is written, and reading that gives the same."""
+def test_each_class_is_written_as_a_table(tmp_path):
+    """Its files are relative to the scenario, only its explicit keys are written, and they are read back unchanged."""
     (tmp_path / "mine.csv").write_text("lai\n1\n2\n3\n4\n5\n")
-    path = written(
+    path = write_toml(
         tmp_path,
         "[landscape]\ncover = 'voronoi'\n[classes.grass]\nshare = 0.7\n[classes.wood]\nshare = 0.3\n"
         "distribution = 'mine.csv'\nbackground = { TM3 = 0.1, TM4 = 0.2 }\n",
