@@ -1,4 +1,4 @@
-"""Pairs of rasters that tests of their regression share."""
+"""Pairs of rasters for the tests of regression."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ CELL = 30 / 9
 
 @pytest.fixture(scope="session")
 def scattered():
-    """LAI from 0.2 to 2.2, and NDVI on a line with noise of a known deviation."""
+    """LAI from 0.2 to 2.2, and NDVI on a line with noise of known standard deviation."""
     grid = fifesim.fife_site(CELL, window=((0, 300), (0, 300)))
     lai = fifesim.lai_scene(grid, arp=0.0, seed=2)
     rng = np.random.default_rng(8)
@@ -21,7 +21,7 @@ def scattered():
 
 @pytest.fixture
 def pair(lai):
-    """LAI on a line of itself, with a little noise."""
+    """LAI as a linear function of itself, with a little noise."""
     x = lai.rename("ndvi")
     noise = np.random.default_rng(5).normal(0, 0.1, lai.shape)
     return (2 * lai + 1 + noise).rename("lai"), x

@@ -1,4 +1,4 @@
-"""Kernels of reflectance and corrections against values computed in 40 digits, and corrections of simulated slopes."""
+"""BRDF kernels and corrections against values computed with 40 digits, and corrections of simulated slopes."""
 
 from pathlib import Path
 
@@ -59,21 +59,21 @@ def test_kernels_are_reciprocal():
         assert there == pytest.approx(back, rel=1e-14)
 
 
-def test_illumination_of_the_kernel_is_the_terrain_s():
+def test_illumination_cosine_agrees_with_the_terrain_function():
     sun = fifesim.Geometry(sza=50.0, saa=117.0)
     cos_i = corrections.illumination_cosine(sun.sza, sun.saa, DEM.fifesim.slope(), DEM.fifesim.aspect())
     lit = DEM.fifesim.illumination(sun)
-    # The aspect is from true north at each cell, the illumination takes the convergence at the middle of the grid.
+    # Aspect is relative to true north at each cell; the illumination uses the convergence at the centre of the grid.
     np.testing.assert_allclose(cos_i, lit.where(lit > 0, cos_i), rtol=0, atol=1e-4)
 
 
-def test_kt_gives_level_ground_back():
+def test_kt_restores_level_ground():
     level = scene()
     found = scene(DEM).fifesim.topographic_correction(DEM, "kt")
     np.testing.assert_allclose(found, level, rtol=1e-6)
 
 
-def test_estimates_of_the_scene_are_least_squares():
+def test_c_and_k_are_least_squares_estimates():
     hilly = scene(DEM)
     cos_i = DEM.fifesim.illumination(fifesim.fife_geometry()).values
     found = hilly.fifesim.topographic_correction(DEM, "c")
@@ -86,7 +86,7 @@ def test_estimates_of_the_scene_are_least_squares():
 
 
 @pytest.mark.parametrize("method", ["cosine", "c", "scs", "scs+c", "minnaert", "kt"])
-def test_corrections_are_lazy_and_level_ground_is_kept(method):
+def test_corrections_are_lazy_and_do_not_change_level_ground(method):
     whole = scene(DEM).fifesim.topographic_correction(DEM, method)
     with no_compute():
         lazy = scene(DEM.chunk(y=70, x=300), LAI.chunk(y=70, x=90)).fifesim.topographic_correction(DEM, method)
@@ -98,7 +98,7 @@ def test_corrections_are_lazy_and_level_ground_is_kept(method):
     np.testing.assert_allclose(flat, scene(), rtol=1e-12)
 
 
-def test_brdf_normalise_takes_one_view_to_another():
+def test_brdf_normalise_converts_between_views():
     land = fifesim.RossLi([0.1, 0.3], [0.05, 0.15], [0.01, 0.03])
     slant = fifesim.Geometry(sza=40.0, saa=120.0, vza=35.0, vaa=300.0)
     nadir = fifesim.Geometry(sza=40.0, saa=120.0)
@@ -110,7 +110,7 @@ def test_brdf_normalise_takes_one_view_to_another():
     np.testing.assert_allclose(found.fifesim.brdf_normalise(land, geometry=nadir, to=slant), seen, rtol=1e-12)
 
 
-def test_refusals_name_the_direction():
+def test_invalid_arguments_are_named():
     with pytest.raises(ValueError, match=r"sza .* vza .* raa"):
         check_surface(fifesim.RossLi(0.05, 0.19, 0.06))
     with pytest.raises(ValueError, match="more than it receives"):

@@ -21,8 +21,8 @@ def reflectance(lai, wavelengths=(0.56, 0.66, 0.83, 1.65)):
     return cube.rename("toa_reflectance")
 
 
-def test_indices_keep_their_word_and_equal_the_kernels(lai_with_hole):
-    """Bands go to the formula in its order: blue, green, red, near and shortwave infrared are 0 to 4."""
+def test_indices_are_raster_functions_and_equal_the_kernels(lai_with_hole):
+    """Bands are in the order of wavelength: blue, green, red, near and shortwave infrared."""
     cube = reflectance(lai_with_hole, (0.48, 0.56, 0.66, 0.83, 1.65))
     blue, green, red, nir, swir = cube.values
     bands = {"EVI": (nir, red, blue), "NDWI": (green, nir), "NDMI": (nir, swir)}
@@ -40,7 +40,7 @@ def test_indices_keep_their_word_and_equal_the_kernels(lai_with_hole):
     "wavelengths, red, nir",
     [((0.83, 0.66), 1, 0), ((0.61, 0.64, 0.69, 0.76, 0.95, 0.86), 1, 5), ((0.45, 0.665, 0.71, 0.842, 1.6), 1, 3)],
 )
-def test_bands_are_picked_by_wavelength(lai, wavelengths, red, nir):
+def test_bands_are_selected_by_wavelength(lai, wavelengths, red, nir):
     cube = reflectance(lai, wavelengths)
     np.testing.assert_array_equal(
         reflectance_ndvi(cube), indices.normalized_difference(cube.values[nir], cube.values[red])
@@ -64,7 +64,7 @@ def test_raster_without_the_bands_is_refused(lai, change, message):
 
 @pytest.mark.parametrize("name", ["TM", "ETM+", "OLI", "MSI", "MODIS"])
 def test_instruments_have_the_bands_of_every_index(name):
-    """The broad bands of their makers: the coastal blue, the red edge and 1.24 um are none of them."""
+    """The indices use the broad bands; coastal blue, red edge and 1.24 um are not among them."""
     bands = instrument(name).bands
     wavelengths = [band.wavelength for band in bands]
     picked = {window.name: bands[nearest_band(wavelengths, window)].name for _, ws in INDICES.values() for window in ws}
@@ -79,7 +79,7 @@ def test_instruments_have_the_bands_of_every_index(name):
     assert [picked[each] for each in order] == expected[name].split()
 
 
-def test_index_that_is_none_or_lacks_a_band_is_named(lai):
+def test_unknown_index_or_missing_band_is_named(lai):
     with pytest.raises(ValueError, match="there is no index 'GNDVI': type one of NDVI, EVI, EVI2"):
         reflectance_index(reflectance(lai), "GNDVI")
     with pytest.raises(ValueError, match=r"no blue band between 0\.45 and 0\.52 um"):
@@ -95,7 +95,7 @@ DATES = np.array(["1987-06-06T16:35", "1987-07-08T16:35", "1987-08-09T16:34"], "
 
 @pytest.fixture(scope="module")
 def stack(lai_values):
-    """NDVI of three dates with clouds of low values and with holes; one cell has no data."""
+    """NDVI of three dates with low values for clouds and with gaps; one cell has no data."""
     rng = np.random.default_rng(3)
     dates = [lai_values * 0.1 + rng.normal(0, 0.1, lai_values.shape) for _ in DATES]
     found = xr.concat(dates, xr.DataArray(DATES, dims="time", name="time")).rename("ndvi")
@@ -105,7 +105,7 @@ def stack(lai_values):
     return found
 
 
-def test_composite_of_ndvi_is_the_largest_with_its_date_and_sun(stack):
+def test_composite_is_the_maximum_ndvi_with_its_date_and_sun(stack):
     found = fifesim.composite(stack)
     check_place(found, grids.geobox(stack).crs)
     np.testing.assert_array_equal(found, stack.max("time"))
@@ -129,8 +129,8 @@ def test_composite_is_lazy_and_the_same_in_chunks(stack, chunks):
     xr.testing.assert_identical(stack, before)
 
 
-def test_images_are_composed_by_their_ndvi_or_by_what_is_given(stack):
-    """All bands of a cell are of one date, by their own NDVI or by an index that is given."""
+def test_images_are_composited_by_their_ndvi_or_a_given_index(stack):
+    """All bands of a cell come from one date, selected by NDVI of the images or by a given index."""
     red = 0.05 + 0 * stack
     images = xr.concat([red, red * (1 + stack) / (1 - stack)], xr.DataArray(["TM3", "TM4"], dims="band", name="band"))
     images = images.assign_coords(wavelength=("band", [0.66, 0.83])).transpose("time", "band", "y", "x")
@@ -164,7 +164,7 @@ def test_images_are_composed_by_their_ndvi_or_by_what_is_given(stack):
         (lambda ndvi: ndvi.assign_attrs(standard_name="leaf_area_index"), {}, "leaf area index by its standard_name"),
     ],
 )
-def test_what_makes_no_composite_is_refused(stack, change, options, said):
+def test_invalid_composites_are_rejected(stack, change, options, said):
     with pytest.raises(ValueError, match=said):
         fifesim.composite(change(stack), **options)
 
@@ -177,16 +177,16 @@ def test_what_makes_no_composite_is_refused(stack, change, options, said):
         (lambda by: by.assign_coords(x=by["x"] + 30.0), "have different grids"),
     ],
 )
-def test_what_decides_has_the_dates_and_cells_of_the_images(stack, change, said):
-    """Of as many dates and cells it would choose wrong ones in silence."""
+def test_given_index_must_have_the_dates_and_cells_of_the_images(stack, change, said):
+    """Otherwise an index of the same shape would silently select wrong dates or cells."""
     with pytest.raises(ValueError, match=said):
         fifesim.composite(stack, by=change(stack))
     plain = stack.drop_vars("spatial_ref").drop_attrs(deep=False) * 2
     np.testing.assert_array_equal(fifesim.composite(stack, by=plain), fifesim.composite(stack))
 
 
-def test_angles_by_cell_are_those_of_the_date(stack):
-    """As a product opened by pixel has them."""
+def test_angles_by_cell_come_from_the_selected_date(stack):
+    """Products opened with angles by pixel have such coordinates."""
     sza = stack.copy(data=np.random.default_rng(3).uniform(20, 60, stack.shape)).drop_vars("date", errors="ignore")
     found = fifesim.composite(stack.assign_coords(sza=(stack.dims, sza.values)))
     for number, date in enumerate(stack["time"].values):
@@ -194,7 +194,7 @@ def test_angles_by_cell_are_those_of_the_date(stack):
         np.testing.assert_array_equal(found["sza"].values[there], sza.values[number][there])
 
 
-def test_nothing_records_a_composite(lai):
+def test_sense_rejects_a_composite(lai):
     toa = lai.fifesim.surface_reflectance().fifesim.to_toa()
     times = xr.DataArray(np.array(["2022-06-01T17:00", "2022-06-11T17:00"], "M8[ns]"), dims="time", name="time")
     clear = xr.concat([toa, toa], times).fifesim.composite()
@@ -204,7 +204,7 @@ def test_nothing_records_a_composite(lai):
 
 @pytest.mark.parametrize("kind", ["netcdf", "zarr"])
 @pytest.mark.parametrize("chunks", [None, ODD_CHUNKS], ids=["eager", "lazy"])
-def test_a_composite_comes_back_from_netcdf_and_zarr(stack, tmp_path, kind, chunks):
+def test_composite_is_restored_from_netcdf_and_zarr(stack, tmp_path, kind, chunks):
     found = fifesim.composite(stack if chunks is None else in_chunks(stack, chunks))
     path = tmp_path / "composite"
     if kind == "netcdf":
@@ -219,7 +219,7 @@ def test_a_composite_comes_back_from_netcdf_and_zarr(stack, tmp_path, kind, chun
 
 @pytest.mark.parametrize("lazy", [False, True])
 def test_composites_select_by_median_view_or_clear_dates(lai, lazy):
-    """Expected values by numpy, of five dates with gaps, clouds and views."""
+    """Expected values from numpy, for five dates with gaps, clouds and different views."""
     rng = np.random.default_rng(4)
     grid = grids.geobox(lai)
     values = rng.random((5, *grid.shape))
@@ -256,7 +256,7 @@ def test_composites_select_by_median_view_or_clear_dates(lai, lazy):
     np.testing.assert_array_equal(
         nearest.vza.values[some], np.where(np.isnan(seen), 99, vza[:, None, None]).min(axis=0)[some]
     )
-    # Views from the other side of the track are as far from nadir.
+    # Views from the other side of the track are equally far from nadir.
     signed = ndvi.assign_coords(vza=-ndvi.vza)
     np.testing.assert_array_equal(signed.fifesim.composite("nadir-most", clear=clear).values, nearest.values)
     mean = ndvi.fifesim.composite("mean-of-clear", clear=clear)

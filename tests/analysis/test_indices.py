@@ -9,7 +9,7 @@ import pytest
 from fifesim.analysis import indices
 from fifesim.analysis.indices import date_of_maximum, normalized_difference, normalized_difference_std
 
-# As the catalogue of spyndex writes them, with its letters for the bands.
+# Formulas in the notation of the spyndex catalogue, with its letters for the bands.
 CATALOGUE = {
     "normalized_difference": ("NR", "(N - R) / (N + R)"),
     "enhanced": ("NRB", "2.5 * (N - R) / (N + 6.0 * R - 7.5 * B + 1.0)"),
@@ -21,18 +21,18 @@ CATALOGUE = {
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_formulas_are_those_of_the_catalogue(name):
+def test_formulas_agree_with_the_catalogue(name):
     letters, formula = CATALOGUE[name]
     values = dict(zip("NRB", np.random.default_rng(1).uniform(0.01, 0.6, (3, 50)), strict=True))
     values["B"] = values["B"] / 6
     index = getattr(indices, name)
     np.testing.assert_allclose(index(*(values[each] for each in letters)), eval(formula, {}, values), rtol=1e-13)
-    # Bare ground without contrast has no vegetation.
+    # Bare ground without spectral contrast has an index of 0.
     np.testing.assert_allclose(index(*[0.2] * len(letters)), 0.0, rtol=0, atol=1e-15)
     assert np.isnan(index(np.nan, *[0.2] * (len(letters) - 1)))
 
 
-def test_index_without_a_denominator_or_a_root_is_missing_and_integers_do_not_wrap():
+def test_undefined_index_is_missing_and_integers_do_not_overflow():
     assert np.isnan(indices.enhanced(0.5, 0.0, 0.2)) and np.isnan(indices.modified_soil_adjusted(0.5, -0.3))
     assert np.isnan(normalized_difference([0.0, 0.1, 0.1], [0.0, -0.1, np.nan])).all()
     np.testing.assert_array_equal(normalized_difference([0.5, 0.0], [0.0, 0.5]), [1.0, -1.0])
@@ -42,7 +42,7 @@ def test_index_without_a_denominator_or_a_root_is_missing_and_integers_do_not_wr
 
 @pytest.mark.parametrize(("nir", "red"), [(0.4, 0.05), (0.25, 0.25), (0.05, 0.2)])
 def test_error_of_ndvi_follows_from_its_derivatives(nir, red):
-    """Central differences, and the root of the sum of squares of both contributions."""
+    """Central differences; the errors of both bands are added in quadrature."""
     h = 1e-6
     by_nir = (normalized_difference(nir + h, red) - normalized_difference(nir - h, red)) / (2 * h)
     by_red = (normalized_difference(nir, red + h) - normalized_difference(nir, red - h)) / (2 * h)
@@ -51,20 +51,20 @@ def test_error_of_ndvi_follows_from_its_derivatives(nir, red):
     assert np.isnan(normalized_difference_std(0.0, 0.0, 0.003, 0.001))
 
 
-def test_missing_dates_are_passed_over_and_equal_ones_are_the_first():
+def test_missing_dates_are_skipped_and_ties_take_the_first():
     index = np.array([[np.nan, -0.2, -0.1], [0.3, 0.3, np.nan], [np.nan, -np.inf, np.nan], [np.nan] * 3])
     assert date_of_maximum(index).tolist() == [2, 0, 1, -1]
 
 
-def test_maximum_of_normals_is_that_of_the_table():
-    """1e-9: the digits of the quadrature of the table."""
+def test_maximum_of_normals_agrees_with_the_table():
+    """rtol=1e-9: accuracy of the quadrature behind the table."""
     known = pd.read_csv(Path(__file__).parents[1] / "data" / "clouds" / "maximum_of_normals.csv", comment="#")
     found = [indices.maximum_of_normals(dates) for dates in known["dates"]]
     np.testing.assert_allclose(found, known[["mean", "sd"]], rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("dates", [2, 5, 10, 14])
-def test_bias_of_a_maximum_composite_is_that_of_the_maximum_of_normals(dates):
+def test_bias_of_a_maximum_composite_follows_the_maximum_of_normals(dates):
     """Within 3 standard errors, for independent errors of NDVI."""
     ndvi = 0.5 + 0.03 * np.random.default_rng(dates).standard_normal((40_000, dates))
     best = indices.values_of_date(ndvi, indices.date_of_maximum(ndvi), np.nan)

@@ -19,7 +19,7 @@ def line(y, x, y_origin=0.0, x_origin=0.0):
 
 @pytest.mark.parametrize("shift", [0.0, 300.0])
 def test_line_errors_and_intervals_agree_with_statsmodels(shift):
-    """To 1e-10, also where the values are a thousand times their spread."""
+    """Agreement to 1e-10, also where values are a thousand times their spread."""
     ours = line(Y + shift, X - shift, shift, -shift)
     theirs = statsmodels.api.OLS((Y + shift).ravel(), statsmodels.api.add_constant((X - shift).ravel())).fit()
     np.testing.assert_allclose([ours.intercept, ours.slope], theirs.params, rtol=1e-10)
@@ -35,7 +35,7 @@ def test_line_errors_and_intervals_agree_with_statsmodels(shift):
 
 
 def test_missing_and_infinite_values_are_left_out():
-    """1 / 0 is no value of an index: it may not turn a whole line into NaN."""
+    """One infinite value of an index, such as 1 / 0, must not turn the whole line into NaN."""
     y, x = Y.copy(), X.copy()
     y[3, :], x[:, 4], x[0, 0], y[5, 6], y[7, 8] = np.nan, np.nan, np.inf, -np.inf, np.inf
     keep = np.isfinite(y) & np.isfinite(x)
@@ -56,7 +56,7 @@ def test_constant_and_exact_lines():
             exact.confidence_interval(0.5, level)
 
 
-def test_line_takes_numbers_of_any_kind():
+def test_line_accepts_numbers_lists_and_arrays():
     ours = line(Y, X)
     expected = ours.intercept + ours.slope * np.array([0.3, 0.4])
     for x in ([0.3, 0.4], (0.3, 0.4), np.array([0.3, 0.4])):
@@ -67,7 +67,7 @@ def test_line_takes_numbers_of_any_kind():
     np.testing.assert_array_equal(ours.extrapolates([*far, np.nan]), [True, False, False, True, False])
 
 
-def test_regression_is_told_in_two_lines():
+def test_repr_of_a_regression_has_two_lines():
     first, second = repr(Regression(-2.0, 1.25, 0.9, 10, 0.1, 0.5, 4.0)).splitlines()
     assert first == "Regression: y = 1.25 - 2 x, R2 0.9000, n 10"
     assert second == "  standard errors: slope 0.05, intercept 0.0403; y about the line 0.1"
@@ -76,8 +76,8 @@ def test_regression_is_told_in_two_lines():
 # ------------------------------------------------------------------------------------------ increments
 
 
-def test_increments_begin_where_they_are_counted_from():
-    """Values on an edge belong to the increment above it; what lies outside of all is left out, as is NaN."""
+def test_increments_start_at_their_origin():
+    """Values on an edge belong to the increment above it; values outside all increments and NaN are ignored."""
     values = np.array([[-0.6, -0.5, -0.1, 0.0, 0.4, 0.5], [np.nan, 0.1, 0.2, 9.0, -9.0, 0.3]])
     ndvi = np.where(values == 0.3, np.inf, 0.7)
     sums = regression.increment_sums(values, ndvi, -1, 0.5, 2, 0.2)

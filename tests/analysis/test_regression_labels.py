@@ -12,7 +12,7 @@ from fifesim.analysis.regression_labels import matched, sound_cells
 from fifesim.grids import grid as grids
 
 
-def test_regression_has_the_same_bits_in_any_chunks(pair):
+def test_regression_is_identical_in_any_chunks(pair):
     y, x = pair
     y[3:5, 2] = np.nan
     whole = fifesim.regress(y, x)
@@ -32,14 +32,14 @@ def test_regression_works_where_the_first_row_is_empty(pair):
 CELL = 30 / 9
 
 
-def test_pairs_lie_in_the_same_place(pair):
-    """Rasters that cover other ground are cut to what they share."""
+def test_pixels_are_paired_by_location(pair):
+    """Rasters that cover different ground are cropped to their common area."""
     y, x = pair
     cut = fifesim.regress(y[3:40, :50], x[:, 7:])
     assert cut == fifesim.regress(y[3:40, 7:50], x[3:40, 7:50])
 
 
-def test_pairs_may_be_matched_by_row_and_column(pair):
+def test_pixels_can_be_paired_by_row_and_column(pair):
     y, x = pair
     moved = grids.place(x, fifesim.fife_site(CELL, window=((91, 136), (180, 234))))
     assert fifesim.regress(y, moved, pair="index") == fifesim.regress(y, x)
@@ -59,8 +59,8 @@ def test_unmatched_rasters_are_refused(pair):
         fifesim.regress(y.expand_dims(band=["a"]), x)
 
 
-def test_rasters_are_cut_to_their_common_ground(lai):
-    """Whichever of the two begins first, along each axis."""
+def test_rasters_are_cropped_to_their_common_area(lai):
+    """Either raster may begin first along each axis."""
     one, other = matched(lai[5:40, :30], lai[:20, 11:])
     np.testing.assert_array_equal(one, lai[5:20, 11:30])
     np.testing.assert_array_equal(other, one)
@@ -77,8 +77,10 @@ def test_digital_numbers_are_refused(lai):
 # ------------------------------------------------------------------------------------------ noise
 
 
-def test_noise_on_a_line_is_its_deviation_over_slope_and_value(scattered):
-    """Closed form, with the share of the slope within an increment; 900 pairs each know a deviation to 2.4 %."""
+def test_equivalent_noise_of_a_line_matches_the_closed_form(scattered):
+    """
+    Closed form, including the variation of the line within an increment; 900 pairs determine a deviation to 2.4 %.
+    """
     lai, ndvi = scattered
     found = fifesim.relative_equivalent_noise(lai, ndvi, 0.02)
     expected = np.hypot(0.03, 0.3 * 0.02 / np.sqrt(12)) / (0.3 * found["increment"])
@@ -87,7 +89,7 @@ def test_noise_on_a_line_is_its_deviation_over_slope_and_value(scattered):
     assert int(found["count"].sum()) == lai.size
 
 
-def test_noise_has_the_same_bits_in_any_chunks(scattered):
+def test_equivalent_noise_is_identical_in_any_chunks(scattered):
     lai, ndvi = scattered
     whole = fifesim.relative_equivalent_noise(lai, ndvi)
     xr.testing.assert_identical(
@@ -114,9 +116,12 @@ def test_impossible_increments_are_refused(scattered, options, message):
 
 
 @pytest.mark.filterwarnings("ignore:inversion_error is deprecated:FutureWarning")
-def test_inversion_holds_its_share_and_has_the_residual_as_error(scattered):
-    """On the pixels that it was fitted to: no bias, and the residual deviation but for n - 2; 95 % within 4 errors."""
-    lai, ndvi = scattered[0] + 1.0, scattered[1]  # so that no value is clipped
+def test_inversion_interval_has_its_coverage_and_the_error_is_the_residual(scattered):
+    """
+    For the fitted pixels, the bias is 0 and the RMSE is the residual deviation apart from n - 2; 95 % lie within the
+    interval.
+    """
+    lai, ndvi = scattered[0] + 1.0, scattered[1]  # no value is clipped
     fit = fifesim.regress(lai, ndvi)
     estimate = fifesim.invert(ndvi, fit)
     error = fifesim.inversion_error(estimate, lai)
@@ -136,8 +141,8 @@ def test_inversion_holds_its_share_and_has_the_residual_as_error(scattered):
         fifesim.inversion_error(lai * np.nan, lai)
 
 
-def test_map_is_lazy_labelled_and_as_the_line_says(scattered):
-    lai, ndvi = scattered[0] + 1.0, scattered[1]  # so that no value is clipped
+def test_inverted_map_is_lazy_labelled_and_on_the_line(scattered):
+    lai, ndvi = scattered[0] + 1.0, scattered[1]  # no value is clipped
     fit = fifesim.regress(lai, ndvi)
     lazy = fifesim.invert(in_chunks(ndvi, ODD_CHUNKS | {"y": 100, "x": 99}), fit, level=0.5)
     assert lazy["low"].chunks is not None
@@ -175,6 +180,6 @@ def test_values_outside_the_physical_range_are_clipped_and_flagged(scattered):
     ("options", "message"),
     [({"quantity": "ndvi"}, "quantity must be 'lai' or 'fpar'"), ({"level": 95}, "level must be between 0 and 1")],
 )
-def test_impossible_inversion_is_refused(scattered, options, message):
+def test_invalid_inversion_is_rejected(scattered, options, message):
     with pytest.raises(ValueError, match=message):
         fifesim.invert(scattered[1], fifesim.regress(*scattered), **options)

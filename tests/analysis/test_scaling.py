@@ -1,4 +1,4 @@
-"""Scale effects against closed forms, quadrature, brute force and scipy; shares of causes."""
+"""Scale effects against closed forms, quadrature, brute force and scipy; Shapley shares and Sobol indices."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from fifesim.ground.landscape import autoregression
 
 
 def exact_covariance(arp, reach):
-    """Covariance map of the process, from its spectrum on a torus 40 decay lengths around."""
+    """Covariance map of the process, from its spectrum on a torus with a circumference of 40 decay lengths."""
     u = 2 * np.pi * np.fft.fftfreq(1024)
     spectrum = autoregression.response(arp, u[:, None], u[None, :]) ** 2
     covariance = np.fft.ifft2(spectrum).real
@@ -27,8 +27,8 @@ def exact_covariance(arp, reach):
 
 
 @pytest.mark.parametrize("arp", [0.05, 0.15, 0.24])
-def test_means_of_blocks_keep_what_the_spectrum_says(arp):
-    """The same share by integrating the spectrum times the transfer function of 9 x 9 cells."""
+def test_variance_of_block_means_agrees_with_the_spectrum(arp):
+    """The expected variance is the integral of the spectrum times the transfer function of 9 x 9 cells."""
     axis = operator(footprints.Boxcar(9.0))
     products = scaling.weight_correlation(axis, 8)
     variance = scaling.footprint_variance(exact_covariance(arp, 8), products, products)
@@ -44,8 +44,8 @@ def operator(lsf, pixel=9.0):
     )
 
 
-def test_weights_of_a_pixel_that_overhangs_do_not_count():
-    """Two of three pixels of four cells are whole: a triangle."""
+def test_pixels_beyond_the_scene_are_ignored():
+    """Two of three pixels of four cells lie inside the scene; their correlation is a triangle."""
     axis = footprints.axis_operator(
         footprints.Boxcar(4), cell_origin=0, cell_size=1, n_cells=10, pixel_origin=-2, pixel_size=4, n_pixels=3
     )
@@ -57,7 +57,10 @@ def test_weights_of_a_pixel_that_overhangs_do_not_count():
 
 
 def test_reflected_density_has_all_its_mass_above_zero():
-    """That of the samples and their mirror images, twice: scipy's. Without, a part of the mass lies below zero."""
+    """
+    Expected: twice scipy's density of the samples and their mirror images. Without reflection, part of the mass is
+    below zero.
+    """
     samples = np.abs(np.random.default_rng(8).normal(0, 1, 400))
     theirs = stats.gaussian_kde(np.r_[samples, -samples], bw_method=0.2 / np.r_[samples, -samples].std(ddof=1))
     at = np.linspace(0, 6, 901)
@@ -73,15 +76,15 @@ def test_reflected_density_has_all_its_mass_above_zero():
     np.testing.assert_allclose(scaling.sample_density(samples, at, reflect=True), mine, rtol=1e-12)
 
 
-def test_parts_of_many_samples_add_up(monkeypatch):
+def test_density_is_the_same_in_parts(monkeypatch):
     samples, at = np.random.default_rng(2).normal(size=50), np.linspace(-3, 3, 7)
     whole = scaling.gaussian_density(samples, at, 0.3)
     monkeypatch.setattr(scaling, "_PART", 7)
     np.testing.assert_allclose(scaling.gaussian_density(samples, at, 0.3), whole, rtol=1e-13)
 
 
-def test_bandwidth_falls_with_the_fifth_root_of_the_number():
-    """The narrower of the two spreads counts, and a deviation stands for an empty interquartile range."""
+def test_bandwidth_decreases_with_the_fifth_root_of_the_sample_size():
+    """The smaller of the two spreads is used; the standard deviation replaces an interquartile range of 0."""
     assert scaling.silverman_bandwidth(1.0, 1.34 * 0.5, 32.0) == pytest.approx(0.9 * 0.5 / 2, rel=1e-12)
     assert scaling.silverman_bandwidth(1.0, 0.0, 1.0) == pytest.approx(0.9, rel=1e-12)
 
@@ -93,11 +96,11 @@ def test_samples_without_a_density_are_refused():
         scaling.sample_density(np.array([1.0, 1.0]), np.array([0.0]))
 
 
-# ------------------------------------------------------------------------------------------ shares of causes
+# ------------------------------------------------------------------------------------------ shares and indices
 
 
-def test_airport_game():
-    """Runways that cost 1, 2 and 6, of which the longest asked for is built: 1/3, 1/3 + 1/2, 1/3 + 1/2 + 4."""
+def test_shapley_shares_of_the_airport_game():
+    """Runways cost 1, 2 and 6, and the longest one is built. Shares are 1/3, 1/3 + 1/2 and 1/3 + 1/2 + 4."""
     lengths = np.array([1.0, 2.0, 6.0])
     cost = np.array([np.max(lengths * which) for which in np.ndindex(2, 2, 2)])
     np.testing.assert_allclose(shapley(cost.reshape(2, 2, 2), 3), [1 / 3, 5 / 6, 29 / 6], rtol=1e-14)
@@ -123,7 +126,7 @@ def sobol_g(text, share):
 
 
 @pytest.mark.parametrize("case", SOBOL["case"].unique())
-def test_indices_are_those_of_the_closed_form(case):
+def test_sobol_indices_agree_with_the_closed_form(case):
     rows = SOBOL[SOBOL["case"] == case]
     function = ishigami if case.startswith("ishigami") else sobol_g
     sets = sobol_points(qmc.Sobol(2 * len(rows), seed=1).random_base2(12))
@@ -136,13 +139,13 @@ def test_indices_are_those_of_the_closed_form(case):
         assert (difference < 3 * error).all() and (difference < 0.01).all(), name
 
 
-def test_indices_are_those_of_salib():
+def test_sobol_indices_agree_with_salib():
     pytest.importorskip("SALib")
     from SALib.analyze import sobol
 
     sets = sobol_points(np.random.default_rng(4).random((512, 6)))
     values = ishigami("a=7 b=0.1", sets)
-    # SALib has one block of A, A_B of each input and B for each point.
+    # For each point, SALib expects A, then A_B of each input, then B.
     ordered = np.concatenate([values[:1], values[2:], values[1:2]]).T.ravel()
     problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[0, 1]] * 3}
     expected = sobol.analyze(problem, ordered, calc_second_order=False, seed=1)
@@ -158,6 +161,6 @@ def test_constant_and_undefined_functions_are_refused():
         sobol_indices(np.full((4, 8), np.nan))
 
 
-def test_correlation_that_stays_up_has_no_range():
+def test_correlation_above_the_threshold_has_no_range():
     assert np.isnan(scaling.crossing(np.arange(3.0), np.array([1.0, 0.9, 0.8])))
     assert scaling.crossing(2 * np.arange(3.0), np.array([1.0, 0.55, -0.45])) == pytest.approx(3.0)

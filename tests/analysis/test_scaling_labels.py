@@ -18,15 +18,15 @@ CELL = 30 / 9
 
 
 def test_aggregate_is_the_mean_of_blocks(lai):
-    """Cells of 30/9 m: 81 in a pixel, no cell cut."""
+    """Cells of 30/9 m: 81 whole cells per pixel."""
     truth = check_raster_function(lambda lai: fifesim.aggregate(lai, 30.0), lai, quantity="lai")
     expected = lai.values.reshape(5, 9, 6, 9).mean(axis=(1, 3))
     np.testing.assert_allclose(truth, expected, rtol=1e-14)
     assert grids.same_grid(grids.geobox(truth), grids.aligned_grid(grids.geobox(lai), 30.0))
 
 
-def test_blocks_that_cut_cells_share_them(lai):
-    """Brute force: every cell split into a hundred parts."""
+def test_cells_cut_by_blocks_are_weighted_by_area(lai):
+    """Brute force: every cell is split into a hundred parts."""
     truth = fifesim.aggregate(lai, 25.0)
     parts = np.repeat(np.repeat(lai.values, 10, axis=0), 10, axis=1)
     expected = parts[: 5 * 75, : 7 * 75].reshape(5, 75, 7, 75).mean(axis=(1, 3))
@@ -43,8 +43,8 @@ def test_block_with_too_few_valid_cells_is_missing(lai):
     assert np.isfinite(fifesim.aggregate(lai, 30.0, min_valid=0.5)).all()
 
 
-def test_blocks_may_be_weighted_by_a_line_spread(lai):
-    """A matrix of the instrument's weights for each axis, without the package's operators."""
+def test_blocks_can_be_weighted_by_a_line_spread_function(lai):
+    """Expected: one weight matrix per axis, computed from the line spread function directly."""
     lsf = fifesim.instrument("TM", response="paper").line_spread
     weights = [
         [[lsf.cumulative(CELL * (j + 1) - 30 * (i + 0.5)) - lsf.cumulative(CELL * j - 30 * (i + 0.5)) for j in range(n)]
@@ -61,7 +61,7 @@ def test_block_larger_than_the_scene_is_refused(lai):
         fifesim.aggregate(lai, 500.0)
 
 
-def test_aggregates_of_bands_keep_them(lai):
+def test_aggregate_keeps_the_bands(lai):
     bands = (lai * xr.DataArray(np.linspace(0.1, 0.6, 4), dims="band")).transpose("band", "y", "x")
     cube = grids.place(bands, grids.geobox(lai))
     with no_compute():
@@ -78,7 +78,7 @@ CELL = 30 / 9
 
 
 def cube(lai, spread=1.0):
-    """Reflectances that vary with LAI, red down and near infrared up."""
+    """Reflectances that vary with LAI: red decreases, near infrared increases."""
     bands = [0.12 - spread * 0.04 * (lai - 0.7), 0.25 + spread * 0.08 * (lai - 0.7)]
     out = grids.place(xr.concat(bands, "band").transpose("band", "y", "x"), grids.geobox(lai))
     out = out.assign_coords(wavelength=("band", [0.66, 0.83]))
@@ -93,8 +93,8 @@ def test_bias_of_a_linear_algorithm_is_zero(lai_with_hole):
     assert lazy.sizes == {"y": 5, "x": 6}
 
 
-def test_predicted_bias_of_ndvi_is_the_simulated_one(lai):
-    """Coefficients of variation of a tenth: the third order is that much less."""
+def test_predicted_bias_of_ndvi_agrees_with_the_simulation(lai):
+    """Coefficients of variation are about 0.1; third-order terms are smaller by this factor."""
     reflectance = cube(lai, 0.5)
     simulated = fifesim.scale_bias(fifesim.ndvi, reflectance)["bias"]
     predicted = check_raster_function(fifesim.ndvi_bias, reflectance, quantity="ndvi_bias")
@@ -102,8 +102,8 @@ def test_predicted_bias_of_ndvi_is_the_simulated_one(lai):
     assert float(np.abs(predicted - simulated).mean() / np.abs(simulated).mean()) < 0.08
 
 
-def test_predicted_bias_of_fpar_is_the_simulated_one(lai):
-    """The third order is K times the skewness and deviation of LAI, a tenth."""
+def test_predicted_bias_of_fpar_agrees_with_the_simulation(lai):
+    """The third-order term is K times skewness and standard deviation of LAI, about 0.1."""
     extinction = float(layers.extinction_coefficient(fifesim.fife_geometry().sza))
     simulated = fifesim.scale_bias(fifesim.fpar, lai)["bias"]
     predicted = check_raster_function(lambda lai: fifesim.fpar_bias(lai, extinction), lai, quantity="fpar_bias")
@@ -111,15 +111,15 @@ def test_predicted_bias_of_fpar_is_the_simulated_one(lai):
     np.testing.assert_allclose(predicted, simulated, rtol=0.2)
 
 
-def test_bias_of_fpar_is_that_of_the_same_asymptote_as_fpar(lai):
-    """A canopy of LAI 20, of which one part in 1e5 is not in its depth, absorbs what an infinite one does in both."""
+def test_bias_of_fpar_uses_the_asymptote_of_fpar(lai):
+    """A canopy of LAI 20 absorbs the asymptotic fraction to within 1e-5."""
     dense = fifesim.fpar(lai.copy(data=np.full(lai.shape, 20.0)), geometry=fifesim.fife_geometry())
     ratio = fifesim.fpar_bias(lai, 0.5) / fifesim.fpar_bias(lai, 0.5, fpar_inf=1.0)
     np.testing.assert_allclose(ratio, float(dense[0, 0]), rtol=3e-5)
 
 
-def test_white_noise_keeps_a_ninth_of_its_deviation():
-    """Of 9 x 9 cells; 900 means, whose variance is known to sqrt(2 / 900) = 5 %, four of it."""
+def test_white_noise_keeps_a_ninth_of_its_standard_deviation():
+    """Pixels of 9 x 9 cells. The variance of 900 means is known to sqrt(2 / 900) = 5 %; tolerance four times this."""
     grid = fifesim.fife_site(CELL, window=((0, 270), (0, 270)))
     cells = fifesim.lai_scene(grid, arp=0.0, seed=1)
     kept = fifesim.share_kept(fifesim.aggregate(cells), cells)
@@ -131,18 +131,22 @@ def test_white_noise_keeps_a_ninth_of_its_deviation():
 
 
 def test_density_of_a_raster_integrates_to_one_and_ignores_chunks(lai_with_hole):
-    """The kernel reaches past the range of the values, where a few hundredths of the mass lie."""
+    """The kernel extends beyond the range of the values, where a few percent of the mass lie."""
     whole = fifesim.density(lai_with_hole, points=400)
     assert 0.95 < integrate.trapezoid(whole, whole["value"]) <= 1
     xr.testing.assert_identical(fifesim.density(in_chunks(lai_with_hole, ODD_CHUNKS), points=400), whole)
     values = lai_with_hole.values[np.isfinite(lai_with_hole)]
     exact = scaling.gaussian_density(values, whole["value"].values, whole.attrs["bandwidth"], reflect=True)
-    # Bins of 1/2000 of the range beside a bandwidth of a tenth of it: (bin / bandwidth)^2 / 24 of the curvature.
+    # Bins of 1/2000 of the range and a bandwidth of 1/10 of it: relative error (bin / bandwidth)^2 / 24 of the
+    # curvature.
     np.testing.assert_allclose(whole, exact, rtol=1e-3)
 
 
-def test_density_of_leaf_area_is_that_of_its_distribution_down_to_zero():
-    """Exact ranks of burned, grazed ground, whose density is .85 where it is cut off; a difference may be negative."""
+def test_density_of_lai_agrees_with_its_distribution_at_zero():
+    """
+    Exact ranks for burned, grazed ground, whose density is 0.853 at the cut-off at 0; differences of LAI may be
+    negative.
+    """
     site = fifesim.fife_site(30 / 9, window=((0, 333), (0, 333)))
     lai = fifesim.lai_scene(site, arp=0.24, seed=1, method="periodic")
     known = fifesim.lai_distribution("burned-grazed").pdf(0.0)
@@ -155,14 +159,14 @@ def test_density_of_leaf_area_is_that_of_its_distribution_down_to_zero():
         fifesim.density(about, reflect=True)
 
 
-def test_cells_that_lack_one_band_count_in_neither(lai):
-    """A gap in red alone changes the prediction as a gap in both bands does."""
+def test_cells_without_one_band_are_ignored_in_both(lai):
+    """A gap in red alone has the same effect on the prediction as a gap in both bands."""
     one = cube(lai).copy(deep=True)
     both = one.copy(deep=True)
     one[0, 0, 0] = both[:, 0, 0] = np.nan
     xr.testing.assert_equal(fifesim.ndvi_bias(one), fifesim.ndvi_bias(both))
     assert np.isfinite(fifesim.ndvi_bias(one)[0, 0])
-    # A bias has the units of its algorithm.
+    # The bias has the units of the algorithm.
     squared = fifesim.scale_bias(lambda array: (array**2).assign_attrs(units="m4 m-4"), lai)
     assert squared["bias"].attrs["units"] == "m4 m-4"
 
@@ -177,14 +181,14 @@ def test_impossible_beer_laws_are_refused(lai, numbers, message):
 
 
 def test_density_takes_any_dimensions(lai):
-    """Counts do not know how the values are laid out."""
+    """The layout of the values does not matter."""
     whole = fifesim.density(lai, points=50)
     line = lai.stack(cell=("y", "x")).drop_vars(["cell", "y", "x", "spatial_ref"])
     for array in (line, line.chunk(cell=1000), lai.expand_dims(band=1).chunk(y=7), lai.T):
         np.testing.assert_allclose(fifesim.density(array, points=50), whole, rtol=1e-12)
 
 
-def test_linearity_of_rasters_is_that_of_their_values(lai):
+def test_linearity_of_rasters_equals_the_kernel(lai):
     red, nir = cube(lai).values
     for chunks in ({}, ODD_CHUNKS):
         found = fifesim.ndvi_linearity(in_chunks(cube(lai), chunks))
@@ -197,7 +201,7 @@ def test_linearity_of_rasters_is_that_of_their_values(lai):
 CELL = 30 / 9
 
 
-def test_blocks_add_up_to_the_whole(monkeypatch, lai_with_hole):
+def test_autocovariance_is_the_same_in_blocks(monkeypatch, lai_with_hole):
     whole = fifesim.autocovariance(lai_with_hole, 30.0)
     monkeypatch.setattr(variogram_raster, "_LAG_BLOCK", 16)
     parts = fifesim.autocovariance(lai_with_hole, 30.0)
@@ -206,7 +210,7 @@ def test_blocks_add_up_to_the_whole(monkeypatch, lai_with_hole):
     np.testing.assert_allclose(parts["semivariance"], whole["semivariance"], atol=1e-13)
 
 
-def test_chunks_change_no_bit(monkeypatch, lai_with_hole):
+def test_variogram_is_identical_in_any_chunks(monkeypatch, lai_with_hole):
     monkeypatch.setattr(variogram_raster, "_LAG_BLOCK", 16)
     whole = fifesim.variogram(lai_with_hole, 40.0)
     for chunks in (CHUNKS, ODD_CHUNKS):
@@ -221,12 +225,12 @@ def gaussian():
     return lai.copy(data=streaming_field(5, 0.24, 0, 0, (420, 420)))
 
 
-def test_variogram_of_the_autoregressive_field_is_the_analytic_one(gaussian):
+def test_variogram_of_the_autoregressive_field_is_analytic(gaussian):
     """
-    Correlation and practical range within the sampling error.
+    Correlation and practical range agree within the sampling error.
 
-    Covariances of a field are uncertain by about sqrt(2 integral scale / cells): the squared correlation adds up to 60
-    cells over all lags here, so sqrt(2 x 60 / 176400) = 0.026; four of it.
+    The standard error of a covariance is about sqrt(2 integral scale / cells). The squared correlation sums to 60 cells
+    over all lags, so it is sqrt(2 x 60 / 176400) = 0.026; the tolerance is four times this.
     """
     found = fifesim.variogram(gaussian, 40.0)
     expected = autoregression.autocorrelation(0.24, np.arange(found.sizes["lag"]))
@@ -237,15 +241,15 @@ def test_variogram_of_the_autoregressive_field_is_the_analytic_one(gaussian):
 
 
 @pytest.mark.parametrize("lsf", [None, fifesim.instrument("TM").line_spread])
-def test_predicted_variance_is_the_simulated_one(gaussian, lsf):
-    """The covariance is that of the same scene, so that only its borders differ: 46 pixels along an edge, 2 %."""
+def test_predicted_variance_agrees_with_the_simulation(gaussian, lsf):
+    """The covariance comes from the same scene, so that only the borders differ: 46 pixels along an edge, 2 %."""
     found = fifesim.regularized_variance(gaussian, 30.0, lsf)
     assert float(found["predicted"]) == pytest.approx(float(found["simulated"]), rel=0.05)
     assert float(found["predicted"]) < 0.5 * float(found["cells"])
     assert float(found["cells"]) == pytest.approx(float(gaussian.var()), rel=1e-10)
 
 
-def test_reach_out_of_the_raster_is_refused(lai):
+def test_too_long_or_short_lags_are_rejected(lai):
     with pytest.raises(ValueError, match=r"at most half of the raster \(75 m\), got 100 m"):
         fifesim.autocovariance(lai, 100.0)
     with pytest.raises(ValueError, match="at least a cell"):
@@ -254,8 +258,8 @@ def test_reach_out_of_the_raster_is_refused(lai):
         fifesim.autocovariance(lai * np.nan, 30.0)
 
 
-def test_values_that_do_not_vary_have_no_covariance(lai):
-    """They are no missing ones, and have neither correlation nor density."""
+def test_constant_rasters_have_zero_covariance(lai):
+    """Constant values are valid, but have neither correlation nor density."""
     with pytest.raises(ValueError, match="a correlation needs values that vary"):
         fifesim.variogram(lai * 0 + 0.3, 20)
     with pytest.raises(ValueError, match="a density needs values that vary"):

@@ -1,4 +1,4 @@
-"""Scores against quadrature and brute force, and of labelled estimates with uncertainty."""
+"""Scores against quadrature and brute force, also for labelled estimates with uncertainty."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ LEVELS = [0.5, 0.8, 0.95]
 
 
 @pytest.mark.parametrize(("mean", "sd", "truth"), [(0.2, 1.2, -1.9), (-1.4, 0.3, 0.4), (1.0, 0.5, 1.0)])
-def test_scores_of_a_normal_distribution_are_those_of_quadrature(mean, sd, truth):
+def test_scores_of_a_normal_distribution_agree_with_quadrature(mean, sd, truth):
     forecast = norm(mean, sd)
     below = quad(lambda x: forecast.cdf(x) ** 2, -30, truth, epsabs=1e-13)[0]
     above = quad(lambda x: forecast.sf(x) ** 2, truth, 30, epsabs=1e-13)[0]
@@ -22,11 +22,11 @@ def test_scores_of_a_normal_distribution_are_those_of_quadrature(mean, sd, truth
     assert scores.normal_pit(mean, sd, truth) == pytest.approx(forecast.cdf(truth), rel=1e-12)
 
 
-def test_score_without_spread_is_the_error():
+def test_crps_without_spread_is_the_absolute_error():
     np.testing.assert_array_equal(scores.normal_crps([1.0, np.nan], 0.0, 3.0), [2.0, np.nan])
 
 
-def test_ensemble_scores_are_those_of_all_pairs():
+def test_ensemble_scores_agree_with_sums_over_all_pairs():
     rng = np.random.default_rng(1)
     members, truth = rng.normal(0, 1, (5, 7)), rng.normal(0, 1, 5)
     pairs = np.abs(members[:, :, None] - members[:, None, :]).sum(axis=(1, 2))
@@ -39,14 +39,14 @@ def test_ensemble_scores_are_those_of_all_pairs():
     assert np.isnan(scores.ensemble_pit([np.nan, 1.0], 0.0)) and np.isnan(scores.ensemble_crps([np.nan, 1.0], 0.0))
 
 
-def test_interval_score_of_a_normal_is_least_for_its_own_quantiles():
-    """A proper score: intervals that are too narrow, too wide or shifted cost more on average."""
+def test_interval_score_of_a_normal_is_minimal_at_its_quantiles():
+    """The score is proper: intervals that are too narrow, too wide or shifted have a higher mean score."""
     truth = norm.ppf((np.arange(20000) + 0.5) / 20000)
     half = norm.ppf(0.9)
     best = scores.interval_score(-half, half, truth, 0.8).mean()
     for low, high in ((-0.8 * half, 0.8 * half), (-1.2 * half, 1.2 * half), (0.2 - half, 0.2 + half)):
         assert scores.interval_score(low, high, truth, 0.8).mean() > best + 0.01
-    # Closed form: 2 pdf(q) / alpha * 2, for both ends.
+    # Closed form: 2 pdf(q) / alpha for each of the two ends.
     assert best == pytest.approx(4 / 0.2 * norm.pdf(half), rel=1e-3)
 
 
@@ -61,7 +61,7 @@ def truth():
 
 @pytest.fixture(scope="module")
 def estimate(truth):
-    """Too confident by a fifth, and 0.05 too high."""
+    """Estimates whose stated standard deviation is too small by a sixth and whose bias is 0.05."""
     rng = np.random.default_rng(3)
     value = truth + rng.normal(0.05, 0.3, truth.shape)
     sd = xr.full_like(value, 0.25)
@@ -69,7 +69,7 @@ def estimate(truth):
     return xr.Dataset({"lai": value, "sd": sd, "low": value - half * sd, "high": value + half * sd})
 
 
-def test_scores_are_those_of_plain_numpy(estimate, truth):
+def test_scores_agree_with_plain_numpy(estimate, truth):
     found = estimate.fifesim.score(truth)
     known = np.isfinite(truth.values)
     error = (estimate["lai"] - truth).values[known]
@@ -88,13 +88,13 @@ def test_scores_are_those_of_plain_numpy(estimate, truth):
     assert found.pit[0] > 1.2 and found.pit[9] > 1.05, "too confident: both ends are too full"
 
 
-def test_chunks_do_not_change_a_bit(estimate, truth):
+def test_scores_are_identical_in_any_chunks(estimate, truth):
     pieces = {"landscape": 7, "y": 17, "x": 11}
     lazy = estimate.map(lambda each: each.chunk({dim: pieces.get(dim, -1) for dim in each.dims}))
     xr.testing.assert_identical(lazy.fifesim.score(truth.chunk(pieces)), estimate.fifesim.score(truth))
 
 
-def test_groups_are_scored_one_by_one(estimate, truth):
+def test_groups_are_scored_separately(estimate, truth):
     by = xr.where(truth["x"] < 300, 3, 7).rename("cover")
     found = estimate.fifesim.score(truth, by)
     assert found.cover.values.tolist() == [3, 7]
@@ -111,8 +111,11 @@ def test_groups_are_scored_one_by_one(estimate, truth):
     assert fifesim.score(edge.expand_dims("pixel"), edge.expand_dims("pixel"), [0, 1, 2]).n.values.tolist() == [1, 2]
 
 
-def test_standard_errors_are_the_spread_over_redrawn_landscapes():
-    """Errors that a landscape shares, 120 sets of 20 landscapes; of independent pixels they would be much smaller."""
+def test_standard_errors_match_the_spread_over_redrawn_landscapes():
+    """
+    Errors are correlated within a landscape; 120 sets of 20 landscapes. For independent pixels, standard errors would
+    be much smaller.
+    """
     rng = np.random.default_rng(4)
     drawn, errors, biases, stated = [], [], [], []
     for _ in range(120):
@@ -130,7 +133,7 @@ def test_standard_errors_are_the_spread_over_redrawn_landscapes():
     assert np.mean(errors) > 3 * np.sqrt(0.7 * 0.3 / 2000)
 
 
-def test_landscapes_may_be_a_coordinate(estimate, truth):
+def test_landscapes_can_be_a_coordinate(estimate, truth):
     chips = truth.rename(landscape="chip").assign_coords(landscape=("chip", np.repeat(np.arange(4), 3)))
     given = estimate.rename(landscape="chip")
     found = fifesim.score(given, chips)
@@ -144,7 +147,7 @@ def test_landscapes_may_be_a_coordinate(estimate, truth):
         fifesim.score(given, chips, landscape="scene")
 
 
-def test_an_ensemble_is_scored_by_its_members(truth):
+def test_ensemble_is_scored_from_its_members(truth):
     rng = np.random.default_rng(5)
     members = truth + xr.DataArray(rng.normal(0, 0.3, (9, *truth.shape)), dims=("member", *truth.dims))
     found = fifesim.score(members.rename("lai"), truth)
@@ -153,8 +156,8 @@ def test_an_ensemble_is_scored_by_its_members(truth):
     assert float(found.crps) == pytest.approx(expected, rel=1e-12)
 
 
-def test_maps_are_paired_by_their_places(lai):
-    """What `invert` gives is scored as `inversion_error` does it, on the common area of both maps."""
+def test_maps_are_paired_by_location(lai):
+    """Scores of `invert` equal `inversion_error`, on the common area of both maps."""
     image = (
         lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa().fifesim.sense("TM", min_valid=0.1)
     )
@@ -187,12 +190,12 @@ def test_maps_are_paired_by_their_places(lai):
         (lambda given: given, xr.DataArray([1, 2], dims="z"), "bring it onto its grid"),
     ],
 )
-def test_what_cannot_be_scored_is_refused(estimate, truth, change, by, message):
+def test_invalid_estimates_are_rejected(estimate, truth, change, by, message):
     with pytest.raises(ValueError, match=message):
         fifesim.score(change(estimate), truth, by)
 
 
-def test_other_quantities_are_refused(estimate, truth):
+def test_different_quantities_are_rejected(estimate, truth):
     fpar = truth.assign_attrs(standard_name="leaf_area_index")
     other = estimate.assign(lai=estimate["lai"].assign_attrs(standard_name="surface_altitude"))
     with pytest.raises(ValueError, match="must be the same quantity"):
@@ -200,7 +203,7 @@ def test_other_quantities_are_refused(estimate, truth):
 
 
 def test_mask_scores_count_omitted_and_committed_area_by_thickness():
-    """Expected shares by hand: pixels of known cloud, half cloud and clear sky in two classes of thickness."""
+    """Expected shares by hand: pixels of cloud, half cloud and clear sky in two classes of thickness."""
     dims = ("landscape", "pixel")
     truth = xr.DataArray([[1.0, 1.0, 0.5, 0.0, 1.0, 1.0, 0.0, np.nan]], dims=dims, name="cloud")
     mask = xr.DataArray([[True, False, True, True, True, True, False, True]], dims=dims)

@@ -1,4 +1,4 @@
-"""A small page: 12 x 12 pixels of 30 m, and few values a slider."""
+"""A small explorer page: 12 x 12 pixels of 30 m, and few values per slider."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ SMALL = {
 
 
 def ndvi_with_data(scenario):
-    """NDVI and truth of a run, where the image without displacement has data too, as for the stages of a budget."""
+    """Truth and NDVI of a run, for pixels that also have data without displacement, as in a budget."""
     run = fifesim.simulate(scenario)
     still = scenario.sensor.model_copy(update={"offset": [0.0, 0.0]})
     aligned = fifesim.simulate(scenario.model_copy(update={"sensor": still}))
@@ -37,7 +37,7 @@ def small():
 
 @pytest.fixture(scope="session")
 def sweep(small):
-    """Two values of each slider but haze, of instruments TM and HRV."""
+    """Two values of each slider except haze, for the instruments TM and HRV."""
     found = sweep_of(small)
     return replace(
         found, arps=found.arps[:2], hazes=found.hazes[2:], szas=found.szas[:2], instruments=("HRV", "TM"),

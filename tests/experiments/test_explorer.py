@@ -1,4 +1,4 @@
-"""The page: what its text holds, and what a browser shows of it."""
+"""The explorer page: its text and data, and its display in a browser."""
 
 import asyncio
 import base64
@@ -29,7 +29,7 @@ in_a_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium
 
 
 def looked_at(page, folder, look):
-    """What a coroutine finds on the page, which must have no error and ask for nothing."""
+    """Result of the coroutine `look` on the page; the page must have no errors and request no other address."""
 
     async def visit():
         async with opened(page, folder) as browser:
@@ -42,7 +42,7 @@ def looked_at(page, folder, look):
     return asyncio.run(visit())
 
 
-def test_page_is_whole_and_names_no_place_of_this_machine(page, sweep, outcomes, tmp_path):
+def test_page_is_self_contained_and_hides_local_paths(page, sweep, outcomes, tmp_path):
     text = page.read_text(encoding="utf-8")
     assert not re.search(r"(src|href)=\"(?!data:)", text) and "http:" not in text and "https:" not in text
     assert "fifesim " + fifesim.__version__ in text and "seed 3" in text
@@ -50,14 +50,14 @@ def test_page_is_whole_and_names_no_place_of_this_machine(page, sweep, outcomes,
     assert len(text) < 1_000_000
 
 
-def test_story_has_the_numbers_of_the_page(page, outcomes):
+def test_introduction_has_the_numbers_of_the_page(page, outcomes):
     r2 = outcomes.lines[..., 0, 2]
     text = page.read_text(encoding="utf-8").split("</header>")[0]
     for place in ((0, 0, 0, 1, 0), (0, 0, 0, 1, 1), (1, 0, 0, 1, 1)):
         assert f"{r2[place]:.2f}" in text
 
 
-def test_names_of_files_stand_without_their_folders(sweep, outcomes, tmp_path):
+def test_file_names_appear_without_folders(sweep, outcomes, tmp_path):
     dem = tmp_path / "hills.tif"
     fifesim.flint_hills(sweep.scenario.geobox(), seed=1).fifesim.to_geotiff(dem)
     values = sweep.scenario.model_dump(exclude_unset=True) | {"terrain": {"dem": str(dem)}}
@@ -67,7 +67,7 @@ def test_names_of_files_stand_without_their_folders(sweep, outcomes, tmp_path):
     assert str(tmp_path) not in json.dumps(data)
 
 
-def test_ranges_hold_what_is_drawn(sweep, outcomes):
+def test_axis_ranges_are_valid(sweep, outcomes):
     _, data = page_data(sweep, outcomes)
     for name, (low, high) in data["ranges"].items():
         assert low < high, name
@@ -75,8 +75,10 @@ def test_ranges_hold_what_is_drawn(sweep, outcomes):
 
 
 @in_a_browser
-def test_numbers_shown_are_those_of_the_public_functions(page, sweep, tmp_path, with_data):
-    """Sliders by keyboard; R2, slope, intercept, shares, and the scenario that the page says, run again."""
+def test_displayed_numbers_match_the_public_functions(page, sweep, tmp_path, with_data):
+    """
+    Sliders are moved by keyboard. R2, slope, intercept and shares are compared with a run of the displayed scenario.
+    """
 
     async def look(browser):
         await browser.evaluate("document.getElementById('arp').focus()")
@@ -112,8 +114,8 @@ def test_numbers_shown_are_those_of_the_public_functions(page, sweep, tmp_path, 
 
 
 @in_a_browser
-def test_scenario_of_a_landscape_is_written_whole(sweep, outcomes, tmp_path):
-    """Classes are tables of their own; deviations and the like stand in a line."""
+def test_scenario_of_a_landscape_is_written_completely(sweep, outcomes, tmp_path):
+    """Classes are separate tables; deviations and similar keys are inline tables."""
     window = sweep.scenario.grid.model_dump()
     values = fifesim.default_scenario().model_dump(exclude_unset=True) | {"grid": window, "terrain": {"dem": "flat"}}
     values["landscape"] = values["landscape"] | {"covary": {"soil": -0.3}}
@@ -128,8 +130,8 @@ def test_scenario_of_a_landscape_is_written_whole(sweep, outcomes, tmp_path):
 
 
 @in_a_browser
-def test_what_stays_is_said_to_stay(page, tmp_path):
-    """Registration moves the pixels beside the ground; the sun leaves the ground and its leaf area as they are."""
+def test_page_states_the_unchanged_steps(page, tmp_path):
+    """Registration moves pixels relative to the ground; the sun changes neither the ground nor its leaf area."""
 
     async def moves(browser):
         names = ("ground", "truth", "image", "line", "moved")
@@ -150,7 +152,7 @@ def test_what_stays_is_said_to_stay(page, tmp_path):
 
 
 @in_a_browser
-def test_page_fits_its_width_by_mouse_and_keyboard(page, tmp_path):
+def test_page_fits_its_width_and_follows_mouse_and_keyboard(page, tmp_path):
     async def at(browser, width, dark):
         await browser.size(width, 900, dark)
         await browser.evaluate("document.getElementById('reset').click()")
@@ -185,8 +187,8 @@ def test_page_fits_its_width_by_mouse_and_keyboard(page, tmp_path):
 
 
 @in_a_browser
-def test_a_scale_has_three_numbers_and_room_for_them(page, tmp_path):
-    """With one number an axis cannot be read."""
+def test_axis_has_three_to_seven_ticks(page, tmp_path):
+    """An axis with fewer ticks is hard to read."""
     drawing = Path(explorer.__file__).with_name("explore_drawing.js").read_text(encoding="utf-8")
     cases = [(0.41, 0.56, 3), (0.2, 0.47, 3), (0.0, 2.3, 5), (-0.01, 0.3, 5)]
 
@@ -206,7 +208,7 @@ ARRAYS = {
 }
 
 
-def test_arrays_come_back():
+def test_packed_arrays_are_recovered():
     text, places = packed(ARRAYS)
     whole = zlib.decompress(base64.b64decode(text))
     for name, array in ARRAYS.items():
@@ -221,7 +223,7 @@ def test_arrays_come_back():
 
 
 @pytest.mark.parametrize(("kind", "levels"), [("u1", 254), ("u2", 65534)])
-def test_steps_are_half_a_step_wrong_at_most(kind, levels):
+def test_stepped_values_are_within_half_a_step(kind, levels):
     values = np.random.default_rng(5).normal(size=500)
     values[3] = np.nan
     codes, low, step = stepped(values, kind)
@@ -235,7 +237,7 @@ def test_steps_are_half_a_step_wrong_at_most(kind, levels):
         packed({"x": np.arange(3)})
 
 
-def test_sliders_begin_at_the_scenario_and_say_its_values(sweep):
+def test_sliders_start_at_the_scenario_and_show_its_values(sweep):
     arp, haze, sza, instrument, registration = explorer.slider_words(sweep)
     assert arp["start"] == 0 and "leaf area is correlated up to 8 m, arp 0.15" in arp["texts"][0]
     assert haze["marks"] == ["45 km"] and haze["start"] == 0
@@ -248,7 +250,7 @@ def test_sliders_begin_at_the_scenario_and_say_its_values(sweep):
     assert registration["marks"] == ["0", "½"] and registration["texts"] == ["none", "0.50 pixel"]
 
 
-def test_words_of_a_slider_follow_what_varies(sweep, small):
+def test_slider_texts_follow_the_varied_quantity(sweep, small):
     assert set(explorer.STAGE_WORDS) == {CURVATURE, *STAGES}
     arp, haze, *_ = explorer.slider_words(replace(sweep, arps=(None,), hazes=(None,)))
     assert arp["texts"] == ["as in the map"] and haze["texts"] == ["without haze"]
@@ -259,12 +261,12 @@ def test_words_of_a_slider_follow_what_varies(sweep, small):
 
 @pytest.fixture
 def quick(sweep, monkeypatch):
-    """Four settings in the place of all."""
+    """A sweep of four settings."""
     few = type(sweep)(**{**vars(sweep), "arps": sweep.arps[:1], "szas": sweep.szas[:1], "instruments": ("TM",)})
     monkeypatch.setattr(explorer, "sweep_of", lambda scenario: few)
 
 
-def test_command_writes_one_page_and_replaces_none(quick, small, tmp_path, monkeypatch):
+def test_command_writes_one_page_and_overwrites_only_on_request(quick, small, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text(write_scenario(small.complete()))
     made = CliRunner().invoke(app, ["explore", "mine.toml", "-o", "pages/mine.html"])
@@ -278,7 +280,7 @@ def test_command_writes_one_page_and_replaces_none(quick, small, tmp_path, monke
     assert (tmp_path / "pages" / "mine.html").read_bytes() == first
 
 
-def test_what_cannot_be_written_is_named(tmp_path):
+def test_invalid_output_or_scenario_is_named(tmp_path):
     with pytest.raises(ValueError, match="is a folder, and explore writes one page"):
         fifesim.explore(path=tmp_path)
     with pytest.raises(TypeError, match="read_scenario"):

@@ -1,4 +1,4 @@
-"""What the sliders of a page set, and the results of each setting: the numbers of the public functions."""
+"""Settings of the sliders of a page; the results of each setting equal the public functions."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ FLAT = {"terrain": {"dem": "flat"}}
 SITE = {"west": 704970.0, "north": 4334220.0, "width": 3000.0, "height": 3000.0}
 
 
-def test_default_is_the_paper_with_large_patches_on_level_ground():
+def test_default_is_the_paper_with_arp_0_24_on_flat_ground():
     sweep = sweep_of()
     assert sweep.shape == (3, 3, 3, 4, 4)
     assert sweep.instruments == ("MSI", "HRV", "TM", "MSS") and sweep.scenario.terrain.dem == "flat"
@@ -36,7 +36,7 @@ def test_sliders_have_the_values_of_the_scenario():
     assert "OLI" in sweep.instruments and (0.3, 0.4) in sweep.offsets and len(sweep.offsets) == 4
 
 
-def test_a_setting_is_the_scenario_with_its_values(small):
+def test_setting_changes_only_its_values_of_the_scenario(small):
     sweep = sweep_of(
         parse_scenario(
             small.model_dump(exclude_unset=True)
@@ -53,14 +53,14 @@ def test_a_setting_is_the_scenario_with_its_values(small):
 
 
 def test_instruments_fit_the_ground_and_its_cells(small):
-    """In 360 m, MSS has 6 pixels; and a cell of 20 m is more than a pixel of MSI."""
+    """MSS has 6 pixels in 360 m; a cell of 20 m is larger than a pixel of MSI."""
     assert sweep_of(small).instruments == ("MSI", "HRV", "TM")
     coarse = parse_scenario(FLAT | {"grid": SITE | {"cell": 25.0}, "sensor": {"instrument": "MODIS"}})
     found = sweep_of(coarse)
     assert found.instruments == ("TM", "MSS", "MODIS") and found.scenario.geobox().shape == (120, 120)
 
 
-def test_a_map_has_no_patches_to_vary_and_clear_air_no_haze(tmp_path):
+def test_maps_have_no_arp_slider_and_clear_air_no_haze_slider(tmp_path):
     lai = fifesim.lai_scene(
         fifesim.grid_at("EPSG:26914", 707970.0, 4331220.0, 400.0, 400.0, 10.0), "burned-grazed", arp=0.24, seed=1
     )
@@ -74,7 +74,7 @@ def test_a_map_has_no_patches_to_vary_and_clear_air_no_haze(tmp_path):
     np.testing.assert_array_equal(sweep.at(sweep.settings[0]).ground.arp, own.ground.arp)
 
 
-def test_a_landscape_of_many_stages_has_fewer_settings():
+def test_landscape_with_many_stages_has_fewer_settings():
     sweep = sweep_of(fifesim.default_scenario())
     assert sweep.shape == (3, 2, 2, 2, 4)
     assert sweep.hazes == (10.0, 45.0) and sweep.szas[1] == 60.0 and sweep.instruments == ("MSI", "TM")
@@ -82,8 +82,8 @@ def test_a_landscape_of_many_stages_has_fewer_settings():
     assert hills.shape == (3, 3, 3, 4, 4)
 
 
-def test_ground_and_air_decide_what_varies(small):
-    """Optics by band keep other instruments out, and haze by optical thickness stays so."""
+def test_ground_and_atmosphere_limit_the_sliders(small):
+    """Optics by band exclude other instruments, and haze given as optical thickness stays optical thickness."""
     values = small.model_dump(exclude_unset=True)
     sweep = sweep_of(parse_scenario(values | {"atmosphere": {"aot": 0.15}}))
     assert sweep.haze == "aot" and sweep.hazes == (0.05, 0.15, 0.5)
@@ -102,15 +102,15 @@ def scenario_at(sweep, place):
     return sweep.at(setting, sweep.offsets[place[4]])
 
 
-def test_shares_and_curvature_are_what_the_line_leaves(outcomes):
+def test_shares_and_curvature_add_up_to_the_unexplained_variance(outcomes):
     left = outcomes.shares.sum(axis=-1) + outcomes.curvature
     np.testing.assert_allclose(1 - outcomes.lines[..., 2], left, atol=1e-12)
     registration = outcomes.shares[..., list(STAGES).index("registration")]
     assert (registration[..., 0, :] == 0).all() and (registration[..., 1, :] > 0).all()
 
 
-def test_reflectance_of_the_numbers_is_that_of_the_image(sweep, outcomes):
-    """NDVI of the page is that of `fifesim.ndvi`, whatever the sun."""
+def test_reflectance_of_the_digital_numbers_equals_the_image(sweep, outcomes):
+    """NDVI on the page equals `fifesim.ndvi` for every sun angle."""
     place = (1, 0, 1, 0, 0)
     run = fifesim.simulate(scenario_at(sweep, place))
     counts = outcomes.images[0][1, 0, 1, 0]
@@ -121,7 +121,7 @@ def test_reflectance_of_the_numbers_is_that_of_the_image(sweep, outcomes):
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_outcomes_are_those_of_the_public_functions(place, sweep, outcomes, with_data):
+def test_outcomes_equal_the_public_functions(place, sweep, outcomes, with_data):
     arp, haze, sza, instrument, offset = place
     scenario = scenario_at(sweep, place)
     run = fifesim.simulate(scenario)
@@ -139,8 +139,8 @@ def test_outcomes_are_those_of_the_public_functions(place, sweep, outcomes, with
     np.testing.assert_allclose(outcomes.curvature[place], budget["curvature"], atol=1e-12)
 
 
-def test_where_all_pixels_have_one_ndvi_there_is_no_line(small):
-    """Six bits of MSS over patches of 4 m in haze."""
+def test_constant_ndvi_gives_no_line(small):
+    """MSS has 6 bits, and the scene is hazy with patches of 4 m."""
     values = small.model_dump(exclude_unset=True) | {"sensor": {"instrument": "MSS"}}
     values["grid"] |= {"width": 720.0, "height": 720.0}
     one = {"arps": (0.0,), "hazes": (5.0,), "szas": (60.0,), "instruments": ("MSS",), "offsets": ((0.0, 0.0),)}

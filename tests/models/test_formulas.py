@@ -1,4 +1,4 @@
-"""Models of production, evaporation and albedo, against tables of other programs, quadrature and limits."""
+"""Models of production, evaporation and albedo against tables from other programs, quadrature and limits."""
 
 from pathlib import Path
 
@@ -34,7 +34,7 @@ def of_column(function, column, names):
     return lambda table: {column: function(*given(table, names))}
 
 
-# Results by column for the rows of each table.
+# Function that computes the columns of each table.
 TABLES = {
     "mod17_grass": mod17,
     "penman_monteith": of_fields(evaporation.penman_monteith, "ta_k rh_percent pressure_pa lai fpar rn tmin_k"),
@@ -52,16 +52,16 @@ TABLES = {
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_every_row_of_the_table_is_met(name):
+def test_results_agree_with_every_row_of_the_table(name):
     table = pd.read_csv(DATA / f"{name}.csv", comment="#")
     found = TABLES[name](table)
     assert len(table) >= 24
     for column, values in found.items():
-        # Columns that the table has; its last digit limits small numbers.
+        # Small numbers are limited by the last digit of the table.
         np.testing.assert_allclose(values, table[column], rtol=1e-6, atol=1e-12, err_msg=column)
 
 
-def test_reference_evapotranspiration_is_that_of_refet_and_of_the_book():
+def test_reference_evapotranspiration_agrees_with_refet_and_fao_56():
     refet = pytest.importorskip("refet")
     random = np.random.default_rng(3)
     low = random.uniform(-5, 20, 200)
@@ -79,8 +79,10 @@ def test_reference_evapotranspiration_is_that_of_refet_and_of_the_book():
     assert abs(uccle - 3.9) < 0.1
 
 
-def test_light_of_two_leaves_is_the_integral_over_depth():
-    """Eqs. 20 of de Pury and Farquhar (1997) by quadrature; sunlit leaves are the share that no leaf shades."""
+def test_light_of_two_leaves_agrees_with_quadrature_over_depth():
+    """
+    Eqs. 20 of de Pury and Farquhar (1997) by quadrature; the sunlit fraction is the probability of no shading leaf.
+    """
     lai, par, sky, sza = 3.5, 1500.0, 0.3, 40.0
     mu, sigma, below = np.cos(np.radians(sza)), 0.15, 0.036
     kb, kbs, kd = 0.5 / mu, 0.46 / mu, 0.719
@@ -102,24 +104,24 @@ def test_light_of_two_leaves_is_the_integral_over_depth():
     np.testing.assert_allclose(leaves, [sun, both - sun, sunlit, capacity - sunlit], rtol=1e-10)
 
 
-def test_photosynthesis_of_two_leaves_has_its_limits():
+def test_photosynthesis_of_two_leaves_has_the_right_limits():
     lai, sza, ci = np.array([0.5, 3.0]), 30.0, 24.5
     leaves = two_leaves(lai, 1e-4, 0.2, sza, 60.0)
     light = leaves.light_sun + leaves.light_shade
-    # At 25 degC the compensation point is 3.69 Pa, and half of the light that is not lost moves electrons.
+    # At 25 degC the compensation point is 3.69 Pa, and half of the absorbed light drives electron transport.
     dim = light * 0.85 / 2 / 4 * (ci - 3.69) / (ci + 2 * 3.69)
     np.testing.assert_allclose(farquhar_canopy(lai, 1e-4, 0.2, sza, 298.15), dim, rtol=1e-6)
     capacity = leaves.capacity_sun + leaves.capacity_shade
     bright = capacity * (ci - 3.69) / (ci + 40.4 * (1 + 20.5 / 24.8))
     np.testing.assert_allclose(farquhar_canopy(lai, 1e6, 0.2, sza, 298.15), bright, rtol=1e-12)
-    # Much carbon dioxide leaves electron transport, which has its maximum where the two energies balance.
+    # At high CO2, electron transport limits, with its maximum at the optimum temperature of the two energies.
     kelvin = np.linspace(295, 315, 2001)
     transport = farquhar_canopy(3.0, 1e9, 0.2, sza, kelvin, ci_pa=1e7)
     optimum = 220000 / (710 - 8.314 * np.log(37000 / (220000 - 37000)))
     assert abs(kelvin[transport.argmax()] - optimum) < 0.02
 
 
-def test_conductance_is_the_integral_over_leaves():
+def test_conductance_agrees_with_quadrature_over_leaves():
     def leaf(depth):
         flux = 0.6 * 900 * np.exp(-0.6 * depth)
         return 0.006 * flux / (flux + 200) * (1 - (8 / 25) ** 2) / (1 + 1200 / 1500)
@@ -127,15 +129,15 @@ def test_conductance_is_the_integral_over_leaves():
     options = {"extinction": 0.6, "g_max": 0.006, "half_light": 200.0}
     made = evaporation.canopy_conductance(4.0, 900.0, 290.15, 1200.0, **options)
     assert np.isclose(made, quad(leaf, 0, 4)[0], rtol=1e-9)
-    # SiB2 scales the uppermost leaf by the light that the canopy intercepts over its extinction.
+    # SiB2 multiplies the uppermost leaf by intercepted light over extinction.
     sib2 = evaporation.canopy_conductance(4.0, 900.0, 290.15, 1200.0, **options, integral="sib2")
     assert np.isclose(sib2, leaf(0) * (1 - np.exp(-2.4)) / 0.6, rtol=1e-12)
     with pytest.raises(ValueError, match="integral must be 'leaves' or 'sib2'"):
         evaporation.canopy_conductance(4.0, 900.0, 290.15, 1200.0, integral="leaf")
 
 
-def test_two_stream_holds_where_printed_solutions_divide_by_zero():
-    """The beam's extinction equals the eigenvalue at mu = 1 / (2 m); results are continuous there."""
+def test_two_stream_is_continuous_where_printed_solutions_divide_by_zero():
+    """The extinction of the beam equals the eigenvalue at mu = 1 / (2 m)."""
     omega, back = 0.3, (0.3 + 0.1 / 4) / 2
     eigenvalue = np.sqrt((1 - omega) * (1 - omega + 2 * back))
     sza = np.degrees(np.arccos(0.5 / eigenvalue))
@@ -147,7 +149,7 @@ def test_two_stream_holds_where_printed_solutions_divide_by_zero():
     np.testing.assert_allclose(energy, 1, rtol=1e-12)
 
 
-def test_missing_cells_stay_missing_and_bare_ground_is_quiet():
+def test_missing_cells_stay_missing_and_bare_ground_has_no_flux():
     lai = np.array([np.nan, 0.0, 2.0])
     results = [
         canopy_photosynthesis(lai, 0.5, 1000.0, 0.05, 30.0),

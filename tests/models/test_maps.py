@@ -1,4 +1,4 @@
-"""Maps of production, evapotranspiration and albedo: labels, weather and refusals."""
+"""Maps of production, evapotranspiration and albedo: labels, weather and error messages."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_evapotranspiration_is_a_raster_function(lai, model):
     )
 
 
-def test_light_use_is_the_formula_at_each_cell(lai):
+def test_light_use_map_equals_the_formula_at_each_cell(lai):
     temperature, absorbed = field(lai, 285, 305), field(lai, 0, 1)
     weather = WEATHER.replace(temperature=temperature, temperature_min=276.0)
     made = lai.fifesim.gpp(weather, fpar=absorbed)
@@ -52,12 +52,12 @@ def test_only_green_leaves_produce(lai):
     np.testing.assert_array_equal(lai.fifesim.gpp(canopy=half), lai.fifesim.gpp(fpar=green))
 
 
-def test_albedo_is_the_two_stream_model_of_each_band(lai):
+def test_albedo_equals_the_two_stream_model_of_each_band(lai):
     leaf, ground = (0.3, 0.2), 0.15
     made = lai.fifesim.albedo(canopy=fifesim.Canopy(leaf_optics=leaf, background=ground), chi=0.2)
     found = two_stream(*leaf, 0.2, float(fifesim.fife_geometry().sza), lai.values, ground)
     low, high = np.minimum(found.albedo_beam, found.albedo_diffuse), np.maximum(found.albedo_beam, found.albedo_diffuse)
-    # All bands are alike, so that albedo lies between both, nearer to the beam's.
+    # All bands have the same optics, so albedo lies between both values, closer to the value for the beam.
     assert ((made >= low - 1e-6) & (made <= high + 1e-6)).all()
     assert (abs(made - found.albedo_beam) <= abs(made - found.albedo_diffuse) + 2e-6).all()
     check_raster_function(lambda each: each.fifesim.albedo(), lai, quantity="albedo")
@@ -93,7 +93,7 @@ def test_units_of_rasters_and_ranges_of_formulas_are_checked(lai):
         lai.fifesim.gpp(model="mod16")
 
 
-def test_contradictions_of_the_weather_are_refused(lai):
+def test_contradictory_weather_is_rejected(lai):
     for change in ({"temperature": 288.0}, {"temperature_max": 299.0}):
         with pytest.raises(ValueError, match=r"must not exceed temperature.*, got (289|300) and (288|299) K"):
             WEATHER.replace(**change)
@@ -103,11 +103,11 @@ def test_contradictions_of_the_weather_are_refused(lai):
     shifted = WEATHER.replace(pressure=field(lai, 96000, 97000).assign_coords(x=lai.x + 30))
     with pytest.raises(ValueError, match="'pressure' have different grids"):
         lai.fifesim.evapotranspiration(shifted)
-    # Only light-use and Penman-Monteith need the lowest temperature.
+    # Only light-use and Penman-Monteith need the minimum temperature.
     assert np.isfinite(lai.fifesim.gpp(cold, model="farquhar")).all()
 
 
-def test_given_fpar_is_a_fraction_that_the_model_uses(lai):
+def test_given_fpar_is_a_fraction_and_must_have_an_effect(lai):
     absorbed = field(lai, 0, 1)
     for wrong in (100 * absorbed, -absorbed):
         with pytest.raises(ValueError, match=r"fpar must be in \[0, 1\], got"):
@@ -118,6 +118,6 @@ def test_given_fpar_is_a_fraction_that_the_model_uses(lai):
         for verb in (fifesim.gpp, fifesim.evapotranspiration):
             with pytest.raises(ValueError, match=f"{what} has no effect with fpar, .*leave out one of them"):
                 verb(lai, fpar=absorbed, **{what: given})
-    # FPAR of bare and of almost bare ground is a fraction too.
+    # FPAR of bare and almost bare ground is also a valid fraction.
     for area in (0 * lai, 0 * lai + 1e-9):
         assert (area.fifesim.gpp() >= 0).all()

@@ -1,4 +1,4 @@
-"""The experiment as the default has it, with few realisations, and small scenes."""
+"""The default experiment with few realisations, and small scenes."""
 
 import jinja2
 import pytest
@@ -13,7 +13,7 @@ from fifesim.output.report import fixed
 
 @pytest.fixture(scope="session")
 def sentence():
-    """Text of a macro of the sentences of the report."""
+    """A function that renders a macro of the report's sentences."""
     folder = jinja2.FileSystemLoader(_TEMPLATE.parent)
     environment = jinja2.Environment(loader=folder, trim_blocks=True, lstrip_blocks=True)
     environment.filters["fixed"] = fixed
@@ -23,7 +23,7 @@ def sentence():
 
 @pytest.fixture(scope="session")
 def found():
-    """Three realisations of the nine scenes, native and aligned."""
+    """Three realisations of the nine scenes, in the native and the aligned reading."""
     return reproduce_case(case_of(), 3, 1995)
 
 
@@ -35,7 +35,7 @@ def small():
 
 @pytest.fixture(scope="session")
 def effect_tables():
-    """Effects of four readings, one size and no change, on one realisation of scenes of 10 x 10 pixels."""
+    """Effects of four readings, one size and an unchanged case, for one realisation of scenes of 10 x 10 pixels."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(effects, "SIZES", (333,))
         few = ("native", "aligned", "offset", "blur-48.6")
@@ -48,7 +48,7 @@ def effect_tables():
 
 @pytest.fixture(scope="session")
 def folders(tmp_path_factory):
-    """Inputs of a reader's own: samples of LAI with two modes, leaf optics and background."""
+    """User inputs: bimodal samples of LAI, leaf optics and background."""
     folder = tmp_path_factory.mktemp("inputs")
     densities = folder / "densities"
     densities.mkdir()

@@ -1,4 +1,4 @@
-"""What the nine scenarios share, and what each of them says."""
+"""The nine scenarios of the experiment and their inputs."""
 
 import pytest
 from mistakes import mistakes
@@ -9,7 +9,7 @@ from fifesim.ground.landscape.distribution import lai_distribution, treatments
 from fifesim.sensor.description.instruments import instrument, read_instrument
 
 
-def test_scenario_says_what_the_ground_is_whatever_the_defaults_are():
+def test_scenario_sets_the_ground_explicitly():
     scenario = Case().scenario("burned-ungrazed", 0.15, 7)
     assert {"distribution", "arp", "seed", "method"} <= scenario.ground.model_fields_set
     assert "dem" in scenario.terrain.model_fields_set and scenario.terrain.dem == "flat"
@@ -17,7 +17,7 @@ def test_scenario_says_what_the_ground_is_whatever_the_defaults_are():
     assert scenario.geobox().shape == (333, 333)
 
 
-def test_inputs_of_a_readers_own_are_in_the_scenario(folders):
+def test_user_inputs_are_in_the_scenario(folders):
     case = case_of(reading="offset", dem="flint-hills", **folders)
     scenario = case.scenario("burned-ungrazed", 0.05, 1)
     assert scenario.ground.distribution == str(folders["densities"] / "burned-ungrazed.csv")
@@ -30,13 +30,13 @@ def test_inputs_of_a_readers_own_are_in_the_scenario(folders):
 
 
 @pytest.mark.parametrize(("stage", "options", "said"), mistakes("case", name="experiment_mistakes"), ids=str)
-def test_what_cannot_be_is_refused_before_anything_is_computed(stage, options, said):
+def test_impossible_case_is_refused_before_computing(stage, options, said):
     with pytest.raises(ValueError, match=said):
         case_of(**options)
 
 
 def test_another_sensor_or_corner_makes_other_scenes():
-    """A coarse sensor has a scene that holds some of its pixels; the corner is a third of 10 km from the site's."""
+    """A coarse sensor gets a larger scene; the corner lies a third of 10 km inside the corner of the site."""
     case = case_of(sensor="MODIS")
     assert (case.bands, case.pixel, case.cells) == (("MODIS1", "MODIS2"), 250, 900) and case_of(
         sensor="OLI"
@@ -53,7 +53,7 @@ def test_another_sensor_or_corner_makes_other_scenes():
 BANDS = ("TM3", "TM4")
 
 
-def test_samples_of_a_folder_are_the_densities_with_their_modes(folders):
+def test_densities_from_a_folder_keep_both_modes(folders):
     found = case.densities_of(folders["densities"])
     assert list(found) == treatments()
     density = lai_distribution(found["burned-grazed"])
@@ -76,7 +76,7 @@ def test_missing_density_is_named(folders, tmp_path):
         case.densities_of(tmp_path / "nowhere")
 
 
-def test_optics_and_background_of_a_file(folders):
+def test_optics_and_background_are_read_from_files(folders):
     optics = case.optics_by_band(folders["optics"], BANDS, case.OPTICS, "optics")
     assert optics == {"TM3": (0.09, 0.05), "TM4": (0.42, 0.4)}
     assert case.background_of(folders["background"], BANDS) == {"TM3": 0.10, "TM4": 0.16}
@@ -86,7 +86,7 @@ def test_optics_and_background_of_a_file(folders):
 
 
 @pytest.mark.parametrize(("stage", "text", "said"), mistakes("optics", name="experiment_mistakes"), ids=str)
-def test_optics_that_are_not_right_are_one_line(tmp_path, stage, text, said):
+def test_invalid_optics_give_a_message_of_one_line(tmp_path, stage, text, said):
     (tmp_path / "mine.csv").write_text(text)
     with pytest.raises(ValueError, match=said) as told:
         case.optics_by_band(tmp_path / "mine.csv", BANDS, case.OPTICS, "optics")
@@ -94,7 +94,7 @@ def test_optics_that_are_not_right_are_one_line(tmp_path, stage, text, said):
 
 
 @pytest.mark.parametrize(("stage", "given", "said"), mistakes("background", name="experiment_mistakes"), ids=str)
-def test_background_that_is_not_right_is_named(stage, given, said):
+def test_invalid_background_is_named(stage, given, said):
     with pytest.raises(ValueError, match=said):
         case.background_of(given, BANDS)
 
@@ -112,8 +112,8 @@ PAPER = instrument("TM", "paper")
 OTHER = [name for name, reading in READINGS.items() if reading.other_response]
 
 
-def test_blur_is_that_measured_in_flight():
-    """Half of the modulation passes at half of the frequency that the field of view is a half period of."""
+def test_blur_readings_have_the_widths_measured_in_flight():
+    """The transfer function is 0.5 at the frequency whose half period is the effective field of view."""
     for name, metres in (("blur-40.8", 40.8), ("blur-48.6", 48.6)):
         spread = READINGS[name].instrument(PAPER).line_spread
         assert float(spread.mtf(1 / (2 * metres))) == pytest.approx(0.5, abs=1e-4)
@@ -121,21 +121,21 @@ def test_blur_is_that_measured_in_flight():
 
 
 @pytest.mark.parametrize("name", OTHER)
-def test_instrument_file_of_a_reading_is_that_instrument(name, tmp_path):
+def test_instrument_file_of_a_reading_reproduces_the_instrument(name, tmp_path):
     reading, tm = READINGS[name], PAPER
     (tmp_path / "own.toml").write_text(reading.instrument_file(), encoding="utf-8")
     read, made = read_instrument(tmp_path / "own.toml"), reading.instrument(tm)
     assert read.lsf == made.lsf != tm.lsf
     assert read.bands == made.bands and read.bits == made.bits and read.ground_interval == made.ground_interval
-    # Its source is no longer the paper.
+    # The source is no longer the paper.
     assert read.sources["lsf"] == name and name in read.references
 
 
-def test_aligned_reading_stands_beside_every_other():
+def test_every_reading_is_compared_with_the_aligned_reading():
     assert all(beside(reading) == [reading, ALIGNED] for reading in READINGS.values() if reading != ALIGNED)
     assert beside(ALIGNED) == [ALIGNED, NATIVE]
 
 
-def test_words_of_a_reading_are_those_of_the_instrument():
+def test_text_of_a_reading_states_the_numbers_of_the_instrument():
     assert all(each.in_words(43e-6 * 705000, 30.0) == each.text for each in READINGS.values())
     assert "every 21.900 m" in NATIVE.in_words(21.9, 20.0) and "the 20 m blocks" in NATIVE.in_words(21.9, 20.0)

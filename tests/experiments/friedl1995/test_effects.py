@@ -1,4 +1,4 @@
-"""What each choice does."""
+"""Effects of readings, sizes and chosen numbers on Table 2."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def test_every_chosen_number_is_changed_once(folders):
     assert not any("LAI" in name for name in own)
 
 
-def test_densities_move_as_they_say():
+def test_shifted_densities_have_the_stated_moments():
     for change, mean, deviation in (({"shift": 0.1}, 0.1, 1.0), ({"factor": 0.9}, 0.0, 0.9)):
         for name, found in effects.shifted_densities(**change).items():
             own = lai_distribution(name)
@@ -36,7 +36,7 @@ def test_densities_move_as_they_say():
         assert low == pytest.approx(max(found.mean() - 3 * found.std(), 0), abs=0.01), name
 
 
-def test_row_of_a_reading_has_r2_and_slopes_of_the_table(found):
+def test_row_of_a_reading_has_the_r2_and_slopes_of_the_table(found):
     row = effects.row_of(found.sel(reading="native"))
     scene = found.sel(reading="native", distribution="burned-ungrazed", variable="lai").mean("realisation")
     for arp in (0.05, 0.24):
@@ -46,18 +46,18 @@ def test_row_of_a_reading_has_r2_and_slopes_of_the_table(found):
     assert row["paper_growth"] == pytest.approx(np.mean([3.09 / 2.46, 4.08 / 3.44, 3.47 / 2.58]))
 
 
-def test_readings_stand_side_by_side_on_both_kinds_of_ground(effect_tables):
+def test_readings_are_tabulated_on_flat_ground_and_on_hills(effect_tables):
     table = effect_tables["readings"]
     assert list(table["name"]) == ["native", "aligned", "offset", "blur-48.6", "native", "aligned"]
     assert list(table["dem"]) == ["flat"] * 4 + ["flint-hills"] * 2
     rows = table.set_index(["name", "dem"])
-    # Blur narrows NDVI, so that slopes rise above those of the sharper response; relief scatters what is aligned.
+    # Blur narrows NDVI and thus steepens slopes; relief adds scatter to aligned pixels.
     assert rows.loc[("blur-48.6", "flat"), "lai_slope_factor"] > 1.3 * rows.loc[("aligned", "flat"), "lai_slope_factor"]
     relief = rows.loc[("aligned", "flint-hills")]["r2 burned-ungrazed 0.05"]
     assert relief < rows.loc[("aligned", "flat")]["r2 burned-ungrazed 0.05"]
 
 
-def test_a_change_to_the_same_is_none_and_sizes_are_those_of_a_scene(effect_tables):
+def test_unchanged_case_has_no_effect_and_sizes_are_listed(effect_tables):
     (row,) = effect_tables["sensitivity"].to_dict("records")
     assert all(value == 0 for name, value in row.items() if name not in ("name", "before", "after"))
     assert list(effect_tables["sizes"]["name"]) == ["90 cells, 300 m"]
@@ -70,7 +70,7 @@ def by_name(case):
 
 
 def test_fitted_numbers_are_counted():
-    """Three means and deviations, four of leaves, two of background, the size of the scenes, and the reading."""
+    """Three means and deviations, four of leaves, two of background, the scene size and the reading."""
     assert effects.fitted_count(case_of()) == 3 + 3 + 4 + 2 + 1 + 1
     rows = by_name(case_of())
     assert rows["elevation"].origin == rows["hour and view"].origin == "assumed"
@@ -78,7 +78,7 @@ def test_fitted_numbers_are_counted():
     assert rows["mean LAI"].text.startswith("0.74, 1.41, 1.18 (burned-grazed, burned-ungrazed, unburned-ungrazed)")
 
 
-def test_what_a_reader_gives_is_not_called_fitted(folders, tmp_path):
+def test_user_inputs_are_not_called_fitted(folders, tmp_path):
     case = case_of(reading="aligned", cells=90, **folders)
     rows = by_name(case)
     assert effects.fitted_count(case) == 0
@@ -89,7 +89,7 @@ def test_what_a_reader_gives_is_not_called_fitted(folders, tmp_path):
 
 @pytest.fixture
 def table(found):
-    """A Table 2 that is the paper's own, in which a sample scatters by a tenth."""
+    """Table 2 with the published values, in which a sample has a standard deviation of 0.1."""
     table = friedl1995_table.table2(found.sel(reading="native"))
     for name in friedl1995_table.COEFFICIENTS:
         table[name], table[f"{name}_deviation_200"] = table[f"paper_{name}"], 0.1
@@ -104,7 +104,7 @@ def table(found):
         ("slope", 0.5, "slope of LAI"),
     ],
 )
-def test_one_number_beyond_its_limit_is_named(table, column, change, name):
+def test_number_beyond_its_limit_is_named(table, column, change, name):
     other = table.copy()
     table.loc[table.index[table["variable"] == "lai"][0], column] += change
     rows = effects.limits(table, other)
@@ -114,7 +114,7 @@ def test_one_number_beyond_its_limit_is_named(table, column, change, name):
     assert [row["name"] for row in effects.limits(other, table) if not row["met"]] == []
 
 
-def test_limits_are_told_in_deviations_of_a_sample(table):
+def test_limits_are_expressed_in_standard_deviations_of_a_sample(table):
     told = {row["name"]: row["deviations"] for row in effects.limits(table, table)}
     assert told["R² of LAI, largest difference of nine rows"] == pytest.approx(1.2)
     assert told["R² of LAI, root mean square difference"] == pytest.approx(0.6)

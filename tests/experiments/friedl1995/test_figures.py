@@ -14,14 +14,14 @@ from fifesim.experiments.friedl1995.table import INCREMENTS
 
 
 @pytest.mark.parametrize("number", figures.FIGURE_NUMBERS)
-def test_figure_is_drawn_of_every_reading(number, small):
+def test_figure_is_drawn_for_every_reading(number, small):
     for reading in (None, "aligned"):
         figure = fifesim.plot_reproduction(number, small, reading=reading)
         assert isinstance(figure, Figure) and all(axis.has_data() for axis in figure.axes)
 
 
-def test_densities_of_figure_6_are_not_halved_at_zero(found):
-    """The cells' curve begins at the .853 of the distribution; without reflection at .447."""
+def test_densities_of_figure_6_are_reflected_at_zero(found):
+    """The curve of the cells begins at 0.853, as the distribution; without reflection it begins at 0.447."""
     axis = figures.plot_reproduction(6, found).axes[0]
     cells = axis.get_lines()[0].get_ydata()
     known = float(fifesim.lai_distribution("burned-grazed").pdf(0))
@@ -39,8 +39,8 @@ def test_densities_of_figure_6_are_not_halved_at_zero(found):
         (9, -1, 0, "boa_nir", "toa_nir"),
     ],
 )
-def test_axes_are_those_of_the_paper(found, number, panel, points, x, y):
-    """Of figure 8 the difference is below; axes are named after what they show."""
+def test_axes_show_the_quantities_of_the_paper(found, number, panel, points, x, y):
+    """Figure 8 shows the difference in the lower panels."""
     axis = figures.plot_reproduction(number, found, reading="native").axes[panel]
     arp = float(found["arp"][-1 if panel == -1 else 0])
     values = figures.sample(found, "native", arp)
@@ -60,12 +60,12 @@ def test_axes_are_those_of_the_paper(found, number, panel, points, x, y):
         (5, {"reading": "offset"}, "one of native, aligned, which were computed"),
     ],
 )
-def test_figure_that_there_is_not_is_refused(small, number, options, said):
+def test_unknown_figure_is_refused(small, number, options, said):
     with pytest.raises((ValueError, TypeError), match=said):
         fifesim.plot_reproduction(number, small, **options)
 
 
-def test_figure_of_table_2_shows_the_numbers_of_the_table(found):
+def test_figure_of_table_2_shows_the_values_of_the_table(found):
     tables = {str(name): table.table2(found.sel(reading=name)) for name in found["reading"].values}
     axes = figures.table2_figure(tables).axes
     assert [axis.get_title() for axis in axes] == [
@@ -92,8 +92,8 @@ def caption(found, sentence):
     return text
 
 
-def test_most_of_the_scatter_of_figure_9_is_the_drift(found, caption):
-    """1 - R2 of reflectance, by hand, in both readings."""
+def test_drift_causes_most_of_the_scatter_of_figure_9(found, caption):
+    """1 - R2 of reflectance, computed separately in both readings."""
     share = figures.drift_share(found)
     scene = found.sel(arp=0.15)
     left = {}
@@ -111,8 +111,8 @@ def test_most_of_the_scatter_of_figure_9_is_the_drift(found, caption):
         assert all(f"pixels read as {reading}" in caption(number, reading) for number in (5, 6, 7, 9))
 
 
-def test_caption_of_figure_6_counts_the_peaks_of_digitising(caption):
-    """In this sample NDVI has more peaks with 8 bits than before them."""
+def test_caption_of_figure_6_counts_the_peaks_due_to_quantisation(caption):
+    """In this sample, 8-bit NDVI has more peaks than NDVI before quantisation."""
     text = caption(6, "native")
     digital, analogue = re.search(r"its curve has (.*?); before digitising \(grey\) (.*?)\.", text).groups()
     assert digital != "one peak" and analogue == "one peak"
@@ -120,8 +120,11 @@ def test_caption_of_figure_6_counts_the_peaks_of_digitising(caption):
     assert (figures.peaks(one), figures.peaks(np.concatenate([one, one + 8]))) == (1, 2)
 
 
-def test_relation_at_the_ground_is_tight_and_scaling_has_the_papers_sign(found):
-    """Fig. 5: BOA R2 near 1. Fig. 8: NDVI of the mean reflectance is slightly below the mean NDVI. Fig. 9: scatter."""
+def test_surface_relation_is_tight_and_scaling_has_the_published_sign(found):
+    """
+    Fig. 5: R2 at the surface is near 1. Fig. 8: NDVI of the mean reflectance is slightly below the mean NDVI. Fig. 9:
+    scatter.
+    """
     for arp in found["arp"].values:
         scene = found.sel(reading="native", arp=arp)
         values = {name: scene[f"pixel_{name}"].dropna("pixel").values for name in ("lai", "fpar", "boa_ndvi")}
@@ -129,12 +132,12 @@ def test_relation_at_the_ground_is_tight_and_scaling_has_the_papers_sign(found):
         assert np.corrcoef(values["boa_ndvi"], values["lai"])[0, 1] ** 2 > 0.95
         assert -0.01 < float((scene["pixel_ndvi_of_mean"] - scene["pixel_boa_ndvi"]).mean()) < 0
         red = [scene[f"pixel_{name}_red"].dropna("pixel").values for name in ("boa", "clear", "toa")]
-        # The atmosphere alone is a line; the image scatters about it.
+        # The effect of the atmosphere alone is linear; the image scatters about the line.
         assert np.corrcoef(red[0], red[1])[0, 1] ** 2 > 0.9999
         assert np.corrcoef(red[0], red[2])[0, 1] ** 2 < 0.9
 
 
-def test_pixels_shown_are_those_of_the_table(found):
+def test_figures_show_the_pixels_of_the_table(found):
     scene = found.sel(reading="aligned", arp=0.15)
     lai, ndvi = (scene[name].dropna("pixel").values for name in ("pixel_lai", "pixel_ndvi"))
     first = found["r2"].sel(reading="aligned", arp=0.15, distribution="burned-grazed", variable="lai")[0]

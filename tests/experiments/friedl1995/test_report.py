@@ -1,4 +1,4 @@
-"""What the page concludes follows from its figures."""
+"""Conclusions on the report page follow from its numbers."""
 
 import re
 
@@ -17,7 +17,7 @@ from fifesim.scenario.scenario import read_scenario
 
 
 def row(name, r2, slope, growth, *, dem="flat", lowest=0.45):
-    """A row of the table of readings."""
+    """One row of the table of readings."""
     found = {f"r2 {treatment} {arp:g}": 0.6 for treatment in report.treatments() for arp in report.ARPS}
     found["r2 burned-ungrazed 0.05"] = lowest
     found |= {"name": name, "dem": dem, "lai_r2_rms": r2, "lai_slope_rms": slope, "lai_slope_rest": slope / 5}
@@ -51,19 +51,19 @@ def on_blur(readings, sentence):
     return told
 
 
-def test_slopes_decide_between_blur_and_drift_where_the_figures_say_so(on_blur):
+def test_slopes_distinguish_blur_from_drift(on_blur):
     text = on_blur()
     assert "R² of blur-48.6 is off by 0.08" in text and "that of the drift by 0.05" in text
     assert "rise 1.89 times" in text and "more than 6 %" in text
     assert "1.26 times in the paper, 1.27 with drift, 1.05 with blur. So slopes decide, not R²." in text
 
 
-def test_blur_that_has_the_papers_slopes_is_not_told_from_drift(readings, on_blur):
+def test_blur_with_the_published_slopes_is_not_distinguished_from_drift(readings, on_blur):
     readings.loc[readings["name"] == "blur-48.6", "lai_slope_rms"] = 0.09
     assert on_blur().endswith("these figures do not tell blur from drift.")
 
 
-def test_displacement_is_told_apart_where_it_differs(readings, sentence):
+def test_displacement_is_distinguished_if_r2_differs(readings, sentence):
     def told():
         found = report.conclusions({"readings": readings, "sensitivity": SENSITIVITY})
         return sentence("on_displacement", found["displaced"], found["drifting"], found["alike"])
@@ -73,18 +73,18 @@ def test_displacement_is_told_apart_where_it_differs(readings, sentence):
     assert "tell them apart" not in told()
 
 
-def test_relief_is_told_by_the_row_that_it_lowers_most(readings, sentence):
+def test_relief_is_reported_for_the_row_that_it_lowers_most(readings, sentence):
     found = report.on_relief(readings)
     assert (found["treatment"], found["arp"], found["dem"]) == ("burned-ungrazed", "0.05", "flint-hills")
     assert found["level"]["native"][found["most"]] == 0.45 and found["hills"]["native"][found["most"]] == 0.25
     assert "was not in Table 2" in sentence("on_relief", found["worse"], report._ALIKE)
-    # Of a case on hills, level ground is the other.
+    # For a case on hills, the comparison is flat ground.
     turned = pd.concat([readings.iloc[5:], readings.iloc[:5]], ignore_index=True)
     again = report.on_relief(turned)
     assert again["hills"]["native"]["lai_r2_rms"] == 0.08 and again["level"]["native"]["lai_r2_rms"] == 0.05
 
 
-def test_words_follow_the_figures_of_relief_and_blur(readings, on_blur, sentence):
+def test_wording_follows_the_effect_of_relief_and_blur(readings, on_blur, sentence):
     readings.loc[5, "lai_r2_rms"] = 0.055
     assert "too little to be told" in sentence("on_relief", report.on_relief(readings)["worse"], report._ALIKE)
     readings.loc[5, "lai_r2_rms"] = 0.01
@@ -112,7 +112,7 @@ def quick(monkeypatch, tmp_path):
 
 @pytest.fixture
 def prepared(quick, monkeypatch, effect_tables, small):
-    """The same, whose numbers are there already; the cases that they were asked for."""
+    """The command with tables computed in advance; `asked` lists the requested cases."""
     asked = []
 
     def ready(case, *arguments, **options):
@@ -145,15 +145,15 @@ def test_command_writes_tables_figures_scenarios_and_page(prepared, tmp_path):
     page = (tmp_path / "out" / "report.html").read_text()
     assert page.count("data:image/png;base64,") == 1 + 11
     assert "http" not in page.replace("http-equiv", "") and "nan" not in page.split("base64")[0].lower()
-    # Every reading has a row of R2 and slopes, and the aligned one a column of Table 2.
+    # Every reading has a row of R2 and slopes, and the aligned reading has a column in Table 2.
     assert "Drift or blur?" in page and "slope: native</th>" in page and "aligned</th>" in page
-    # The drift is shown together with the passages of the paper that speak against it.
+    # The page shows the drift together with the passages of the paper that contradict it.
     assert "The text of the paper suggests aligned pixels: " in page
     assert all(f"“{passage}” (section {section})" in page for section, passage in PASSAGES.items())
     assert prepared("-o", "out").exit_code == 2
 
 
-def test_page_says_the_reading_the_inputs_and_what_is_fitted(prepared, tmp_path, folders, monkeypatch):
+def test_page_states_the_reading_the_inputs_and_the_fitted_values(prepared, tmp_path, folders, monkeypatch):
     monkeypatch.setattr(reproduction.figures, "plot_reproduction", lambda *arguments, **options: Figure((1, 1)))
     result = prepared("-o", "own", "--reading", "aligned", "--dem", "flint-hills", *given(folders))
     assert result.exit_code == 0, result.output
@@ -174,13 +174,13 @@ def given(folders):
 
 
 @pytest.mark.parametrize(("stage", "arguments", "said"), mistakes("reproduce", name="experiment_mistakes"), ids=str)
-def test_mistake_is_one_line_and_leaves_nothing(quick, tmp_path, stage, arguments, said):
+def test_mistake_prints_one_line_and_writes_nothing(quick, tmp_path, stage, arguments, said):
     result = quick("-o", "out", *arguments)
     assert result.exit_code == 2
     assert said in result.stderr and len(result.stderr.strip().splitlines()) == 1
     assert not (tmp_path / "out").exists()
 
 
-def test_line_of_the_command_makes_the_same_again():
+def test_printed_command_lists_the_changed_options():
     line = reproduction.command({"reading": "native", "dem": "my hills.tif", "optics": None, "cells": 333})
     assert line == "fifesim reproduce --dem 'my hills.tif' --cells 333"

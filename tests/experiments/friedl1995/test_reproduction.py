@@ -1,4 +1,4 @@
-"""The experiment as one call."""
+"""`fifesim.reproduce` and the scenario files of its scenes."""
 
 import builtins
 import json
@@ -19,7 +19,7 @@ from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.simulation import simulate
 
 
-def test_dataset_holds_54_numbers_by_realisation_beside_the_papers(found):
+def test_dataset_has_54_numbers_by_realisation_and_the_published_ones(found):
     assert list(found["reading"].values) == ["native", "aligned"]
     assert sum(found[name].isel(reading=0, realisation=0).size for name in ("intercept", "slope", "r2")) == 54
     assert sum(found[f"paper_{name}"].size for name in ("intercept", "slope", "r2")) == 54
@@ -31,13 +31,13 @@ def test_dataset_holds_54_numbers_by_realisation_beside_the_papers(found):
 
 
 def slopes(**options):
-    """Of one scene, in two readings."""
+    """Slopes of one scene in two readings."""
     case = case_of(cells=90, **options)
     return realise_scenes(case, [1995], [NATIVE, ALIGNED], ["unburned-ungrazed"], [0.15])["slope"].values
 
 
 @pytest.mark.parametrize("name", ["densities", "optics", "background"])
-def test_every_input_of_a_readers_own_changes_the_numbers(name, folders):
+def test_every_user_input_changes_the_numbers(name, folders):
     assert (slopes(**{name: folders[name]}) != slopes()).all()
 
 
@@ -49,7 +49,7 @@ def test_relief_another_sensor_and_another_seed_change_the_numbers(small):
 
 
 @pytest.mark.parametrize(("error", "options", "said"), mistakes("ValueError", "TypeError", name="experiment_mistakes"))
-def test_mistake_is_told_by_its_name(error, options, said):
+def test_mistake_is_named(error, options, said):
     with pytest.raises(getattr(builtins, error), match=said):
         fifesim.reproduce(**options)
 
@@ -60,12 +60,12 @@ def read(path):
 
 
 def seen(case, *scene):
-    """Digital numbers of a scene on arrays, as the tables have them."""
+    """Digital numbers of a scene from plain arrays, as for the tables."""
     cells, driver = cells_of(case, *scene, case.light()), Driver(case.setup)
     return driver.image(driver.toa(cells.reflectance), case.grid)
 
 
-def test_nine_scenarios_give_the_images_of_the_experiment_to_the_bit(tmp_path):
+def test_nine_scenarios_reproduce_the_images_to_the_bit(tmp_path):
     case, images = case_of(cells=90), []
     reproduction.write_scenarios(case, tmp_path, 11)
     for treatment, arp in friedl1995.scenes():
@@ -77,13 +77,13 @@ def test_nine_scenarios_give_the_images_of_the_experiment_to_the_bit(tmp_path):
 
 @pytest.fixture
 def one_of_nine(tmp_path, monkeypatch):
-    """Folder of one of the nine with its rasters."""
+    """Folder of one of the nine scenes with its rasters."""
     monkeypatch.setattr(friedl1995, "scenes", lambda: [("burned-ungrazed", 0.24)])
     reproduction.write_scenarios(case_of(cells=90), tmp_path / "nine", 11, scenes=True)
     return tmp_path / "nine" / "burned-ungrazed-0.24"
 
 
-def test_files_of_a_scene_hold_what_its_scenario_gives(one_of_nine):
+def test_files_of_a_scene_equal_a_run_of_its_scenario(one_of_nine):
     run, cells = simulate(read_scenario(one_of_nine / "scenario.toml")), read(one_of_nine / "scene.tif")
     np.testing.assert_array_equal(seen(case_of(cells=90), "burned-ungrazed", 0.24, 11), read(one_of_nine / "image.tif"))
     truth = np.stack([run["truth"][name].values for name in ("lai", "fpar")])
@@ -92,8 +92,8 @@ def test_files_of_a_scene_hold_what_its_scenario_gives(one_of_nine):
     np.testing.assert_array_equal(np.stack([expected.lai, expected.fpar, *expected.reflectance]).astype("f4"), cells)
 
 
-def test_scenes_are_a_collection(one_of_nine):
-    """The item of each lies beside its rasters, those of the image with bands, and the collection leads to it."""
+def test_scenes_are_a_stac_collection(one_of_nine):
+    """Each item is stored next to its rasters, image assets list bands, and the collection links to the item."""
     found = json.loads((one_of_nine.parent / "collection.json").read_text(encoding="utf-8"))
     (path,) = [link["href"] for link in found["links"] if link["rel"] == "item"]
     item = json.loads((one_of_nine.parent / path).read_text(encoding="utf-8"))
@@ -107,8 +107,8 @@ def test_scenes_are_a_collection(one_of_nine):
 @pytest.mark.parametrize(
     "options", [{"reading": "blur-48.6", "dem": "flint-hills"}, {"reading": "offset"}, {"sensor": "OLI"}], ids=str
 )
-def test_inputs_and_readings_are_in_the_scenario(tmp_path, folders, options):
-    """On hills, with another response from a file beside the scenario, and with a reader's own ground."""
+def test_scenario_file_contains_inputs_and_reading(tmp_path, folders, options):
+    """Cases on hills, with another response from a file next to the scenario, and with user inputs."""
     if "sensor" not in options:
         options = options | folders
     case = case_of(cells=90, **options)

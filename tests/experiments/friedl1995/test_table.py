@@ -1,4 +1,4 @@
-"""Table 2 over realisations, beside the paper's."""
+"""Table 2 over realisations, compared with the published values."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ def tables(found):
     return {name: friedl1995_table.table2(found.sel(reading=name)) for name in ("native", "aligned")}
 
 
-def test_line_agrees_with_scipy():
+def test_regression_line_agrees_with_scipy():
     rng = np.random.default_rng(0)
     x, y = rng.normal(size=(2, 4, 50))
     found = friedl1995_table.line(x, y)
@@ -32,10 +32,10 @@ def test_line_agrees_with_scipy():
 
 def test_table_2_agrees_with_the_paper(tables):
     """
-    The limits that the report states.
+    Table 2 is within the limits that the report states.
 
-    Three realisations of 1296 pixels leave errors of .012 in R2 and 2 % in slopes, which the limits of single rows hold
-    beside the differences found over twenty, .10 and 12 %.
+    Three realisations of 1296 pixels leave standard errors of 0.012 in R2 and 2 % in slopes. The limits of single rows
+    cover these errors in addition to the differences found over twenty realisations, 0.10 and 12 %.
     """
     native = tables["native"]
     assert list(native.columns[:6]) == ["variable", "distribution", "arp", "intercept", "slope", "r2"]
@@ -43,8 +43,8 @@ def test_table_2_agrees_with_the_paper(tables):
     assert [row["name"] for row in rows if not row["met"]] == []
 
 
-def test_rows_of_the_table_are_those_of_the_paper(found, tables):
-    """Row by row: a table in another order would still have the right spread of numbers."""
+def test_rows_of_the_table_are_in_the_order_of_the_paper(found, tables):
+    """Compares row by row, because a table in another order would still have the right spread of numbers."""
     for name, table in tables.items():
         fit = found["slope"].sel(reading=name).mean("realisation")
         for _, row in table.iterrows():
@@ -55,11 +55,11 @@ def test_rows_of_the_table_are_those_of_the_paper(found, tables):
             assert row["slope_deviation"] == pytest.approx(np.sqrt(np.sum((three - three.mean()) ** 2) / 2), rel=1e-9)
 
 
-def test_sample_of_200_scatters_as_theory_says(tables):
+def test_samples_of_200_have_the_theoretical_scatter(tables):
     """
-    Standard error of R2, 2 r (1 - r2) / sqrt(n) for a normal pair, beside the deviation over samples.
+    Standard error of R2, 2 r (1 - r2) / sqrt(n) for a normal pair, compared with the deviation over samples.
 
-    The samples of a scene come from 1296 pixels, so that they scatter by sqrt(1 - 200/1296) less, and scenes differ.
+    The samples of a scene come from 1296 pixels, which reduces their scatter by sqrt(1 - 200/1296), and scenes differ.
     """
     table = tables["native"]
     expected = 2 * np.sqrt(table["r2"]) * (1 - table["r2"]) / np.sqrt(200)
@@ -67,13 +67,13 @@ def test_sample_of_200_scatters_as_theory_says(tables):
 
 
 def test_aligned_pixels_do_not_explain_the_paper(tables):
-    """A literal reading leaves R2 near .8 and above, where the paper has .38 to .81."""
+    """A literal reading leaves R2 near 0.8 and above, compared with 0.38 to 0.81 in the paper."""
     assert (tables["aligned"]["r2"] > 0.78).all()
     assert friedl1995_table.agreement(tables["aligned"])["lai_r2_rms"] > 0.3
 
 
 def test_readings_share_their_ground():
-    """A reading gives the same numbers beside others as by itself."""
+    """A reading gives the same numbers alone and together with other readings."""
     options = {"distributions": ["burned-grazed"], "arps": [0.15]}
     several = friedl1995_table.realise_scenes(Case(cells=90), [5], [READINGS["aligned"], READINGS["narrow"]], **options)
     alone = friedl1995_table.realise_scenes(Case(cells=90, reading=READINGS["narrow"]), [5], **options)
@@ -81,8 +81,8 @@ def test_readings_share_their_ground():
     assert (several["r2"].sel(reading="aligned") != several["r2"].sel(reading="narrow")).all()
 
 
-def test_agreement_counts_in_deviations_and_finds_a_common_factor(tables):
-    """The paper's own numbers, with slopes 1.5 times as high, and R2 two deviations of a sample off."""
+def test_agreement_is_in_standard_deviations_and_includes_a_common_factor(tables):
+    """Published numbers with slopes 1.5 times as high, and R2 two standard deviations of a sample off."""
     table = tables["native"].copy()
     for name in friedl1995_table.COEFFICIENTS:
         table[name] = table[f"paper_{name}"]
@@ -101,8 +101,10 @@ SCENE = ("burned-ungrazed", 0.24, 3)
 
 
 @pytest.mark.parametrize("dem", ["flat", "flint-hills"])
-def test_cells_are_those_of_the_labelled_ground(dem):
-    """Exact ranks: the quantiles of the cells are those of the distribution, and treatments share one field."""
+def test_cells_equal_the_labelled_ground(dem):
+    """
+    Ranks are exact: the quantiles of the cells equal the quantiles of the distribution, and treatments share one field.
+    """
     case = Case(cells=90, dem=dem)
     cells, scene = cells_of(case, *SCENE, case.light()), simulate(case.scenario(*SCENE))["scene"]
     np.testing.assert_array_equal(cells.lai, scene["lai"])
@@ -114,8 +116,8 @@ def test_cells_are_those_of_the_labelled_ground(dem):
     assert (periodic_scene("burned-grazed", 0.24, 6, (90, 90)) != other).any()
 
 
-def test_native_pixels_drift_from_the_truth_by_the_interval():
-    """43 microradian x 705 km = 30.315 m (Table 1): 0.315 m a pixel."""
+def test_native_pixels_drift_from_the_truth_with_the_interval():
+    """43 microradian x 705 km = 30.315 m (Table 1): 0.315 m per pixel."""
     case = Case(cells=180)
     run = simulate(case.scenario(*SCENE))
     native, blocks = (grids.geobox(run[node][name]) for node, name in (("image", "dn"), ("truth", "lai")))
@@ -127,25 +129,28 @@ def test_native_pixels_drift_from_the_truth_by_the_interval():
 
 
 def test_offset_pixels_see_the_ground_to_the_south_east():
-    """Two cells each way: the aligned image of the scene without its first two rows and columns."""
+    """
+    The offset is two cells each way, so the image equals the aligned image of the scene without its first two rows and
+    columns.
+    """
     case, scene = Case(cells=180, reading=READINGS["offset"]), Case(cells=180, reading=READINGS["aligned"])
     reflectance = simulate(case.scenario(*SCENE))["scene"]["surface_reflectance"].compute()
     moved = image_of(case.setup, reflectance)
     aligned = image_of(replace(scene.setup, onto=None), reflectance[:, 2:, 2:])
-    # Sums of another window round otherwise, which may carry a value over the middle of two counts.
+    # Sums over another window round differently, so that a value may cross the boundary between two counts.
     off = abs(moved[:, :19, :19].values.astype(int) - aligned[:, :19, :19].values)
     assert off.max() <= 1 and (off > 0).mean() < 0.005
 
 
-def test_pixels_pair_by_row_and_column_without_what_lacks_data():
+def test_pixels_are_paired_by_row_and_column_without_missing_data():
     truth = np.arange(12.0).reshape(3, 4)
     truth[0, 0] = np.nan
     values = paired(truth, 2 * np.arange(16.0).reshape(4, 4)[:, :3])
     np.testing.assert_array_equal(values, [[1, 2, 4, 5, 6, 8, 9, 10], [2, 4, 8, 10, 12, 16, 18, 20]])
 
 
-def test_noise_range_and_samples_are_as_the_papers(found):
-    """REN grows with arp as in the paper, and the range kept from about 15 % to about three quarters."""
+def test_equivalent_noise_and_range_grow_with_arp_as_published(found):
+    """REN grows with arp as in the paper, and the remaining range from about 15 % to about 75 %."""
     text = friedl1995_table.text_table(found.sel(reading="native")).set_index(["quantity", "variable", "arp"])
     assert text.loc[("ren", "lai", 0.24), "paper"] == 0.31 and text.loc[("range_kept", "ndvi", 0.24), "paper"] == 0.75
     assert text.loc[("ren", "lai", 0.24), "value"] > 2 * text.loc[("ren", "lai", 0.05), "value"]

@@ -1,4 +1,4 @@
-"""Small scenarios of a budget: 12 x 14 pixels of 30 m."""
+"""Small scenarios for budgets: 14 x 12 pixels of 30 m."""
 
 import pytest
 
@@ -16,12 +16,12 @@ def scenario_of(sensor=None, dem="flat", **ground):
 
 @pytest.fixture(scope="session")
 def scenario():
-    """A function that makes a scenario of its sensor, elevation and ground."""
+    """A function that makes a scenario from sensor, elevation and ground."""
     return scenario_of
 
 
 @pytest.fixture(scope="session")
 def rough(scenario):
-    """A scenario with every stage at work."""
+    """A scenario in which every stage has an effect."""
     sensor = {"instrument": "L4TM", "interval": "native", "offset": [0.1, 0.0], "noise": ["thermal"]}
     return scenario(sensor, dem="flint-hills")

@@ -1,4 +1,4 @@
-"""End-to-end report: its files, maps and text."""
+"""End-to-end report: files, maps and text."""
 
 import numpy as np
 import pandas as pd
@@ -31,7 +31,7 @@ def test_report_has_the_numbers_of_the_budget(tmp_path):
     assert fifesim.read_scenario(tmp_path / "out" / "scenario.toml").sensor.offset == [0.3, 0.0]
 
 
-def test_maps_are_of_the_retrieval_and_its_interval():
+def test_maps_show_the_retrieval_and_the_width_of_its_interval():
     chip = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
     study = fifesim.Study(chip, {"visibility": {"uniform": [20, 60]}}, landscapes=10)
     retrieval = fifesim.train(study, "line", chips=10)
@@ -42,7 +42,7 @@ def test_maps_are_of_the_retrieval_and_its_interval():
         lai, width = endtoend.estimated(image, truth, each)
         inside = np.isfinite(lai.values)
         assert inside.sum() > 60 and (width.values[inside] > 0).all()
-        # The interval of 80 % holds most of the truth.
+        # The 80 % interval contains most of the truth.
         near = np.abs(lai.values - truth.values)[inside] < width.values[inside] / 2
         assert 0.4 < near.mean() <= 1
     figure = endtoend.map_figure(case, errors.target_of("photosynthesis"), retrieval)

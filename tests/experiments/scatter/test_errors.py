@@ -1,4 +1,4 @@
-"""Bias and variance of the error of a quantity by stage."""
+"""Bias and variance of the error of a quantity, by stage."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def test_bias_comes_from_scaling_and_scatter_from_registration(sections):
 
 
 def test_concave_models_are_biased_by_the_curvature_of_the_truth():
-    """With the true mean LAI, the bias is the mean of the model at the pixel means minus its mean at the cells."""
+    """With the true mean LAI, the bias is the model at the pixel means minus the mean of the model over cells."""
     scenario = fifesim.Scenario(**BURNED)
     (case,) = budget_cases(scenario, realisations=1, cells=333)
     lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
@@ -55,17 +55,17 @@ def test_concave_models_are_biased_by_the_curvature_of_the_truth():
     means, truth = lai.fifesim.aggregate(30), saturating(lai).fifesim.aggregate(30)
     expected = (saturating(means) - truth).isel(y=slice(1, -1), x=slice(1, -1)).mean()
     found = shares_of(BURNED, saturating, realisations=1)
-    # Pixels at the edge have no data; the others differ little in the mean.
+    # Pixels at the edge have no data; the mean of the remaining pixels differs little.
     np.testing.assert_allclose(found.bias.sel(stage="scaling").item(), expected.item(), rtol=0.05)
 
 
-def test_linear_quantity_with_a_line_has_the_shares_of_the_closed_form(tmp_path):
+def test_shares_of_a_linear_quantity_and_a_regression_line_match_the_closed_form(tmp_path):
     """
-    Independent cells of nearly the same leaf area, displaced by a third of a pixel.
+    Independent cells with nearly constant leaf area, displaced by a third of a pixel.
 
-    Footprint and block have the correlation r = 2 / 3. The error has the variance 2 (1 - r) of the block means if LAI
-    of the footprint is known, and 1 - r^2 / (1 + q) on a line, with the share q of digital numbers in the variance of
-    NDVI. The total of the budget gives q, and q the three shares.
+    Footprint and block are correlated with r = 2 / 3. The error variance, relative to the variance of the block means,
+    is 2 (1 - r) if LAI of the footprint is known. On a regression line it is 1 - r^2 / (1 + q), where q is the share of
+    quantisation in the variance of NDVI. The total of the budget gives q, and q gives the three shares.
     """
     path = tmp_path / "narrow.csv"
     np.savetxt(path, np.random.default_rng(1).normal(2.0, 0.1, 200), header="lai", comments="")
@@ -88,7 +88,7 @@ def test_linear_quantity_with_a_line_has_the_shares_of_the_closed_form(tmp_path)
     np.testing.assert_allclose(found.bias.sel(stage="scaling"), 0, atol=1e-12)
 
 
-def test_retrieval_of_reflectance_states_what_cannot_be_switched_off():
+def test_retrieval_from_reflectance_states_why_stages_cannot_be_ideal():
     chip = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
     study = fifesim.Study(chip, {"visibility": {"uniform": [20, 60]}}, landscapes=10)
     retrieval = fifesim.train(study, "line", chips=10)
@@ -98,7 +98,7 @@ def test_retrieval_of_reflectance_states_what_cannot_be_switched_off():
     assert found.variance.sel(stage="atmosphere").isnull().all()
     np.testing.assert_allclose(found.variance.sum("stage"), found.total_variance, rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.bias.sum("stage"), found.total_bias, rtol=0, atol=1e-9)
-    # The estimates are those of the image of the whole chain.
+    # The estimates are the same as for the image of the whole chain.
     (case,) = budget_cases(fifesim.Scenario(**BURNED), realisations=1, cells=333)
     run = fifesim.simulate(case)
     image = run["image"]["dn"].fifesim.to_reflectance().fifesim.retrieve(retrieval).lai
@@ -133,12 +133,12 @@ def missing(area):
     ],
     ids=["negative", "shape", "missing", "arguments", "name", "retrieval", "no quantity"],
 )
-def test_invalid_quantities_are_refused_by_name(options, message):
+def test_invalid_quantity_is_named(options, message):
     with pytest.raises(ValueError, match=message):
         fifesim.budget(fifesim.Scenario(**BURNED), realisations=1, each=iter, **options)
 
 
-def test_weather_by_cell_is_refused(lai):
+def test_weather_rasters_are_rejected(lai):
     weather = fifesim.fife_weather().replace(shortwave=(500 + lai).drop_attrs())
     with pytest.raises(ValueError, match="weather of numbers, got a raster of shortwave"):
         fifesim.budget(fifesim.Scenario(**BURNED), quantity="gpp", weather=weather, realisations=1)
@@ -147,14 +147,14 @@ def test_weather_by_cell_is_refused(lai):
 CHIP = fifesim.Scenario(grid={"width": 120, "height": 120}, terrain={"dem": "flat"})
 
 
-def test_parameters_of_a_study_have_their_shares():
-    """Of a function of the scenario: twice the range has four times the variance."""
+def test_sensitivity_matches_a_linear_function():
+    """The quantity is a sum of two parameters: twice the range has four times the variance."""
     study = fifesim.Study(CHIP, {"brown": {"uniform": [0, 0.2]}, "moisture": {"uniform": [0, 0.4]}})
     found = fifesim.sensitivity(study, lambda each: each.ground.brown + each.ground.moisture, n=256, each=iter)
     assert found.parameter.values.tolist() == ["ground.brown", "ground.moisture"]
     np.testing.assert_allclose(found["first"], [0.2, 0.8], atol=0.02)
     np.testing.assert_allclose(found["total"], [0.2, 0.8], atol=0.02)
-    # Only green leaves produce, and soil hardly matters for the light that they absorb.
+    # Only green leaves produce, and soil hardly affects the light that they absorb.
     gpp = fifesim.sensitivity(study, "gpp", n=16, each=iter)
     assert gpp["first"].sel(parameter="ground.brown") > 0.95
     with pytest.raises(ValueError, match="must return a number for a scenario, it returns list"):

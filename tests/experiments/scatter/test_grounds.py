@@ -1,4 +1,4 @@
-"""Ground with what varies over it at its ideal, and what a budget makes of it."""
+"""Ground with ideal (uniform) properties, and its stages in a budget."""
 
 from functools import cache
 
@@ -45,13 +45,13 @@ def everything():
 
 @pytest.fixture(scope="module")
 def whole(everything):
-    """The ground as it is."""
+    """The ground with all variation."""
     return ground_scene(everything, everything.geobox())
 
 
 @pytest.fixture(scope="module")
 def ideal(everything):
-    """A function that makes this ground without one property, each once."""
+    """A cached function that makes this ground with the named properties ideal."""
     return cache(lambda *left_out: ground_with(everything, everything.geobox(), set(IDEAL_PROPERTIES) - set(left_out)))
 
 
@@ -73,14 +73,14 @@ def ideal(everything):
     ],
     ids=str,
 )
-def test_what_varies_is_found(sections, found):
+def test_varying_properties_are_found(sections, found):
     case = case_of(**sections)
     assert varying_ground(case) == found
     assert tuple(name for name in working_stages(case) if name in IDEAL_PROPERTIES) == found
 
 
-def test_without_a_property_only_that_is_even(ideal, whole):
-    """As `PROPERTIES` says; all else has the same bits, of the same random numbers."""
+def test_ideal_property_is_uniform_and_the_rest_unchanged(ideal, whole):
+    """All other variables are identical to the bit, because random numbers are the same."""
     changed = {"soil": {"soil", "moisture"}, "dead leaves": {"brown"}, "cover": {"cover"}, "clumping": {"crown_cover"}}
     for name, variables in changed.items():
         found = ideal(name)
@@ -94,8 +94,8 @@ def test_without_a_property_only_that_is_even(ideal, whole):
     assert first.attrs["flag_meanings"] == whole["cover"].attrs["flag_meanings"] and (whole["cover"] == 2).any()
 
 
-def test_without_covariance_leaf_area_is_that_of_no_other_property(everything, ideal, whole):
-    """What else varies is the same; leaf area of each class is that of its own scene."""
+def test_without_covariance_leaf_area_is_independent_of_the_soil(everything, ideal, whole):
+    """Other variables are unchanged; leaf area of each class equals a scene of this class alone."""
     found = ideal("covariance")
     for name in set(whole) - {"lai"}:
         np.testing.assert_array_equal(found[name], whole[name], err_msg=name)
@@ -105,12 +105,13 @@ def test_without_covariance_leaf_area_is_that_of_no_other_property(everything, i
         np.testing.assert_array_equal(found["lai"].values[cells], alone.values[cells])
     soil = whole["soil"].values.ravel()
     with_soil, without = (np.corrcoef(each["lai"].values.ravel(), soil)[0, 1] for each in (whole, found))
-    # Leaf area is no normal score: part of its correlation. Some 2,000 independent cells: .02.
+    # Leaf area is not Gaussian, so it keeps part of the correlation. Standard error with about 2,000 independent cells:
+    # 0.02.
     assert with_soil < -0.2 and abs(without) < 0.1
 
 
 def test_missing_cover_stays_missing(tmp_path, everything):
-    """Where no class is known there is none to take."""
+    """A cell of unknown class does not get the first class."""
     codes = np.where(ground_scene(everything, everything.geobox())["cover"] == 1, 3, 0)
     codes[:20, :9] = -1
     path = write(tmp_path / "cover.tif", codes, everything.geobox().affine, nodata=-1)
@@ -122,8 +123,8 @@ def test_missing_cover_stays_missing(tmp_path, everything):
     np.testing.assert_array_equal(found, np.where(codes < 0, -1, 3))
 
 
-def test_pixels_without_a_property_are_those_of_a_scenario_without_it():
-    """Of the same random numbers: the image is that of the scenario which says nothing of it."""
+def test_pixels_with_an_ideal_property_equal_a_scenario_without_it():
+    """With the same random numbers, the image equals the image of a scenario that omits the property."""
     land = {"deviations": {"soil": 0.04}, "covary": {"soil": -0.4}}
     seen = pixels(case_of(landscape=land))
     for (soil, goes), own in {(1, 1): land, (1, 0): {"deviations": {"soil": 0.04}}, (0, 0): {}}.items():

@@ -1,4 +1,4 @@
-"""The same ground through every instrument."""
+"""The same ground simulated for every instrument."""
 
 import importlib
 from pathlib import Path
@@ -22,7 +22,7 @@ def make_instruments(monkeypatch):
     return importlib.import_module("make_instruments")
 
 
-def test_an_instrument_is_flown_with_all_that_is_known_of_it():
+def test_instrument_scenario_has_all_known_errors_of_the_instrument():
     msi = instrument_scenario("Sentinel-2", arp=0.24)
     assert msi.sensor.bands == ["MSI4", "MSI8"] and msi.sensor.size == 10.0 and msi.ground.arp == 0.24
     assert msi.sensor.offset == pytest.approx([0.33, 0.33]) and msi.sensor.noise == ["all"]
@@ -30,8 +30,8 @@ def test_an_instrument_is_flown_with_all_that_is_known_of_it():
     assert mss.sensor.offset == [0.0, 0.0] and mss.sensor.noise == [] and mss.terrain.dem == "flat"
 
 
-def test_terms_that_no_source_states_are_unknown_and_so_is_their_total(make_instruments):
-    """Of EMIT the place is unknown; of MSS blur, noise and place are."""
+def test_terms_without_a_source_are_unknown_and_so_is_the_total(make_instruments):
+    """The geolocation of EMIT is unknown; so are blur, noise and geolocation of MSS."""
     found = make_instruments.compare_instruments(["EMIT", "MSS"], arps=(0.15,), realisations=2)
     unknown = found[found["share"].isna() & found["alone"].isna()]
     by_name = unknown[unknown["variable"] == "lai"].groupby("instrument")["stage"].agg(set)
@@ -46,13 +46,13 @@ def test_terms_that_no_source_states_are_unknown_and_so_is_their_total(make_inst
     assert known["share"].notna().all() and (known.query("stage == 'quantisation'")["share"] != 0).all()
 
 
-def test_table_of_the_gallery_has_no_number_for_an_unknown_term(make_instruments):
+def test_gallery_table_has_no_numbers_for_unknown_terms(make_instruments):
     table = pd.read_csv(DOCS / "instruments.csv")
     complete = table[list(make_instruments.KNOWN.values())].all(axis=1)
     hidden = table["stage"].isin(["total", "sub-pixel variation"]) & ~complete
     for stage, name in make_instruments.KNOWN.items():
         hidden |= (table["stage"] == stage) & ~table[name]
-    # The ground's own variation has no share that adds up.
+    # The variation of the ground itself has no additive share.
     hidden |= table["stage"] == "sub-pixel variation"
     assert (table["share"].isna() == hidden).all() and (table["share_error"].isna() == hidden).all()
     columns = table.drop_duplicates("instrument").set_index("instrument")[list(make_instruments.KNOWN.values())]
@@ -63,8 +63,8 @@ def test_table_of_the_gallery_has_no_number_for_an_unknown_term(make_instruments
         assert tuple(known) == stated, name
 
 
-def test_budget_states_origins_and_no_zero_for_what_is_unknown():
-    """Of MSS, blur, geolocation and noise are unknown; its detector blurs by more than a pixel of 60 m."""
+def test_budget_states_origins_and_shows_unknown_terms_as_unknown():
+    """Blur, geolocation and noise of MSS are unknown; the detector alone blurs by more than a pixel of 60 m."""
     found = fifesim.budget(instrument_scenario("MSS"), realisations=1, cells=333, each=iter)
     unknown = ["point spread", "registration", "noise"]
     assert found["origin"].sel(stage=unknown).values.tolist() == ["–"] * 3
@@ -74,8 +74,8 @@ def test_budget_states_origins_and_no_zero_for_what_is_unknown():
     assert sum(text.get_text() == "unknown" for text in chart.axes[0].texts) == 4
 
 
-def test_range_of_a_trade_study_contains_its_total():
-    """Both ends of the uncertainty of the blur enclose the total."""
+def test_range_of_the_total_contains_the_total():
+    """The two ends of the uncertainty of the blur enclose the total."""
     options = {"realisations": 2, "cells": 120, "each": iter}
     for name in ("OLI", "TM"):
         scenario = instrument_scenario(name)
@@ -85,7 +85,7 @@ def test_range_of_a_trade_study_contains_its_total():
     assert total_range(instrument_scenario("MSS"), **options) is None
 
 
-def test_a_budget_of_an_instrument_from_the_command_line(tmp_path, monkeypatch):
+def test_command_makes_the_budget_of_an_instrument(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     made = CliRunner().invoke(app, ["budget", "--sensor", "MSS", "-o", "out", "--realisations", "1"])
     assert made.exit_code == 0, made.output

@@ -1,4 +1,4 @@
-"""Page, mechanisms and folder of a budget, and the command."""
+"""Report page, mechanisms, output folder and command of a budget."""
 
 import numpy as np
 import pandas as pd
@@ -17,7 +17,7 @@ from fifesim.experiments.scatter.stages import STAGES, VARIABLES
 
 @pytest.fixture
 def budget():
-    """Shares of 1 to 8 % for the stages in their order, and a curvature of 9 %, twice the same."""
+    """Shares of 1 to 8 % for the stages in order and a curvature of 9 %, in two equal realisations."""
     shares = np.broadcast_to(np.arange(1, len(STAGES) + 1) / 100, (2, len(VARIABLES), len(STAGES)))
     curvature = np.full((2, len(VARIABLES)), 0.09)
     return xr.Dataset(
@@ -30,7 +30,7 @@ def budget():
     )
 
 
-def test_mechanisms_share_out_the_stages_once(budget):
+def test_every_stage_belongs_to_one_mechanism(budget):
     rows = report.mechanisms(budget)
     parts = [part for row in rows for part in report.MECHANISMS[row["name"]]]
     assert len(parts) == len(set(parts)) and set(parts) <= {*STAGES, CURVATURE}
@@ -81,7 +81,7 @@ def test_one_realisation_has_no_error(command, tmp_path):
 
 
 @pytest.mark.parametrize(("stage", "given", "said"), mistakes("budget", name="experiment_mistakes"), ids=str)
-def test_mistake_is_one_line_and_leaves_nothing(command, tmp_path, stage, given, said):
+def test_mistake_prints_one_line_and_writes_nothing(command, tmp_path, stage, given, said):
     text, *arguments = given
     (tmp_path / "wrong.toml").write_text(text)
     result = command("wrong.toml", "-o", "out", *arguments)

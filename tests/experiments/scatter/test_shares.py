@@ -1,4 +1,4 @@
-"""Where the scatter comes from: images with stages at their ideal, their shares, and the command."""
+"""Sources of scatter: images with ideal stages and the shares of the stages."""
 
 import warnings
 
@@ -22,7 +22,7 @@ def test_shares_and_curvature_add_up_to_the_scatter(rough):
         assert parts.sum() == pytest.approx(rows.loc[scatter.TOTAL, "share"], rel=1e-12)
 
 
-def test_stage_that_is_ideal_already_has_exactly_nothing(scenario):
+def test_stages_already_ideal_have_zero_share(scenario):
     case = scenario()
     nothing = ["registration", "noise", "topography", "coupling", "clouds", "shadows", *IDEAL_PROPERTIES]
     assert set(STAGES) - set(working_stages(case)) == set(nothing)
@@ -41,12 +41,12 @@ def test_stage_that_is_ideal_already_has_exactly_nothing(scenario):
         ({"instrument": "L4TM", "noise": ["all"]}, "noise"),
     ],
 )
-def test_what_is_added_to_a_scenario_has_a_share_beyond_its_error(sensor, stage, scenario):
+def test_added_errors_have_a_significant_share(sensor, stage, scenario):
     share = fifesim.budget(scenario(sensor), realisations=5)["share"].sel(stage=stage)
     assert (share.mean("realisation") > 3 * scatter.standard_error(share)).all()
 
 
-def test_map_has_as_many_realisations_as_it_has_filled_windows(tmp_path):
+def test_map_has_one_realisation_per_window_with_data(tmp_path):
     rng = np.random.default_rng(2)
     lai = np.exp(rng.normal(0, 0.3, (100, 200))).astype("float32")
     lai[:, 150:] = np.nan
@@ -65,7 +65,7 @@ def test_map_has_as_many_realisations_as_it_has_filled_windows(tmp_path):
         fifesim.budget(finer, realisations=1, cells=70)
 
 
-def test_realisations_lie_side_by_side_and_have_seeds_of_their_own(scenario):
+def test_realisations_are_adjacent_and_have_different_seeds(scenario):
     cases = scatter.budget_cases(fifesim.Scenario(), realisations=4, cells=333, seed=3)
     assert len({(case.grid.west, case.grid.north) for case in cases}) == 4
     assert [case.ground.seed for case in cases] == [3, 4, 5, 6] and len({case.sensor.seed for case in cases}) == 4

@@ -1,4 +1,4 @@
-"""Images with stages at their ideal."""
+"""Images with ideal stages."""
 
 import re
 from pathlib import Path
@@ -28,11 +28,11 @@ from fifesim.scenario.scenario import Scenario
 
 
 def of(seen, **at_work):
-    """NDVI with the stages named at work, and those without a word ideal."""
+    """NDVI with the named stages active and all others ideal."""
     return seen.ndvi[tuple(int(at_work.get(stage.replace(" ", "_"), 0)) for stage in seen.stages)]
 
 
-def test_physics_page_lists_the_stages_and_the_ideal_ground():
+def test_physics_page_lists_the_stages_and_their_ideals():
     page = (Path(__file__).parents[3] / "docs" / "physics.md").read_text(encoding="utf-8")
     _, _, table = page.partition("| stage | ideal |\n|---|---|\n")
     rows = dict(re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", table.partition("\n\n")[0], re.MULTILINE))
@@ -41,8 +41,8 @@ def test_physics_page_lists_the_stages_and_the_ideal_ground():
 
 
 @pytest.mark.parametrize("clumped", [False, True])
-def test_all_stages_at_work_are_the_simulation(rough, scenario, clumped):
-    """Pixels have data where the displaced image has; only the truth of rough ground has an axis of one or two."""
+def test_all_stages_active_equal_the_simulation(rough, scenario, clumped):
+    """Pixels have data where the displaced image has data; only the truth of rough ground has axes of length 1 or 2."""
     case = scenario(crown_cover=0.6) if clumped else rough
     seen, run = pixels(case), fifesim.simulate(case)
     assert set(STAGES) - set(seen.stages) == (
@@ -62,7 +62,7 @@ def test_all_stages_at_work_are_the_simulation(rough, scenario, clumped):
         assert scatter.unexplained(truth, seen.ndvi[at_work]) == pytest.approx(1 - line.r2, abs=1e-12)
 
 
-def test_ideal_of_ndvi_scaling_is_the_mean_over_the_cells(scenario):
+def test_ideal_ndvi_scaling_is_the_mean_ndvi_of_the_cells(scenario):
     case = scenario()
     lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
     of_cells = fifesim.ndvi(fifesim.surface_reflectance(lai, bands=["TM3", "TM4"]))
@@ -70,8 +70,8 @@ def test_ideal_of_ndvi_scaling_is_the_mean_over_the_cells(scenario):
     np.testing.assert_allclose(found, fifesim.aggregate(of_cells, 30).values.ravel(), rtol=1e-12)
 
 
-def test_ideal_of_non_linearity_is_the_reflectance_and_fpar_of_the_mean(scenario):
-    """Tangents average to the curve's value at the mean; its table is within 1e-6 of SAIL."""
+def test_ideal_non_linearity_is_the_reflectance_and_fpar_of_the_mean_lai(scenario):
+    """Tangents average to the value of the curve at the mean; its table is within 1e-6 of SAIL."""
     seen = pixels(scenario())
     lai = fifesim.lai_scene(scenario().geobox(), "burned-grazed", arp=0.15, seed=7).fifesim.aggregate(30)
     of_mean = fifesim.ndvi(fifesim.surface_reflectance(lai, bands=["TM3", "TM4"], exact=True))
@@ -80,11 +80,12 @@ def test_ideal_of_non_linearity_is_the_reflectance_and_fpar_of_the_mean(scenario
     np.testing.assert_allclose(seen.truth["lai"][0].ravel(), lai.values.ravel(), rtol=1e-12)
 
 
-def test_over_uniform_pixels_the_cells_are_the_mean(scenario):
+def test_homogeneous_ndvi_is_the_ndvi_of_the_mean_lai(scenario):
     """
-    Aligned, the cosine of 30.3 m takes in 0.16 m of each neighbour alone.
+    NDVI of ground that is uniform within pixels.
 
-    Half a count of TM3 is .001 of reflectance, and that .005 of NDVI.
+    Pixels are aligned, so the cosine of 30.3 m includes only 0.16 m of each neighbour. Half a count of TM3 is 0.001 in
+    reflectance, which is 0.005 in NDVI.
     """
     seen = pixels(scenario())
     lai = fifesim.lai_scene(scenario().geobox(), "burned-grazed", arp=0.15, seed=7).fifesim.aggregate(30)
@@ -92,8 +93,8 @@ def test_over_uniform_pixels_the_cells_are_the_mean(scenario):
     np.testing.assert_allclose(seen.homogeneous_ndvi, fifesim.ndvi(of_mean).values.ravel(), atol=0.01)
 
 
-def test_pixels_at_several_displacements_are_those_of_each(rough):
-    """The whole of it, to the bit: stages, images, truth, and the ground that is uniform within pixels."""
+def test_displaced_pixels_equal_separate_runs(rough):
+    """Stages, images, truth and uniform ground are identical to the bit."""
     offsets = [(0.0, 0.0), (0.1, 0.0), (0.0, 0.5)]
     for offset, seen in zip(offsets, displaced_pixels(rough, offsets), strict=True):
         sensor = rough.sensor.model_copy(update={"offset": list(offset)})
@@ -114,7 +115,7 @@ def test_plain_arrays_and_labelled_functions_give_the_same_pixels(scenario, monk
     np.testing.assert_array_equal(plain.truth["fpar"], labelled.truth["fpar"])
 
 
-def test_adjacency_is_that_of_the_labelled_chain(scenario):
+def test_adjacency_equals_the_labelled_chain(scenario):
     case = scenario()
     hazy = case.model_copy(update={"atmosphere": case.atmosphere.model_copy(update={"adjacency": True})})
     reflectance = fifesim.simulate(hazy)["scene"]["surface_reflectance"]
@@ -128,7 +129,7 @@ def test_adjacency_is_that_of_the_labelled_chain(scenario):
 
 
 @pytest.mark.parametrize("dem", ["flat", "flint-hills"])
-def test_the_stage_of_coupling_is_the_change_of_the_simulation(scenario, dem):
+def test_coupling_stage_equals_the_change_of_the_simulation(scenario, dem):
     case = scenario(dem=dem)
     keys = {"coupling": "directional", "visibility": 10.0}
     case = case.model_copy(update={"atmosphere": case.atmosphere.model_copy(update=keys)})
@@ -137,7 +138,7 @@ def test_the_stage_of_coupling_is_the_change_of_the_simulation(scenario, dem):
     both = seen.ndvi[(1,) * at][:, *(1,) * (len(seen.stages) - at - 1)]
     for found, coupling in zip(both, ("lambert", "directional"), strict=True):
         run = fifesim.simulate(case.replace(coupling=coupling))
-        # The fused pass has its own table, within 1e-5: a count may differ.
+        # The fused pass has a separate table, within 1e-5, so that counts may differ by one.
         np.testing.assert_allclose(found, run["image"]["ndvi"].values.ravel(), atol=0.01)
     assert 1e-3 < abs(both[1] - both[0]).mean() < 0.03
     no_air = [slice(None)] * seen.ndvi.ndim
@@ -146,8 +147,8 @@ def test_the_stage_of_coupling_is_the_change_of_the_simulation(scenario, dem):
     np.testing.assert_array_equal(*without)
 
 
-def test_a_tangent_has_the_value_and_slope_of_the_curve_at_the_middle():
-    """Beer's law, whose derivative is known; a central difference is as near as its step squared."""
+def test_tangent_has_the_value_and_slope_of_the_curve_at_the_middle():
+    """Beer's law, whose derivative is known; the error of a central difference is of the order of the squared step."""
     lai, extinction = np.linspace(0.2, 2.5, 40).reshape(5, 8), 0.7
     found = along_tangent(lambda area: 1 - np.exp(-extinction * area), lai, np.full(lai.shape, 1.2))
     left = np.exp(-extinction * 1.2)
@@ -171,15 +172,15 @@ def cells(scene):
     return np.stack([red, nir, (nir - red) / (nir + red)])
 
 
-def test_counts_move_an_ideal_image_by_what_they_move_that_of_the_means(scene, cells):
-    """Whether NDVI is of cells or of means, the detector's steps are the same, and not larger than a count or two."""
+def test_quantisation_changes_ndvi_of_cells_and_of_means_alike(scene, cells):
+    """The quantisation error is the same for NDVI of cells and of means, and at most one or two counts."""
     found = images_of(scene, cells, ((False, True), (False,), (False,), (False, True), (False,)))[:, 0, 0, :, 0]
     steps = found[:, 1] - found[:, 0]
     np.testing.assert_allclose(steps[0], steps[1], atol=1e-12)
     assert 1e-4 < np.abs(steps).max() < 0.03
 
 
-# Seven cells of 10 m along each axis: two blocks of 30 m, and a cell of none.
+# Seven cells of 10 m along each axis: two blocks of 30 m and one cell outside the blocks.
 GRID = fifesim.grid_at("EPSG:26914", 707970.0, 4331220.0, 70.0, 70.0, 10.0)
 BLOCKS = grids.aligned_grid(GRID, 30.0)
 
@@ -190,7 +191,7 @@ def land():
     return lai.copy(data=np.arange(49.0).reshape(7, 7))
 
 
-def test_each_cell_of_a_block_has_its_mean(land):
+def test_cells_of_a_block_have_the_block_mean(land):
     found = spread_out(land, BLOCKS, 0.98).values
     expected = [[8.0, 11.0], [29.0, 32.0]]
     np.testing.assert_array_equal(found[:6, :6], np.kron(expected, np.ones((3, 3))))
@@ -198,7 +199,7 @@ def test_each_cell_of_a_block_has_its_mean(land):
     np.testing.assert_array_equal(found[:, 6], land.values[:, 6])
 
 
-def test_a_cell_without_data_has_none_and_a_block_without_a_mean_keeps_its_cells(land):
+def test_cells_without_data_stay_missing_and_blocks_without_a_mean_keep_their_cells(land):
     land[0, 0] = np.nan
     found = spread_out(land, BLOCKS, 0.98).values
     np.testing.assert_array_equal(found[:3, :3], land.values[:3, :3])
@@ -206,7 +207,7 @@ def test_a_cell_without_data_has_none_and_a_block_without_a_mean_keeps_its_cells
     assert np.isnan(found[0, 0]) and found[1, 1] == pytest.approx((9 * 8 - 0) / 8)
 
 
-def test_the_middle_cell_stands_for_its_block(land):
+def test_block_takes_the_value_of_its_middle_cell(land):
     codes = xr.where(land == 0, -1, land, keep_attrs=True).astype(np.int16)
     found = middle_cells(land.copy(data=codes.values), BLOCKS).values
     assert found[0, 0] == -1 and set(found[:3, :3].ravel()) == {-1, 8}
@@ -215,7 +216,7 @@ def test_the_middle_cell_stands_for_its_block(land):
 
 
 def test_clouds_thinner_than_the_mask_are_stages():
-    """Without clouds the stages are ideal; a mask that lets clouds pass gives them a share, and leaves fewer pixels."""
+    """Without clouds the stages are ideal; a loose mask keeps thin clouds, which then have a share, and more pixels."""
     sky = {"cloud_cover": 0.5, "thickness": 1.0, "length": 300.0, "base": 300.0, "top": 300.0}
     base = {"grid": {"width": 600, "height": 600, "cell": 10}, "terrain": {"dem": "flat"}}
     clear = Scenario(**base)

@@ -1,4 +1,4 @@
-"""`fifesim verify`: it passes where all is well, and says what is wrong where it is not."""
+"""`fifesim verify` passes on a sound installation and names broken physics."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def run():
 
 @pytest.fixture
 def only(monkeypatch):
-    """Leave one area to check."""
+    """A function that leaves only one area to check."""
     return lambda area: monkeypatch.setattr(areas, "AREAS", {area: areas.AREAS[area]})
 
 
@@ -72,7 +72,7 @@ def test_missing_table_is_one_line_with_exit_code_1(monkeypatch):
     ]
 
 
-def test_python_gets_what_the_command_prints(only):
+def test_python_function_returns_the_printed_deviations(only):
     only("sensor")
     found = fifesim.verify()
     assert [each.what for each in found] == [each.what for each in areas.deviations()]
@@ -84,13 +84,13 @@ WITHIN = Deviation("terrain", "slope of planes", 1e-12, 1e-9, "degree", "plane")
 BEYOND = Deviation("canopy", "reciprocity", 0.2, 0.1, "1", "theory")
 
 
-def test_numbers_stand_below_their_headings():
+def test_columns_are_aligned_with_the_heading():
     for word, text in (("compared", "slope of planes"), ("with", "plane")):
         assert deviation_line(WITHIN).rindex(text) == HEADING.index(word)
     assert "EXCEEDED" in deviation_line(BEYOND) and "EXCEEDED" not in deviation_line(WITHIN)
 
 
-def test_summary_names_what_is_beyond():
+def test_summary_names_exceeded_bounds():
     assert deviation_summary([WITHIN, WITHIN]) == "2 checks, all within their bounds"
     assert deviation_summary([WITHIN, BEYOND]) == "2 checks, 1 beyond their bounds: canopy: reciprocity"
 
@@ -102,12 +102,12 @@ def test_every_stage_has_one_heading():
     assert lines[1:3] == [deviation_line(BEYOND), deviation_line(WITHIN)] and lines[4:] == [deviation_line(sensor)]
 
 
-def test_what_is_not_a_number_is_beyond_its_bound():
+def test_nan_exceeds_every_bound():
     assert np.isnan(largest([1.0, np.nan], 1.0))
     assert not Deviation("canopy", "anything", np.nan, 1.0, "1", "theory").within
     assert Deviation("canopy", "anything", 1.0, 1.0, "1", "theory").within
 
 
-def test_deviations_are_the_largest_and_the_mean():
+def test_largest_and_rms_deviation():
     assert largest([1.0, 4.0], [2.0, 2.0]) == 2.0 and largest([1.0, 4.0], [2.0, 4.0], relative=True) == 0.5
     assert rms_percent([1.03, 0.96], 1.0) == pytest.approx(np.sqrt((9 + 16) / 2), rel=1e-12)

@@ -1,4 +1,4 @@
-"""Checks of the atmosphere notice what is wrong, and say where."""
+"""Checks of the atmosphere detect and name errors."""
 
 from functools import partial
 from pathlib import Path
@@ -19,8 +19,8 @@ DATA = Path(__file__).parents[2] / "data"
 
 
 @pytest.mark.slow
-def test_successive_orders_without_polarization_are_scalar_6s(monkeypatch):
-    """Scalar 6S is not always consistent in itself: its table has fewer cases."""
+def test_successive_orders_without_polarization_agree_with_scalar_6s(monkeypatch):
+    """Scalar 6S is not always self-consistent, so its table has fewer cases."""
     scalar, table = pd.read_csv(DATA / "sixs_scalar.csv", comment="#"), files.table
     monkeypatch.setitem(engines.SCATTERING, "successive-orders", partial(mixed_scattering, polarized=False))
     monkeypatch.setattr(engines, "_band_terms", engines._band_terms.__wrapped__)
@@ -29,8 +29,8 @@ def test_successive_orders_without_polarization_are_scalar_6s(monkeypatch):
     assert exceeded(atmosphere._successive_orders) == []
 
 
-def test_a_tighter_bound_is_exceeded(monkeypatch):
-    """The closed forms of 5S do not reach a hundredth of a percent."""
+def test_tighter_bound_is_exceeded(monkeypatch):
+    """The closed forms of 5S are less accurate than 0.01 %."""
     monkeypatch.setattr(areas, "AREAS", {"atmosphere": (atmosphere._five_s_at_fife,)})
     monkeypatch.setattr(atmosphere, "_FIFE_BOUNDS", (0.007, 0.004, 1e-5, 0.002, 0.001, 0.001))
     result = CliRunner().invoke(app, ["verify"])
@@ -42,14 +42,14 @@ def test_a_tighter_bound_is_exceeded(monkeypatch):
     "name, what",
     [("corrected_reflectance", "reflectance there and back"), ("target_reflectance", "target there and back")],
 )
-def test_a_way_back_that_leads_elsewhere_is_noticed(monkeypatch, name, what):
+def test_inexact_inverse_is_detected(monkeypatch, name, what):
     right = getattr(atmosphere, name)
     monkeypatch.setattr(atmosphere, name, lambda *given, **terms: right(*given, **terms) + 1e-9)
     assert exceeded(atmosphere._there_and_back) == [what]
 
 
-def test_a_sunbeam_of_another_depth_is_noticed(monkeypatch):
-    """In the mixed atmosphere the beam falls off with the depths of molecules and aerosol together."""
+def test_wrong_optical_depth_of_the_direct_beam_is_detected(monkeypatch):
+    """In the mixed atmosphere the beam is attenuated by molecules and aerosol together."""
     right = atmosphere.scattering
 
     def wrong(air, wavelength, *angles):
@@ -62,7 +62,7 @@ def test_a_sunbeam_of_another_depth_is_noticed(monkeypatch):
 
 
 @pytest.mark.parametrize("wrong", [-1.0, 1.001, np.nan])
-def test_a_wrong_kernel_of_the_tables_is_noticed(monkeypatch, wrong):
+def test_wrong_kernel_of_the_tables_is_detected(monkeypatch, wrong):
     right = lookup._through
 
     def through(*given):

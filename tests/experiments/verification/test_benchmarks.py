@@ -1,4 +1,4 @@
-"""Benchmarks of others hold, and what breaks one of them is named."""
+"""Published benchmarks are met, and a changed reference is named."""
 
 import re
 from pathlib import Path
@@ -15,7 +15,7 @@ from fifesim.cli import app
 from fifesim.experiments.verification import areas, benchmarks, canopy
 
 
-def test_every_view_of_the_references_is_compared():
+def test_all_views_of_the_references_are_compared():
     assert sum(len(benchmarks.iprt(case)[0]) for case in ("A1a", "A1b", "A1c", "A2", "A3", "B1")) == 295
     table, found, converged = benchmarks.molecules()
     assert found.shape == converged.shape == (3, len(table)) == (3, 252)
@@ -33,7 +33,7 @@ def test_every_view_of_the_references_is_compared():
         (benchmarks._canopy, "rami4atm", "reflectance", -1, 1.1, "HOM45, toward the sun, 65 to 75 degrees"),
     ],
 )
-def test_a_reference_changed_in_one_place_is_named(monkeypatch, check, name, column, row, factor, said):
+def test_reference_changed_in_one_place_is_named(monkeypatch, check, name, column, row, factor, said):
     right = files.table
 
     def wrong(path):
@@ -50,7 +50,7 @@ def test_a_reference_changed_in_one_place_is_named(monkeypatch, check, name, col
     assert said in result.stdout.splitlines()[-1]
 
 
-def test_another_depolarization_is_noticed(monkeypatch):
+def test_other_depolarization_is_detected(monkeypatch):
     right, own = successive_orders.mixed_column, {"depolarization": gases.DEPOLARIZATION}
     monkeypatch.setattr(successive_orders, "mixed_column", lambda *given, **options: right(*given, **options | own))
     assert "IPRT A1c, Q and U" in exceeded(benchmarks._iprt)
@@ -62,7 +62,7 @@ def test_matrix_of_spheres_needs_its_diagonal(monkeypatch):
     assert exceeded(benchmarks._iprt) == ["IPRT A3, Q and U"]
 
 
-def test_wrong_canopy_is_noticed(monkeypatch):
+def test_wrong_canopy_is_detected(monkeypatch):
     right = benchmarks.sail
     monkeypatch.setattr(benchmarks, "sail", lambda *given, **o: right(*given, **{**o, "hotspot": o["hotspot"] / 2}))
     assert "HOM45, from -30 to 60 degrees" in exceeded(benchmarks._canopy)
@@ -70,13 +70,13 @@ def test_wrong_canopy_is_noticed(monkeypatch):
 
 
 def test_flat_discs_without_size_have_no_hot_spot():
-    """Beer's law both ways, and straight back the leaves seen are those lit."""
+    """Beer's law along both directions; in exact backscatter, all visible leaves are sunlit."""
     far, back = benchmarks.flat_discs(1e-6, 2.0, [0.0, 30.0])
     assert far == pytest.approx((1 - np.exp(-4.0)) / 2, rel=1e-3)
     assert back == pytest.approx(1 - np.exp(-2.0), rel=1e-6)
 
 
-def test_errors_of_crowns_are_those_of_the_page():
+def test_errors_of_crowns_match_the_physics_page():
     page = (Path(__file__).parents[3] / "docs" / "physics.md").read_text(encoding="utf-8")
     row = r"^\| (HET0\d).* \| ([\d.]+)(?:, .+)? \| (.+) % \| (.+) % \| (.+) % \|$"
     rows = re.findall(row, page, re.MULTILINE)

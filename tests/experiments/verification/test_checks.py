@@ -1,4 +1,4 @@
-"""Checks pass, and see the kernels that production calls."""
+"""Checks pass, and detect changes of the kernels used in production."""
 
 import string
 from importlib import import_module
@@ -20,17 +20,17 @@ from fifesim.experiments.verification import (
 TABLE = Path(__file__).parents[2] / "data" / "broken_kernels.csv"
 BROKEN = pd.read_csv(TABLE, comment="#", keep_default_na=False, dtype=str)
 
-# Many cases of successive orders, whose engine has tests of its own.
+# Checks with many cases of successive orders, which have separate tests.
 SLOW = (atmosphere._light, atmosphere._successive_orders, canopy._foliage_tables)
 
 
 @pytest.mark.parametrize("check", [check for checks in areas.AREAS.values() for check in checks if check not in SLOW])
-def test_all_is_well(check):
+def test_check_passes(check):
     assert exceeded(check) == []
 
 
 def found(path):
-    """Module, class or function by its path."""
+    """Module, class or function at a dotted path."""
     module, _, name = path.rpartition(".")
     return getattr(import_module(module), name) if name[0] in string.ascii_uppercase + "_" else import_module(path)
 
@@ -42,7 +42,7 @@ def test_production_kernels_are_checked(monkeypatch, owner, kernel, factor, chec
         assert notices(check, monkeypatch, owner, kernel)
         return
     right, factors = getattr(owner, kernel), np.array(factor.split(), float)
-    # The plane of scattering is turned in one of two places: in what is scattered once.
+    # The rotation of the scattering plane has two places; only single scattering is changed here.
     factors = factors[:, None, None] if kernel == "_rotation" else factors
 
     def wrong(*given, **options):
@@ -54,7 +54,7 @@ def test_production_kernels_are_checked(monkeypatch, owner, kernel, factor, chec
 
 
 @pytest.mark.parametrize("turned", [(1, 0), (0, 2), (2, -2)])
-def test_turned_wigner_functions_are_noticed(monkeypatch, turned):
+def test_wigner_functions_of_the_wrong_sign_are_detected(monkeypatch, turned):
     right = column.wigner
 
     def wigner(order, spin, cosine, count):
@@ -64,8 +64,8 @@ def test_turned_wigner_functions_are_noticed(monkeypatch, turned):
     assert "Wigner functions" in exceeded(scattering._wigner_functions)
 
 
-def test_surroundings_elsewhere_are_noticed(monkeypatch):
-    """By one block."""
+def test_displaced_surroundings_are_detected(monkeypatch):
+    """The surroundings are displaced by one block."""
     right = adjacency.block_environment
 
     def shifted(sums, surroundings, spread):
@@ -75,7 +75,7 @@ def test_surroundings_elsewhere_are_noticed(monkeypatch):
     assert exceeded(scattering._part_of_a_scene) == ["environment of a part of a scene"]
 
 
-def test_a_turned_sum_over_blocks_is_noticed(monkeypatch):
+def test_sum_over_blocks_of_the_wrong_sign_is_detected(monkeypatch):
     right = adjacency._add_moments
     monkeypatch.setattr(adjacency, "_add_moments", lambda values, *given: right(-values, *given))
     assert exceeded(scattering._direct_sums) == ["environment of cells"]
