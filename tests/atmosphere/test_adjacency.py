@@ -1,4 +1,4 @@
-"""Blocks of cells, the environment function, and the environment on blocks."""
+"""Block sums, the environment function, and the environment reflectance on blocks."""
 
 from pathlib import Path
 
@@ -32,7 +32,7 @@ def values():
 
 
 def summed(values, along_y, along_x, linear):
-    """Sums of whole blocks, from the sums of all pieces at once."""
+    """Sums over whole blocks, with all sub-blocks computed at once."""
     rows, columns = (slice(0, along.start.size) for along in (along_y, along_x))
     sums = block_sums(rows, columns, values, along_y=along_y, along_x=along_x, linear=linear)
     return whole_blocks(sums, along_y, along_x)
@@ -51,8 +51,8 @@ def test_blocks_are_counted_from_the_origin():
     assert blocks_along(7, 200.0, 10).cells == 1
 
 
-def test_sums_are_those_of_the_cells_of_each_block(values):
-    """Whole numbers of 2 to the -52."""
+def test_block_sums_equal_the_sums_over_cells(values):
+    """Sums are integers in units of 2^-52."""
     found = summed(values, whole(Y), whole(X), False)
     assert found.shape == (2, 2, 1, 1, 6, 6)
     for band, (i, rows), (j, columns) in (
@@ -66,19 +66,19 @@ def test_sums_are_those_of_the_cells_of_each_block(values):
         np.testing.assert_allclose(found[band, :, 0, 0, i, j], expected, rtol=0, atol=1e-14)
 
 
-def test_weights_between_blocks_share_each_cell_out(values):
+def test_interpolation_weights_partition_each_cell(values):
     plain, linear = (summed(values, whole(Y), whole(X), flag) for flag in (False, True))
     assert linear.shape == (2, 2, 3, 3, 6, 6)
     np.testing.assert_allclose(linear.sum(axis=(2, 3)), plain[:, :, 0, 0], rtol=0, atol=1e-14)
     np.testing.assert_allclose(Y.interpolation_weights.sum(axis=1), 1)
-    # Mean place of a cell that is shared out so is its own.
+    # The weighted mean position equals the position of the cell.
     place = (np.arange(4) + 0.5) / 4 - 0.5
     np.testing.assert_allclose(Y.interpolation_weights @ [-1, 0, 1], place, atol=1e-15)
 
 
 @pytest.mark.parametrize("cuts", [((21,), (5, 11)), ((1, 1, 19), (16,)), ((2, 3, 7, 9), (4, 4, 4, 4))])
 @pytest.mark.parametrize("linear", [False, True])
-def test_cuts_give_the_same_bits(values, cuts, linear):
+def test_chunking_gives_bitwise_equal_sums(values, cuts, linear):
     (along_y, row_counts), (along_x, column_counts) = (axis.pieces(cut) for axis, cut in zip((Y, X), cuts, strict=True))
     parts = np.empty((2, 2, *(3, 3) * linear, *(1, 1) * (not linear), along_y.start.size, along_x.start.size), np.int64)
     row = 0
@@ -98,20 +98,20 @@ def test_cuts_give_the_same_bits(values, cuts, linear):
     np.testing.assert_array_equal(whole_blocks(parts, along_y, along_x), summed(values, whole(Y), whole(X), linear))
 
 
-def test_values_beyond_a_thousand_count_as_that():
-    """A sum that overflowed would be any number."""
+def test_values_are_clipped_at_minus_1000():
+    """Clipping keeps the integer sums from overflowing."""
     sums = summed(np.full((1, 21, 16), -1e30), whole(Y), whole(X), False)
     np.testing.assert_allclose(sums[0, 0, 0, 0] / sums[0, 1, 0, 0], -1000, rtol=1e-12)
 
 
-def test_single_precision_is_summed_as_it_is(values):
+def test_single_precision_is_summed_without_loss(values):
     narrow = values.astype(np.float32)
     np.testing.assert_array_equal(
         summed(narrow, whole(Y), whole(X), True), summed(narrow.astype(float), whole(Y), whole(X), True)
     )
 
 
-def test_cells_between_blocks_lie_on_the_plane_through_them():
+def test_interpolation_from_blocks_to_cells_reproduces_a_plane():
     i, j = np.mgrid[-1 : Y.count + 1, -1 : X.count + 1]
     along = Y.interpolation, X.interpolation
     rows, columns = slice(2, 19), slice(1, 16)
@@ -143,37 +143,34 @@ def sixs_mixed():
     return mixed_environment_function(1000 * SIXS["radius"], SIXS["vza"], *up)
 
 
-# Printed by 6SV1.1 at nadir: radius [km], molecules, aerosol.
-
-
-def test_environment_function_is_that_of_6s_at_other_angles():
-    """Single precision, and seven digits printed."""
+def test_environment_function_agrees_with_6s_off_nadir():
+    """6S computes in single precision and prints seven digits."""
     molecules, aerosol = environment_function(1000 * SIXS["radius"], SIXS["vza"])
     np.testing.assert_allclose(molecules, SIXS["environment_function_molecules"], rtol=0, atol=2e-7)
     np.testing.assert_allclose(aerosol, SIXS["environment_function_aerosol"], rtol=0, atol=2e-7)
 
 
 def test_mixed_environment_function_agrees_with_6s():
-    """The rows hold means over the band of the transmittances that 6S mixes with: 1.2e-3 at most in 244 cases."""
+    """The table holds band means of the transmittances that weight the mixture: at most 1.2e-3 off in 244 cases."""
     np.testing.assert_allclose(sixs_mixed(), SIXS["environment_function"], rtol=0, atol=1.5e-3)
 
 
 def test_apparent_reflectance_of_a_target_agrees_with_6s():
-    """Means over the band for the sum over wavelengths: 2.1e-4 at most in 244 cases. The effect itself reaches 0.11."""
+    """Band means replace the sum over wavelengths: at most 2.1e-4 off in 244 cases, for an effect of up to 0.11."""
     share = sixs_mixed()
     around = share * SIXS["target_reflectance"] + (1 - share) * SIXS["environment_reflectance"]
     toa = inhomogeneous_reflectance(SIXS["target_reflectance"], around, sixs_terms())
     np.testing.assert_allclose(toa, SIXS["toa_reflectance"], rtol=0, atol=3e-4)
 
 
-def test_where_nothing_scatters_the_target_is_its_own_environment():
+def test_without_scattering_the_environment_is_the_target():
     assert environment_weights(0.0, 0.0) == (0.0, 0.0)
     assert mixed_environment_function(10.0, 0.0, 0.0, 0.0) == 1.0
     np.testing.assert_array_equal(point_spread((2, 2), (60, 60), 0.0, 0.0, 0.0), [[1, 0], [0, 0]])
 
 
 def density(distance, vza):
-    """Of the aerosol, by central differences of its environment function. [m-2]"""
+    """Point spread of the aerosol by central differences of its environment function. [m-2]"""
     step = 1e-3 * distance
     low, high = (environment_function(distance + sign * step, vza)[1] for sign in (-1, 1))
     return float(high - low) / (2 * step) / (2 * np.pi * distance)
@@ -182,7 +179,7 @@ def density(distance, vza):
 @pytest.mark.parametrize("vza", [0.0, 40.0])
 @pytest.mark.parametrize("row, column", [(0, 1), (3, 2), (9, 0), (12, 30)])
 def test_weight_of_a_cell_is_the_integral_of_the_density(row, column, vza):
-    """The difference quotient is good to 1e-6; cells beyond the eighth have the coarser rule."""
+    """The difference quotient is accurate to 1e-6; from the ninth cell on, the quadrature is coarser."""
     down, across = 60.0, 75.0
     weight = point_spread((13, 31), (down, across), vza, 0.0, 1.0)[row, column]
     limits = [(column - 0.5) * across, (column + 0.5) * across, (row - 0.5) * down, (row + 0.5) * down]
@@ -190,8 +187,8 @@ def test_weight_of_a_cell_is_the_integral_of_the_density(row, column, vza):
     assert weight == pytest.approx(brute, rel=1e-5)
 
 
-def test_weight_of_the_target_itself_is_the_mean_of_its_edge():
-    """Around the centre, by angle: the share within the distance of the cell's edge."""
+def test_weight_of_the_target_cell_is_the_mean_over_its_edge():
+    """Mean over azimuth of the environment function at the distance of the cell's edge."""
     down, across = 60.0, 75.0
 
     def edge(angle):
@@ -204,7 +201,7 @@ def test_weight_of_the_target_itself_is_the_mean_of_its_edge():
 
 
 def test_weights_of_the_plane_sum_to_one():
-    """All but what lies beyond 400 km: a molecule's share of e^-32."""
+    """Weights beyond 400 km are missing: e^-32 for molecules."""
     weights = point_spread((400, 400), (1000.0, 1000.0), 0.0, 1.0, 0.0)
     whole = 4 * weights.sum() - 2 * weights[0].sum() - 2 * weights[:, 0].sum() + weights[0, 0]
     assert whole == pytest.approx(1.0, abs=1e-8)
@@ -214,7 +211,7 @@ def test_weights_of_the_plane_sum_to_one():
 # ------------------------------------------------------------------------------------------ environment on blocks
 
 
-# Cells as large as blocks: what is between blocks is not asked for.
+# Blocks of one cell need no interpolation.
 ROWS, COLUMNS = Blocks(1, 0, 9), Blocks(1, 0, 12)
 CELL, VZA, WEIGHTS = (60.0, 80.0), 30.0, (0.3, 0.6)
 
@@ -223,8 +220,8 @@ def spread(margin=(1, 1)):
     return spread_over(ROWS, COLUMNS, CELL, margin, VZA, *WEIGHTS)
 
 
-def test_one_bright_block_is_seen_by_the_point_spread():
-    """Also from the ring around the scene, and not around the back of the Fourier transform."""
+def test_one_bright_block_gives_the_point_spread():
+    """Also on the ring around the scene, and without wrap-around of the Fourier transform."""
     field = np.zeros((11, 14))
     field[1 + 2, 1 + 3] = 1.0
     expected = point_spread((9, 12), CELL, VZA, *WEIGHTS)

@@ -31,14 +31,14 @@ NAMES = (
 
 
 def make_terms(*bands):
-    """Of these names; adjacency asks for no others."""
+    """Band terms with the values in `NAMES`, and NaN for the terms that adjacency does not use."""
     unknown = dict.fromkeys(BandTerms._fields, np.full(len(bands), np.nan))
     return BandTerms(**unknown | dict(zip(NAMES, np.array(bands).T, strict=True)))
 
 
-# Like TM1 and TM3 through a visibility of 10 km.
+# Similar to TM1 and TM3 at a visibility of 10 km.
 HAZE = make_terms((0.09, 0.8, 0.83, 0.52, 0.07, 0.29, 0.19, 0.98), (0.04, 0.85, 0.88, 0.62, 0.02, 0.26, 0.12, 0.93))
-# A slanted view in which more light comes from the environment than from the target.
+# Slant view that receives more light from the environment than from the target.
 SLANTED = make_terms((0.3, 0.6, 0.7, 0.1, 0.1, 0.5, 0.2, 0.9), (0.3, 0.6, 0.7, 0.2, 0.1, 0.4, 0.2, 0.9))
 
 
@@ -52,7 +52,7 @@ def raster(values, cell, west=700_000.0, north=4_330_000.0):
 
 @pytest.fixture
 def scene():
-    """Two bands of 47 x 62 cells of 20 m, three to a block, beginning within a block, with holes in one."""
+    """Two bands of 47 x 62 cells of 20 m, 3 x 3 cells per block, starting within a block, with gaps in one band."""
     values = np.random.default_rng(3).random((2, 47, 62)) * 0.5
     values[0, 10:21, 30:47] = np.nan
     values[0, 0, 3] = np.nan
@@ -64,7 +64,7 @@ def environment(array, surroundings=None, vza=0.0):
 
 
 def surroundings_of(array):
-    """A raster of 150 m cells far beyond the scene on two sides and a little on the others, with a hole."""
+    """Raster of 150 m cells, far beyond the scene on two sides and slightly on the others, with a gap."""
     values = np.random.default_rng(4).random((30, 25)) * 0.4
     values[:4, :4] = np.nan
     place = array.odc.geobox.boundingbox
@@ -81,17 +81,17 @@ def test_uniform_ground_is_its_own_environment(scene, kind, vza):
 
 @pytest.mark.parametrize("vza", [0.0, 40.0])
 @pytest.mark.parametrize("radius", [120.0, 300.0, 1000.0, 3500.0])
-def test_middle_of_a_disc_has_the_environment_function(radius, vza):
+def test_centre_of_a_disc_gives_the_environment_function(radius, vza):
     """
-    Coverage is right by block, and the ground is spread over its block.
+    Each block has the correct mean, but its ground is spread over the block of width w.
 
-    That moves a point by w^2 / 6 along each axis in the mean square, and changes the share by w^2 / 12 (F'' - F' / r)
-    to second order, where the size of F'' is at most F' / r.
+    This displaces a point by w^2 / 6 along each axis (mean square). To second order the share changes by
+    w^2 / 12 (F'' - F' / r), where the magnitude of F'' is at most F' / r.
     """
     size, cell = 3 * 141, 20.0
     centre = (np.arange(size) + 0.5) * cell - size * cell / 2
     inside = np.hypot(centre[:, None], centre) < radius
-    # 699 960 and 4 330 020 are whole numbers of 60 m.
+    # 699 960 m and 4 330 020 m are multiples of 60 m.
     disc = raster(np.where(inside, 0.5, 0.1)[None], cell, west=699_960.0, north=4_330_020.0)
     around = adjacency_raster.environment(disc, 0.3, 0.7, vza, surroundings=0.1)[0]
     share = (float(around[size // 2, size // 2]) - 0.1) / 0.4
@@ -101,7 +101,7 @@ def test_middle_of_a_disc_has_the_environment_function(radius, vza):
 
 
 def brute_force(array, number, weights, vza):
-    """Environment of one band, summed over blocks and cells one by one."""
+    """Environment of one band by explicit loops over blocks and cells."""
     (down, across), (row, column) = grids.cell_size(array.odc.geobox), grids.lattice_position(array.odc.geobox)
     values = array.values
     sums, missing, blocks = {}, {}, []
@@ -123,8 +123,8 @@ def brute_force(array, number, weights, vza):
 
 
 @pytest.mark.parametrize("number", [None, 0.2])
-def test_environment_is_the_direct_sum(scene, number):
-    """Fourier transforms of numbers below 1, in double precision."""
+def test_environment_equals_the_direct_sum(scene, number):
+    """1e-12: Fourier transforms of numbers below 1 in double precision."""
     result = environment(scene, number, 30.0)
     for band, weights in enumerate([(0.3, 0.7), (0.2, 0.8)]):
         far = float(scene[band].mean()) if number is None else number
@@ -138,8 +138,8 @@ def test_scene_without_data_has_the_environment_of_its_surroundings(scene):
     assert environment(empty).isnull().all()
 
 
-def test_raster_of_surroundings_counts_at_its_place():
-    """The environment of a part of a scene, given the whole; and given it in cells as large as nine."""
+def test_raster_of_surroundings_is_georeferenced():
+    """Environment of a window, with the whole scene as surroundings, also in cells nine times as wide."""
     coarse = np.random.default_rng(5).random((40, 40)) * 0.5
     whole = raster(coarse.repeat(9, axis=0).repeat(9, axis=1)[None], 20.0, west=699_960.0, north=4_330_020.0)
     far = float(whole.mean())
@@ -149,7 +149,7 @@ def test_raster_of_surroundings_counts_at_its_place():
     assert np.abs(environment_of_one(scene, far) - expected).max() > 0.01
     for surroundings in (whole, whole[0], raster(coarse, 180.0, west=699_960.0, north=4_330_020.0)):
         found = environment_of_one(scene, surroundings)
-        # The scene ends within blocks: what is missing of these comes from the surroundings' mean over the block.
+        # The scene ends within blocks: the rest of these blocks comes from the block mean of the surroundings.
         inner = {"y": slice(3, -3), "x": slice(3, -3)}
         np.testing.assert_allclose(found.isel(inner), expected.isel(inner), rtol=0, atol=0.004)
     whole_blocks = {"y": slice(96, 180), "x": slice(51, 162)}
@@ -164,8 +164,8 @@ def environment_of_one(array, surroundings):
 
 @pytest.mark.parametrize("cell", [3.0, 30.0, 40.0, 90.0, (30.0, 80.0)])
 @pytest.mark.parametrize("terms", [HAZE, SLANTED], ids=["haze", "slanted"])
-def test_there_and_back_is_the_same(cell, terms):
-    """The environment is solved to 1e-12; a target is known by a tenth of its light."""
+def test_round_trip_is_exact(cell, terms):
+    """The environment is solved to 1e-12; as little as 0.1 of the light of a target arrives unscattered."""
     values = np.random.default_rng(7).random((2, 41, 53)) * 0.6
     values[0, 7:12, 3:30] = np.nan
     ground = raster(values, cell)
@@ -175,7 +175,7 @@ def test_there_and_back_is_the_same(cell, terms):
         np.testing.assert_allclose(back, ground, rtol=0, atol=1e-10)
 
 
-def test_no_direct_light_is_said(scene):
+def test_correction_without_direct_light_raises(scene):
     blind = HAZE._replace(direct_transmittance_up=np.array([1e-6, 1e-6]))
     with pytest.raises(RuntimeError, match="of the light of a target 1e-06 comes to the sensor unscattered"):
         adjacency_raster.corrected_reflectance_of_scene(scene, blind, 0.0)
@@ -190,7 +190,7 @@ def back(array, surroundings=None):
 
 
 @pytest.mark.parametrize("function", [environment, forth, back])
-def test_chunks_give_the_same_bits_and_nothing_early(scene, function):
+def test_chunks_give_bitwise_equal_results_lazily(scene, function):
     scene = scene.assign_coords(band=["TM1", "TM3"], sza=30.0)
     for around in (None, surroundings_of(scene)):
         before = scene.copy(deep=True)
@@ -213,13 +213,13 @@ def test_lazy_surroundings_make_the_result_lazy(scene):
     xr.testing.assert_identical(lazy.compute(), forth(scene, around))
 
 
-def test_missing_cells_stay_missing_and_no_others(scene):
+def test_only_missing_cells_are_missing_in_the_result(scene):
     np.testing.assert_array_equal(forth(scene).isnull(), scene.isnull())
     np.testing.assert_array_equal(back(forth(scene)).isnull(), scene.isnull())
 
 
 class _Held(Callback):
-    """Most of the bytes of results that were held at once."""
+    """Peak number of bytes of results held at once."""
 
     most = 0
 
@@ -233,9 +233,9 @@ class _Nowhere:
 
 
 @pytest.mark.parametrize("function", [forth, back])
-def test_cells_are_not_held_until_all_are_known(function):
+def test_results_are_streamed(function):
     """
-    Written as they come, cells take a few chunks of 64, and the sums over blocks of 400 cells 18 numbers a block.
+    Results that are written at once occupy a few of 64 chunks; sums need 18 numbers per block of 400 cells.
     """
     chunks = ((2,), (200,) * 8, (200,) * 8)
     made = da.map_blocks(lambda block_info=None: np.full((2, 200, 200), 0.3), chunks=chunks, dtype=float)
@@ -260,17 +260,17 @@ def test_cells_are_not_held_until_all_are_known(function):
         ),
     ],
 )
-def test_surroundings_that_do_not_fit_are_refused(scene, around, message):
+def test_invalid_surroundings_raise(scene, around, message):
     with pytest.raises(ValueError, match=message):
         environment(scene.assign_coords(band=["TM1", "TM3"]), around)
 
 
-def test_surroundings_of_another_crs_are_refused(scene):
+def test_surroundings_in_another_crs_raise(scene):
     with pytest.raises(ValueError, match=r"in the CRS of the scene, EPSG:26914, got EPSG:26915: reproject"):
         environment(scene, scene.rio.write_crs("EPSG:26915"))
 
 
-def test_surroundings_are_found_by_the_name_of_their_band(scene):
+def test_surroundings_are_matched_by_band_name(scene):
     scene = scene.assign_coords(band=["TM1", "TM3"])
     around = raster(np.stack([np.full((9, 9), value) for value in (0.5, 0.1, 0.3)]), 3000.0)
     named = around.assign_coords(band=["TM4", "TM3", "TM1"])

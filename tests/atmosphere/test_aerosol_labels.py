@@ -1,4 +1,4 @@
-"""Aerosols from Datasets and files, as several codes name what is in them."""
+"""Aerosols from Datasets and files, with the variable names of several codes."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ def tables():
 
 @pytest.fixture
 def totals():
-    """The continental model without its components, as Eradiate writes such."""
+    """Continental model, not split into components, in the format of Eradiate."""
     wavelength, angle = np.array([0.44, 0.55, 0.67, 0.87, 1.02]), np.linspace(0, 180, 721)
     mu = np.cos(np.radians(angle[::-1]))
     extinction, albedo, _ = aerosols.aerosol_optics("continental", wavelength)
@@ -38,7 +38,7 @@ def totals():
 
 
 def optics(aerosol, wavelength=0.6, cosine=-0.4):
-    """What is asked of an aerosol."""
+    """Extinction, albedo, asymmetry, phase function and polarization of an aerosol."""
     at = aerosol, cosine, wavelength
     return [
         *aerosols.aerosol_optics(aerosol, wavelength),
@@ -48,13 +48,13 @@ def optics(aerosol, wavelength=0.6, cosine=-0.4):
 
 
 @pytest.mark.parametrize(("unit", "micrometre"), [("m", 1e-6), ("um", 1.0), ("micrometre", 1.0), ("nanometer", 1e3)])
-def test_wavelengths_may_be_in_other_units(totals, unit, micrometre):
+def test_wavelength_units_are_converted(totals, unit, micrometre):
     other = totals.assign_coords(w=("w", totals["w"].values / 1000 * micrometre, {"units": unit}))
     np.testing.assert_allclose(read_aerosol(other).wavelength, [0.44, 0.55, 0.67, 0.87, 1.02], rtol=1e-12)
 
 
-def test_tables_of_the_continental_model_give_what_it_gives(tables):
-    """By components that meet at angles between those of the tables, in all TM bands and at a wavelength."""
+def test_tables_of_the_continental_model_reproduce_the_model(tables):
+    """Band terms of all TM bands and scattering at one wavelength."""
     mine = read_aerosol(tables)
     airs = fifesim.Atmosphere(aerosol=mine, aot=0.3), fifesim.Atmosphere(aot=0.3)
     np.testing.assert_allclose(*(band_terms(air, TM, 50.0, 20.0, 40.0) for air in airs), rtol=1e-10)
@@ -64,7 +64,7 @@ def test_tables_of_the_continental_model_give_what_it_gives(tables):
         np.testing.assert_allclose(found, expected, rtol=1e-10)
 
 
-def test_tables_survive_files(tables, tmp_path):
+def test_tables_round_trip_through_files(tables, tmp_path):
     tables.to_netcdf(tmp_path / "mine.nc")
     tables.to_dataframe().to_csv(tmp_path / "mine.csv")
     for name in ("mine.nc", "mine.csv"):
@@ -73,16 +73,16 @@ def test_tables_survive_files(tables, tmp_path):
         np.testing.assert_allclose(optics(mine), optics("continental"), rtol=1e-12)
 
 
-def test_matrix_as_eradiate_has_it(totals):
-    """Cosines, nanometres, per steradian; what components do between wavelengths is lost: 4e-3."""
+def test_eradiate_phase_matrix(totals):
+    """Input in cosines, nm and sr-1. Between wavelengths 4e-3, since the components are not interpolated separately."""
     mine = read_aerosol(totals)
     np.testing.assert_allclose(optics(mine, 0.67), optics("continental", 0.67), rtol=2e-4)
     np.testing.assert_allclose(optics(mine, 0.6), optics("continental", 0.6), rtol=4e-3)
     assert aerosols.wavelength_limits(read_aerosol(totals)) == pytest.approx((0.44, 1.02))
 
 
-def test_moments_as_libradtran_has_them(totals):
-    """Without wavelengths of their own they hold at all. Those of Henyey and Greenstein are powers."""
+def test_libradtran_moments(totals):
+    """Moments without a wavelength axis apply to all wavelengths. Henyey-Greenstein moments are powers of g."""
     moments = 0.6 ** np.arange(60)
     given = totals.drop_vars(["phase", "mu"]).rename(sigma_t="ext", albedo="ssa").assign(pmom=("nmom", moments))
     mine, cosine = read_aerosol(given), np.array([-0.9, 0.0, 0.9])
@@ -93,8 +93,8 @@ def test_moments_as_libradtran_has_them(totals):
         read_aerosol(given.assign(pmom=("nmom", 2 * moments)))
 
 
-def test_one_row_of_aeronet(totals, tmp_path):
-    """Sites, dates and quantities that are not needed do not matter."""
+def test_aeronet_row(totals, tmp_path):
+    """Other columns, such as site and date, are ignored."""
     row = {"Site": "FIFE", "Sphericity_Factor(%)": 99.0, "Absorption_AOD[440nm]": 0.1}
     angle = np.degrees(np.arccos(totals["mu"].values))
     for k, nm in enumerate((440, 550, 670, 870, 1020)):
@@ -110,7 +110,7 @@ def test_one_row_of_aeronet(totals, tmp_path):
         read_aerosol(tmp_path / "two.csv")
 
 
-def test_where_it_floats_is_an_argument_or_an_attribute(tables):
+def test_vertical_distribution_is_an_argument_or_an_attribute(tables):
     assert read_aerosol(tables).vertical == 2.0
     assert read_aerosol(tables.assign_attrs(scale_height=3.0)).vertical == 3.0
     assert read_aerosol(tables.assign_attrs(bottom=1.0, top=2.5)).vertical == (1.0, 2.5)
@@ -118,8 +118,8 @@ def test_where_it_floats_is_an_argument_or_an_attribute(tables):
     assert read_aerosol(tables, layer=(3, 5)).vertical == (3.0, 5.0)
 
 
-def test_aerosol_aloft_hides_molecules_from_successive_orders_and_5s_does_not_know(tables):
-    """Absorbing particles above the molecules take their light twice."""
+def test_aerosol_height_affects_successive_orders_but_not_5s(tables):
+    """Absorbing particles above the molecules attenuate the Rayleigh reflectance on both paths."""
     dark = tables.assign(single_scattering_albedo=0 * tables["single_scattering_albedo"] + 0.2)
     at = np.array([0.66]), 40.0, np.zeros(1), np.zeros(1)
     path = {}
@@ -132,7 +132,7 @@ def test_aerosol_aloft_hides_molecules_from_successive_orders_and_5s_does_not_kn
     assert above < 0.8 * below
 
 
-def test_bands_beyond_the_tables_are_refused(totals):
+def test_bands_outside_the_tables_raise(totals):
     air = fifesim.Atmosphere(aerosol=read_aerosol(totals), aot=0.2)
     assert np.isfinite(band_terms(air, TM[2:4], 30.0, 0.0, 0.0)).all()
     with pytest.raises(ValueError, match=r"band TM5 must lie within .* 0.44 to 1.02 um, got 1.501 to 1.889 um: add"):
@@ -141,7 +141,7 @@ def test_bands_beyond_the_tables_are_refused(totals):
         fifesim.atmosphere.spectrum(air)
 
 
-def test_what_cannot_be_read_is_refused(totals, tables, tmp_path):
+def test_unreadable_aerosol_raises(totals, tables, tmp_path):
     for wrong, message in (
         (totals.drop_vars("albedo"), "there must be wavelength, extinction, single_scattering_albedo"),
         (totals.drop_vars("phase"), "one of phase and moments, got"),
@@ -164,8 +164,8 @@ def test_what_cannot_be_read_is_refused(totals, tables, tmp_path):
             read_aerosol(tmp_path / "bad.csv")
 
 
-def test_reflectance_carries_an_aerosol_through_the_chain(tables):
-    """By cell, too, where the terms come from a lattice and what is scattered once is added."""
+def test_user_aerosol_passes_through_the_chain(tables):
+    """Also with elevation by cell, where a lookup table is interpolated and single scattering is added."""
     lai = fifesim.lai_scene(fifesim.fife_site(30, window=((0, 4), (0, 5))), arp=0.1, seed=1)
     air = fifesim.Atmosphere(aerosol=read_aerosol(tables), aot=0.3)
     rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], atmosphere=air)

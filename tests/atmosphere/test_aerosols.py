@@ -1,4 +1,4 @@
-"""Optics of aerosols beside 6S and Mie theory, and tables of one's own."""
+"""Aerosol optics compared with 6S and Mie theory, and user-defined aerosol tables."""
 
 import pickle
 from dataclasses import replace
@@ -28,7 +28,7 @@ MOMENTS = pd.read_csv(DATA / "mie_moments.csv", comment="#")
 WAVELENGTH = np.array([0.35, 0.4, 0.4777, 0.55, 0.86, 1.0, 1.65, 2.25, 3.0, 3.75])
 
 
-def of_6s(table, name):
+def rows_of_6s(table, name):
     rows = table[table["aerosol"] == name]
     assert len(rows) > 3
     return rows
@@ -36,8 +36,12 @@ def of_6s(table, name):
 
 @pytest.mark.parametrize("name", ["continental", "urban", "dust", "water_soluble", "soot"])
 def test_optics_agree_with_6s(name):
-    """The same micro-physics, two Mie codes: 0.1 %; asymmetry .002, in dust .02, as 6S takes it from 83 angles."""
-    rows = of_6s(OPTICS, name)
+    """
+    Same microphysics, two Mie codes: 0.1 %.
+
+    The asymmetry parameter agrees to 0.002, for dust to 0.02, since 6S integrates it over 83 angles.
+    """
+    rows = rows_of_6s(OPTICS, name)
     aerosol = name if name in MODELS else f"{name}:1"
     extinction, albedo, asymmetry = aerosol_optics(aerosol, rows["wavelength"])
     np.testing.assert_allclose(extinction, rows["extinction"], rtol=1.1e-3)
@@ -47,8 +51,12 @@ def test_optics_agree_with_6s(name):
 
 @pytest.mark.parametrize("aerosol", ["maritime", "oceanic"])
 def test_sea_salt_agrees_with_6s(aerosol):
-    """1.2 %, asymmetry .01. From 1.54 to 2.25 um albedo is no check: the imaginary index was retrieved from it."""
-    rows = of_6s(OPTICS, aerosol)
+    """
+    1.2 %, asymmetry 0.01.
+
+    From 1.54 to 2.25 um the albedo is not an independent test: the imaginary index was retrieved from it.
+    """
+    rows = rows_of_6s(OPTICS, aerosol)
     extinction, albedo, asymmetry = aerosol_optics(aerosol if aerosol in MODELS else "oceanic:1", rows["wavelength"])
     np.testing.assert_allclose(extinction, rows["extinction"], rtol=0.012)
     np.testing.assert_allclose(albedo, rows["single_scattering_albedo"], rtol=0.01)
@@ -57,15 +65,15 @@ def test_sea_salt_agrees_with_6s(aerosol):
 
 @pytest.mark.parametrize("aerosol", ["continental", "urban"])
 def test_phase_function_agrees_with_6s(aerosol):
-    """1 %, of which most is straight back; it is .2 % rms."""
-    rows = of_6s(PHASE, aerosol)
+    """At most 1 %, mostly at exact backscatter; 0.2 % rms."""
+    rows = rows_of_6s(PHASE, aerosol)
     ratio = aerosol_phase(aerosol, rows["cosine"], rows["wavelength"]) / rows["phase"]
     np.testing.assert_allclose(ratio, 1, atol=0.01)
 
 
 def test_phase_function_of_sea_salt_agrees_with_6s_in_the_visible():
-    """5 % short of the glory, which turns on the third digit of the refractive index."""
-    rows = of_6s(PHASE, "maritime").query("wavelength < 1 and -0.95 < cosine < 0.95")
+    """5 % outside the glory, which is sensitive to the third digit of the refractive index."""
+    rows = rows_of_6s(PHASE, "maritime").query("wavelength < 1 and -0.95 < cosine < 0.95")
     assert len(rows) > 10
     ratio = aerosol_phase("maritime", rows["cosine"], rows["wavelength"]) / rows["phase"]
     np.testing.assert_allclose(ratio, 1, atol=0.05)
@@ -73,7 +81,7 @@ def test_phase_function_of_sea_salt_agrees_with_6s_in_the_visible():
 
 @pytest.mark.parametrize("aerosol", [*MODELS, *(f"{name}:1" for name in COMPONENTS)])
 def test_mean_of_the_phase_function_is_one(aerosol):
-    """At and between the tabulated wavelengths, by a quadrature of its own; 1e-4 for the kinks between angles."""
+    """At and between the tabulated wavelengths, by an independent quadrature; 1e-4 for the piecewise linear table."""
     edges = np.radians(np.concatenate([np.arange(0, 10, 0.05), np.arange(10, 180.1, 0.5)]))
     points, weights = np.polynomial.legendre.leggauss(3)
     angle = (edges[:-1, None] + np.diff(edges)[:, None] * (1 + points) / 2).ravel()
@@ -84,14 +92,14 @@ def test_mean_of_the_phase_function_is_one(aerosol):
 
 @pytest.mark.parametrize("aerosol", [*MODELS, *(f"{name}:1" for name in COMPONENTS)])
 def test_second_moment_is_the_asymmetry(aerosol):
-    """The one from the table by angle, the other from Mie's coefficients: 1e-4."""
+    """The moment comes from the table by angle, the asymmetry from Mie coefficients: 1e-4."""
     moments = phase_moments(aerosol, WAVELENGTH, 2)
     np.testing.assert_allclose(moments[:, 0], 1, rtol=1e-12)
     np.testing.assert_allclose(moments[:, 1], aerosol_optics(aerosol, WAVELENGTH)[2], atol=1e-4)
 
 
-def test_moments_are_those_of_mie_theory():
-    """Up to the 80th, 1e-3: dust at 0.35 um has a forward peak of half a degree."""
+def test_moments_agree_with_mie_theory():
+    """1e-3 up to the 80th moment: dust at 0.35 um has a forward peak of 0.5 degrees."""
     for (name, wavelength), rows in MOMENTS.groupby(["component", "wavelength"]):
         moments = phase_moments(f"{name}:1", wavelength, 81)[0]
         np.testing.assert_allclose(moments[rows["order"]], rows["moment"], atol=1e-3, err_msg=name)
@@ -99,9 +107,9 @@ def test_moments_are_those_of_mie_theory():
 
 def test_small_particles_polarize_like_molecules():
     """
-    Soot at 3.75 um is near Rayleigh's limit, (1 - cos2) / (1 + cos2).
+    Soot at 3.75 um is near the Rayleigh limit, (1 - cos2) / (1 + cos2).
 
-    The next order in the size is odd in the cosine and drops out of the mean of both sides: 1 % for what is left.
+    The next order in particle size is odd in the cosine and cancels in the mean of cos and -cos: 1 % remains.
     """
     cosine = np.linspace(0, 1, 21)
     both = (aerosol_polarization("soot:1", cosine, 3.75) + aerosol_polarization("soot:1", -cosine, 3.75)) / 2
@@ -116,7 +124,7 @@ def test_missing_wavelength_stays_missing():
 
 
 @pytest.mark.parametrize("wavelength", [0.3, 4.0, 550.0])
-def test_wavelength_outside_the_tables_is_refused(wavelength):
+def test_wavelength_outside_the_tables_raises(wavelength):
     calls = (
         lambda: aerosol_optics("urban", wavelength),
         lambda: aerosol_phase("urban", 0.0, [0.5, wavelength]),
@@ -128,7 +136,7 @@ def test_wavelength_outside_the_tables_is_refused(wavelength):
             call()
 
 
-# ------------------------------------------------------------------------------------------ tables of one's own
+# ------------------------------------------------------------------------------------------ user-defined tables
 
 
 ANGLE = np.linspace(0, 180, 361)
@@ -144,11 +152,11 @@ FORWARD = np.repeat(henyey_greenstein(0.6, np.cos(np.radians(ANGLE)))[:, None], 
 
 @pytest.fixture
 def haze():
-    """Extinction by a power of the wavelength."""
+    """Aerosol with a power-law extinction."""
     return Aerosol(TABULATED, TABULATED**-1.3, np.full(4, 0.9), ANGLE, FORWARD, name="haze")
 
 
-def test_extinction_goes_on_by_its_power_law_where_tables_end(haze):
+def test_extinction_is_extrapolated_by_its_power_law(haze):
     at = np.array([0.36, 0.44, 0.6, 1.02, 3.0])
     extinction, albedo, asymmetry = aerosols.aerosol_optics(haze, at)
     np.testing.assert_allclose(extinction, (at / 0.55) ** -1.3, rtol=1e-12)
@@ -156,8 +164,8 @@ def test_extinction_goes_on_by_its_power_law_where_tables_end(haze):
     np.testing.assert_allclose(asymmetry, 0.6, atol=1e-4)
 
 
-def test_phase_function_and_moments_are_those_of_the_formula(haze):
-    """The mean of a table every half degree is 1 within 1e-4."""
+def test_phase_function_and_moments_match_the_formula(haze):
+    """A table in steps of 0.5 degrees has a mean of 1 within 1e-4."""
     cosine = np.array([-1.0, -0.3, 0.5, 0.99])
     found = aerosols.aerosol_phase(haze, cosine, 0.7)
     np.testing.assert_allclose(found, henyey_greenstein(0.6, cosine), rtol=2e-4)
@@ -165,16 +173,16 @@ def test_phase_function_and_moments_are_those_of_the_formula(haze):
     assert not aerosols.aerosol_polarization(haze, cosine, 0.7).any()
 
 
-def test_phase_function_that_is_a_little_off_is_made_to_keep_energy():
-    """And by the same factor at all angles."""
+def test_slightly_wrong_phase_function_is_normalized():
+    """The factor is the same at all angles."""
     bright = Aerosol(TABULATED, TABULATED**-1.3, np.full(4, 0.9), ANGLE, 1.015 * FORWARD)
     assert aerosols.phase_moments(bright, 0.7, 1)[0, 0] == pytest.approx(1, rel=1e-12)
     found = aerosols.aerosol_phase(bright, np.array([-0.5, 0.5]), 0.44)
     np.testing.assert_allclose(found, henyey_greenstein(0.6, np.array([-0.5, 0.5])), rtol=2e-4)
 
 
-def test_components_add_up_by_what_they_scatter():
-    """Against the sums by hand at a tabulated wavelength."""
+def test_phase_functions_are_weighted_by_scattering():
+    """Compared with hand-computed sums at a tabulated wavelength."""
     extinction, albedo = np.array([[3.0, 1.0], [1.0, 1.0]]), np.array([[0.9, 0.9], [0.3, 0.3]])
     even, forward = np.ones((361, 2)), FORWARD[:, :2]
     two = Aerosol([0.5, 0.6], extinction, albedo, ANGLE, np.stack([even, forward]))
@@ -185,12 +193,12 @@ def test_components_add_up_by_what_they_scatter():
     assert aerosols.aerosol_phase(two, 0.5, 0.5) == pytest.approx(expected, rel=1e-4)
 
 
-def test_series_of_moments_is_the_phase_function():
+def test_series_of_moments_gives_the_phase_function():
     angle, phase = phase_of_moments(0.6 ** np.arange(60))
     np.testing.assert_allclose(phase, henyey_greenstein(0.6, np.cos(np.radians(angle))), rtol=1e-9)
 
 
-def test_equal_tables_are_equal_and_travel_by_their_text(haze):
+def test_equal_tables_compare_equal_and_survive_parsing_and_pickling(haze):
     air = Atmosphere(aerosol=haze, aot=0.3)
     assert Atmosphere.parse(air.text) == air == pickle.loads(pickle.dumps(air))
     assert known_aerosol(str(haze)) is haze
@@ -228,7 +236,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_cannot_be_is_refused(case):
+def test_impossible_table_raises(case):
     fine = {"wavelength": TABULATED, "extinction": TABULATED**-1.3, "single_scattering_albedo": np.full(4, 0.9)}
     wrong, message = WRONG[case]
     with pytest.raises(ValueError, match=f"aerosol mine: .*{message}"):
@@ -243,11 +251,11 @@ def test_what_cannot_be_is_refused(case):
         ({"aot": 0.2, "engine": "6S"}, "got '6S'.*use engine='successive-orders'"),
     ],
 )
-def test_amount_is_an_optical_thickness_and_6s_takes_no_tables(haze, options, message):
+def test_tables_need_aot_and_an_engine_other_than_6s(haze, options, message):
     with pytest.raises(ValueError, match=message):
         Atmosphere(aerosol=haze, **options)
 
 
-def test_atmosphere_in_words_tells_the_bands_that_the_tables_hold(haze):
+def test_summary_lists_only_bands_within_the_tables(haze):
     assert str(Atmosphere(aerosol=haze, aot=0.3)).count("0.63-0.69") == 1
     assert "2.08-2.35" not in str(Atmosphere(aerosol=haze, aot=0.3))

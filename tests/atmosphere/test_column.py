@@ -1,4 +1,4 @@
-"""Layers of an atmosphere, light straight through them, and phase functions as series."""
+"""Atmospheric layers, their direct transmittance, and series expansions of phase functions."""
 
 import numpy as np
 import pytest
@@ -21,11 +21,11 @@ MU = np.array([0.2, 0.7, 1.0])
 
 @pytest.fixture
 def column():
-    """With a forward peak of .7 to the 16th."""
+    """Column whose truncated forward peak is 0.7^16."""
     return mixed_column(TAU_MOLECULES, TAU_AEROSOL, ALBEDO, 0.7 ** np.arange(40.0), 16, 50)
 
 
-def test_layers_hold_all_that_scatters(column):
+def test_layers_sum_to_the_total_optical_depth(column):
     peak = 0.7**16
     assert column.molecules.sum() * column.depth == pytest.approx(TAU_MOLECULES, rel=1e-12)
     assert column.aerosol_once.sum() * column.depth == pytest.approx(TAU_AEROSOL * ALBEDO, rel=1e-12)
@@ -33,7 +33,7 @@ def test_layers_hold_all_that_scatters(column):
     assert 50 * column.depth == pytest.approx(TAU_MOLECULES + TAU_AEROSOL * (1 - ALBEDO * peak), rel=1e-12)
 
 
-def test_light_of_all_layers_is_that_of_the_whole(column):
+def test_layers_combine_to_the_transmittance_of_the_column(column):
     tau = 50 * column.depth
     np.testing.assert_allclose(column.escape(MU).sum(axis=1), 1 - np.exp(-tau / MU), rtol=1e-12)
     np.testing.assert_allclose(
@@ -45,15 +45,15 @@ def test_light_of_all_layers_is_that_of_the_whole(column):
 
 
 @pytest.mark.parametrize("scale_height", [0.3, 2.0, 8.0])
-def test_aerosol_above_an_altitude_is_a_power_by_the_scale_heights(scale_height):
+def test_aerosol_above_an_altitude_is_a_power_of_the_molecules_above(scale_height):
     column = mixed_column(TAU_MOLECULES, TAU_AEROSOL, ALBEDO, 0.7 ** np.arange(40.0), 16, 50, vertical=scale_height)
     molecules, aerosol = (np.cumsum(part) / part.sum() for part in (column.molecules, column.aerosol))
     np.testing.assert_allclose(aerosol, molecules ** (8 / scale_height), rtol=1e-10, atol=1e-12)
     assert column.aerosol_once.sum() * column.depth == pytest.approx(TAU_AEROSOL * ALBEDO, rel=1e-12)
 
 
-def test_even_layer_lies_between_its_edges():
-    """Molecules above 3 km are exp(-3/8), and all of the aerosol lies below; the layer that holds an edge has both."""
+def test_uniform_aerosol_layer_lies_between_its_edges():
+    """A fraction exp(-3/8) of the molecules lies above 3 km, and all aerosol lies below."""
     column = mixed_column(TAU_MOLECULES, TAU_AEROSOL, ALBEDO, 0.7 ** np.arange(40.0), 16, 400, vertical=(1.0, 3.0))
     above = np.cumsum(column.molecules) / column.molecules.sum()
     particles = np.cumsum(column.aerosol) / column.aerosol.sum()
@@ -65,10 +65,11 @@ def test_even_layer_lies_between_its_edges():
     np.testing.assert_allclose(extinction, 1, rtol=1e-3)
 
 
-def test_soot_above_the_molecules_dims_their_light_and_below_it_does_not():
+def test_absorber_dims_molecules_below_it_but_not_above():
     """
-    What absorbs and does not scatter multiplies what passes it: exact at all orders. Half a percent of the molecules
-    lie above 42 km.
+    A pure absorber multiplies the light that crosses it, exactly at all orders.
+
+    0.5 % of the molecules lie above 42 km.
     """
     soot = 0.3, 0.0, [1.0]
     views = 40.0, [25.0], [60.0]
@@ -84,7 +85,7 @@ def test_soot_above_the_molecules_dims_their_light_and_below_it_does_not():
     assert dimmed[0] == pytest.approx(clear[0] * np.exp(-0.3 / mu_s), rel=4e-3)
 
 
-def test_sunlight_on_both_ways_is_its_integral_over_the_depth(column):
+def test_two_way_attenuation_is_the_integral_over_depth(column):
     tau = 50 * column.depth
     up, down = (column.both_ways(0.7, MU, at_ground=at_ground).sum(axis=0) for at_ground in (False, True))
     slant = 1 / 0.7 + 1 / MU
@@ -95,7 +96,7 @@ def test_sunlight_on_both_ways_is_its_integral_over_the_depth(column):
     assert down[1] == pytest.approx(tau * np.exp(-tau / 0.7), rel=1e-12)
 
 
-# ------------------------------------------------------------------------------------------ series
+# ------------------------------------------------------------------------------------------ series expansions
 
 
 NODES, WEIGHTS = leggauss(500)
@@ -116,37 +117,37 @@ def test_wigner_functions_are_orthogonal(order, spin):
     np.testing.assert_allclose(norms, expected, atol=1e-12)
 
 
-def test_wigner_functions_are_the_closed_forms():
+def test_wigner_functions_equal_closed_forms():
     x = np.linspace(-1, 1, 9)
     np.testing.assert_allclose(wigner(2, 2, x, 3)[2], ((1 + x) / 2) ** 2, atol=1e-14)
     np.testing.assert_allclose(wigner(2, -2, x, 3)[2], ((1 - x) / 2) ** 2, atol=1e-14)
     np.testing.assert_allclose(wigner(0, 2, x, 3)[2], np.sqrt(6) / 4 * (1 - x**2), atol=1e-14)
 
 
-def test_molecules_are_expanded_as_they_scatter():
+def test_rayleigh_expansion_gives_the_phase_function_and_polarization():
     expansion = rayleigh_expansion(3)
     np.testing.assert_allclose(legval(NODES, expansion[:, 0]), rayleigh_phase(NODES), rtol=1e-12)
     polarization = expansion[2, 3] * wigner(0, 2, NODES, 3)[2]
-    # At right angles, light of molecules with depolarization d is polarized by (1 - d) / (1 + d).
+    # At 90 degrees, the degree of polarization of molecules with depolarization d is (1 - d) / (1 + d).
     assert np.interp(0, NODES, polarization / rayleigh_phase(NODES)) == pytest.approx((1 - 0.0279) / (1 + 0.0279), 1e-4)
 
 
-def test_moments_give_the_phase_function_back():
+def test_moments_reproduce_the_expansion():
     degree = (1 - NODES**2) / (1 + NODES**2)
     found = matrix_moments(0.75 * (1 + NODES**2), degree, NODES, WEIGHTS, 6)
     np.testing.assert_allclose(found[:3, [0, 3]], PURE_RAYLEIGH[:, [0, 3]], atol=1e-12)
     np.testing.assert_allclose(found[3:, [0, 3]], 0, atol=1e-12)
 
 
-def test_truncation_keeps_the_light_that_is_not_in_the_peak():
+def test_truncation_preserves_the_moments():
     moments = 0.9 ** np.arange(100)
     expansion, peak = truncated_expansion(moments, 32)
     assert peak == pytest.approx(0.9**32)
     np.testing.assert_allclose(expansion[:, 0] / ORDERS[:32] * (1 - peak) + peak, moments[:32], rtol=1e-12)
 
 
-def test_polarized_basis_is_orthogonal_and_turns_over_with_the_light():
-    """Q and U of light going down are those of light going up, with another sign of U where the degree is even."""
+def test_polarized_basis_is_orthogonal_and_symmetric():
+    """Reversing the direction multiplies terms of the same spin by (-1)^l and cross terms by -(-1)^l."""
     nodes, weights = leggauss(40)
     basis = stokes_basis(2, nodes, 8, 3)
     norms = basis.T @ (np.tile(weights, 3)[:, None] * basis)

@@ -1,4 +1,4 @@
-"""The equation of surface and atmosphere, forth and back, and from wavelengths to bands."""
+"""Surface-atmosphere coupling: forward, inverse, and from wavelengths to bands."""
 
 from itertools import pairwise
 
@@ -37,13 +37,13 @@ def test_missing_cell_stays_missing():
     assert np.isnan(toa).tolist() == [True, False]
 
 
-def test_percent_is_refused():
+def test_reflectance_in_percent_raises():
     with pytest.raises(ValueError, match="must be below 1, got 3: reflectance is a fraction"):
         apparent_reflectance(30.0, 0.1, 0.8, 0.9, 0.1)
 
 
 def test_reflections_between_ground_and_air_are_a_geometric_series():
-    """Light that goes up once, comes back a share S, and so on: 60 times are enough."""
+    """Each reflection contributes a factor rho S; 60 orders are sufficient."""
     path, down, up, albedo, gas = UNIFORM
     rho = np.array([0.0, 0.3, 1.0])
     series = gas * (path + down * up * sum(rho * (rho * albedo) ** order for order in range(60)))
@@ -52,7 +52,7 @@ def test_reflections_between_ground_and_air_are_a_geometric_series():
 
 @pytest.mark.parametrize("shape", [(1, 1), (3, 1, 1), (3, 4, 1), (3, 4, 5), (5,), (4, 5), (2, 1, 4, 5)])
 @pytest.mark.parametrize("function", [apparent_reflectance, corrected_reflectance])
-def test_arrays_broadcast_and_are_the_scalars(function, shape):
+def test_arrays_broadcast_and_equal_the_scalars(function, shape):
     random = np.random.default_rng(1)
     values, terms = random.random((3, 4, 5)), [term * random.uniform(0.9, 1.0, shape) for term in UNIFORM]
     found, all_terms = function(values, *terms), np.broadcast_arrays(values, *terms)
@@ -66,7 +66,7 @@ def test_arrays_broadcast_and_are_the_scalars(function, shape):
 
 
 @pytest.mark.parametrize("function", [apparent_reflectance, corrected_reflectance])
-def test_single_precision_is_widened_and_numbers_stay_numbers(function):
+def test_single_precision_becomes_double_and_scalars_stay_scalars(function):
     values = np.linspace(0, 1, 6, dtype=np.float32)
     found = function(values, *UNIFORM)
     assert found.dtype == np.float64
@@ -75,24 +75,24 @@ def test_single_precision_is_widened_and_numbers_stay_numbers(function):
     assert function(np.zeros((2, 0)), *UNIFORM).shape == (2, 0)
 
 
-def test_where_no_light_comes_through_nothing_is_known_of_the_ground():
-    """Opaque gas, as in the middle of a band of water vapour: no error, but no number either."""
+def test_opaque_gas_gives_non_finite_surface_reflectance():
+    """For example in the centre of a water vapour band; no error is raised."""
     assert not np.isfinite(corrected_reflectance(np.array([0.0]), 0.1, 0.8, 0.9, 0.0, 0.0)).any()
 
 
-def test_uniform_ground_has_the_total_transmittance():
+def test_uniform_ground_uses_the_total_transmittance():
     path, down, direct, diffuse, albedo, gas = TERMS
     uniform = gas * (path + down * (direct + diffuse) * 0.3 / (1 - 0.3 * albedo))
     assert inhomogeneous_reflectance(0.3, 0.3, TERMS) == pytest.approx(uniform, rel=1e-14)
 
 
-def test_target_comes_back():
+def test_target_reflectance_inverts_the_forward_equation():
     target, around = np.meshgrid(np.linspace(0, 1, 11), np.linspace(0, 1, 11))
     toa = inhomogeneous_reflectance(target, around, TERMS)
     np.testing.assert_allclose(target_reflectance(toa, around, TERMS), target, atol=1e-13)
 
 
-def test_percent_around_a_target_is_refused():
+def test_environment_in_percent_raises():
     with pytest.raises(ValueError, match=r"must be below 1, got 5\.7: reflectance is a fraction"):
         inhomogeneous_reflectance(30.0, 30.0, TERMS)
 
@@ -101,8 +101,8 @@ def test_percent_around_a_target_is_refused():
 
 
 @pytest.mark.parametrize("visibility", [8.0, 45.0])
-def test_band_factors_stand_for_the_spectral_sum(visibility):
-    """One wide band against the mean of 34 slices of it: 5e-4 at a reflectance of 0.5."""
+def test_band_terms_approximate_the_spectral_sum(visibility):
+    """One wide band compared with the mean of its 34 slices: 5e-4 at a reflectance of 0.5."""
     atmosphere = Atmosphere(visibility=visibility)
     edges = np.linspace(0.75, 0.92, 35)
     slices = [Band("slice", (low, high), (1, 1)) for low, high in pairwise(edges)]
@@ -113,13 +113,13 @@ def test_band_factors_stand_for_the_spectral_sum(visibility):
     assert once[0] == pytest.approx(np.average(parts, weights=weight), abs=5e-4)
 
 
-def test_thermal_band_is_refused():
+def test_thermal_band_raises():
     with pytest.raises(ValueError, match=r"band TM6 spans 10.4 to 12.5 um, the gas tables only 0.4 to 2.5 um"):
         band_terms(Atmosphere(), [Band("TM6", (10.4, 12.5), (1, 1))], 30.0, 0.0, 0.0)
 
 
-def test_powers_of_the_wavelength_are_interpolated_as_they_are():
-    """Depths and reflectances that fall off with a power of the wavelength, and the transmittance of such a depth."""
+def test_power_laws_in_wavelength_are_interpolated_exactly():
+    """Depths and reflectances that follow a power law, and the transmittance of a power-law depth."""
     between = np.sqrt(WAVELENGTHS[1:] * WAVELENGTHS[:-1])
 
     def spectra(wavelength):
@@ -131,7 +131,7 @@ def test_powers_of_the_wavelength_are_interpolated_as_they_are():
 
 
 @pytest.mark.parametrize("low, high", [(0.6, 0.65), (0.4, 0.41), (2.1, 2.5), (0.55, 0.59)])
-def test_a_stretch_of_the_spectrum_has_two_nodes_on_either_side(low, high):
+def test_spectral_interval_has_two_nodes_on_each_side(low, high):
     nodes = spectral_nodes(low, high)
     inside = np.flatnonzero((nodes > low) & (nodes < high))
     assert np.isin(nodes, WAVELENGTHS).all()
@@ -140,16 +140,16 @@ def test_a_stretch_of_the_spectrum_has_two_nodes_on_either_side(low, high):
     assert np.array_equal(nodes[inside], WAVELENGTHS[(low < WAVELENGTHS) & (high > WAVELENGTHS)])
 
 
-def test_terms_over_uniform_ground_are_in_the_order_of_the_equation():
+def test_uniform_terms_follow_the_argument_order():
     terms = BandTerms(*np.arange(len(BandTerms._fields)))
     names = apparent_reflectance.__code__.co_varnames[1:6]
     assert tuple(terms.uniform) == names
     assert all(value is getattr(terms, name) for name, value in terms.uniform.items())
 
 
-def test_skylight_is_what_is_not_sunbeam():
+def test_skylight_is_total_minus_direct_transmittance():
     terms = band_terms(Atmosphere(visibility=8.0), [Band("red", (0.63, 0.69), (1, 1))], 50.0, 0.0, 0.0)
     assert terms.transmittance_down * (1 - terms.diffuse_fraction) == pytest.approx(terms.direct_transmittance_down)
     depth = -np.log(terms.direct_transmittance_down) * np.cos(np.radians(50.0))
-    # A mean of exponentials over the band is not the exponential of the mean.
+    # The band mean of exponentials is not the exponential of the mean.
     assert depth == pytest.approx(terms.optical_depth, rel=2e-3)

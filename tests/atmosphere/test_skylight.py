@@ -1,4 +1,4 @@
-"""Coupling of an atmosphere with ground that is not Lambertian: exact systems, conservation and reciprocity."""
+"""Coupling of an atmosphere with a non-Lambertian surface: exact solutions, energy conservation, reciprocity."""
 
 from functools import cache
 from pathlib import Path
@@ -33,14 +33,14 @@ def sky(sza):
     return atmospheric_sky(AIR, 0.66, sza)
 
 
-def test_four_streams_solve_the_system_of_fluxes():
+def test_four_stream_coupling_solves_the_flux_equations():
     t = pd.read_csv(DATA / "four_stream.csv", comment="#")
     ground = t.rso, t.rdo, t.rsd, t.rdd
     found = four_stream_coupling(*ground, t.tss, t.tsd, t.too, t.tdo, t.spherical_albedo, t.path)
     np.testing.assert_allclose(found, t.toa, rtol=0, atol=1e-12)
 
 
-def test_equal_reflectances_are_lambertian():
+def test_equal_reflectances_give_the_lambertian_result():
     rng = np.random.default_rng(5)
     r, tss, tsd, too, tdo, albedo, path, gas = rng.uniform(0.05, 0.45, (8, 50))
     expected = apparent_reflectance(r, path, tss + tsd, too + tdo, albedo, gas)
@@ -49,14 +49,14 @@ def test_equal_reflectances_are_lambertian():
     np.testing.assert_allclose(directional_coupling(GroundStreams(*[r] * 9), *air), expected, rtol=1e-12)
 
 
-def test_weights_are_normal():
+def test_weights_are_normalized():
     for zenith in (0.0, 35.0, 60.0):
         streams = ground_streams(lambda sza, vza, raa: 0.3 + 0 * raa, sky(zenith), sky(45.0), zenith, 45.0, 70.0)
         np.testing.assert_allclose(streams, 0.3, rtol=1e-12)
 
 
 @pytest.mark.parametrize("surface", ["ross-li", "rpv"])
-def test_sun_and_view_may_be_exchanged(surface):
+def test_sun_and_view_are_reciprocal(surface):
     def ground(sza, vza, raa):
         if surface == "rpv":
             return rpv(0.1, 0.7, -0.15, 0.2, sza=sza, vza=vza, raa=raa)
@@ -69,8 +69,8 @@ def test_sun_and_view_may_be_exchanged(surface):
     assert one == pytest.approx(other, abs=1e-10)
 
 
-def test_returned_light_and_sky_are_the_means_of_their_definitions():
-    """Against sums over a fine grid of the sky, of light that varies with both angles."""
+def test_sky_streams_equal_sums_over_a_fine_grid():
+    """The reflectance of the ground varies with both zenith angles and the azimuth."""
     own, other = sky(35.0), sky(50.0)
 
     def ground(sza, vza, raa):
@@ -94,8 +94,8 @@ def test_returned_light_and_sky_are_the_means_of_their_definitions():
         assert both == pytest.approx(expected, rel=2e-4)
 
 
-def test_white_ground_below_air_without_absorption_returns_all_light():
-    """The ground reflects all light from each direction, most of it near its own zenith angle."""
+def test_white_ground_below_conservative_atmosphere_returns_all_light():
+    """The ground reflects all light from each direction, mostly near the incident zenith angle."""
     tau, sza = 0.3, 35.0
 
     def white(sza, vza, raa):
@@ -122,7 +122,7 @@ def test_white_ground_below_air_without_absorption_returns_all_light():
     assert up == pytest.approx(1.0, abs=1e-6)
 
 
-# Optical depth at 664.6 nm over that at 550 nm and single scattering albedo; other means for the cases without gases.
+# Ratio of the optical depths at 664.6 and 550 nm, and single scattering albedo; RAMI_0: cases without gases.
 RAMI = {"c": (0.706768, 0.96821), "d": (0.903349, 0.936366)}
 RAMI_0 = {"c": (0.7077, 0.96823), "d": (0.9037, 0.93635)}
 NAMES = {"c": "continental", "d": "desert"}
@@ -130,7 +130,7 @@ NAMES = {"c": "continental", "d": "desert"}
 
 @cache
 def rami_matter(case):
-    """Optical depths, albedo, moments and phase function of a case."""
+    """Optical depths, albedo, moments and phase function of a RAMI4ATM case."""
     molecules, aerosol, depth = case[4], case[5], int(case[6]) / 10
     tau = 0.045159 if molecules in "es" else 0.0
     if aerosol == "0":
@@ -144,7 +144,7 @@ def rami_matter(case):
 
 
 def rami_case(case, vza, raa):
-    """Reflectance at the top of a case, with the sky of the atmosphere, and with one reflectance factor."""
+    """Apparent reflectance of a case, with directional streams and with a single reflectance factor."""
     (*matter, moments), phase = rami_matter(case)
     options, sza = {"depolarization": 0.0, "vertical": (0.0, 2.0)}, 30.0
 
@@ -165,8 +165,8 @@ def rami_case(case, vza, raa):
 
 
 @pytest.mark.parametrize("case", ["rpv_0d2s", "rpv_0d6s", "rpv_ec2s", "rpv_sc2s", "rpv_sd2s", "rpv_e00s"])
-def test_ground_below_the_sky_agrees_with_eradiate(case):
-    """In every eighth view within the noise, which one reflectance factor does not reach."""
+def test_directional_coupling_agrees_with_eradiate(case):
+    """Every eighth view agrees within the noise; a single reflectance factor is less accurate."""
     table = pd.read_csv(DATA / "rami4atm_toa.csv", comment="#").query("case == @case").iloc[3::8]
     found = np.array([rami_case(case, abs(float(row.vza)), float(row.raa)) for row in table.itertuples()]).T
     away, noise = 100 * (found / table["brf"].to_numpy() - 1), 100 * (table["sd"] / table["brf"]).to_numpy()

@@ -1,4 +1,4 @@
-"""Successive orders of scattering beside tables, other codes and limits."""
+"""Successive orders of scattering compared with published tables, other codes and limits."""
 
 from pathlib import Path
 
@@ -38,11 +38,11 @@ def henyey_greenstein(asymmetry, scattering_cosine):
     return (1 - asymmetry**2) / (1 + asymmetry**2 - 2 * asymmetry * scattering_cosine) ** 1.5
 
 
-def test_polarized_molecules_are_those_of_the_tables():
+def test_polarized_molecules_agree_with_natraj_tables():
     """
-    Natraj, Li & Yung (2009), which correct Coulson, Dave & Sekera (1960): depth 0.5 over black ground, flux pi.
+    Natraj, Li & Yung (2009), a correction of Coulson, Dave & Sekera (1960): depth 0.5 over black ground, flux pi.
 
-    Their azimuth 0 lies opposite to the sun. 2e-5: tail of the orders, and 400 layers at a view of 89 degrees.
+    Their azimuth 0 lies opposite the sun. 2e-5: truncation of the orders, and 400 layers for a view at 89 degrees.
     """
     mu_s, mu_v, raa = 0.2, np.array([0.02, 0.4, 1.0]), [180.0, 120.0]
     published = [[0.44129802, 0.30091208], [0.16889020, 0.12752450], [0.05300496, 0.05300496]]
@@ -52,8 +52,8 @@ def test_polarized_molecules_are_those_of_the_tables():
     np.testing.assert_allclose(mu_s * found, published, rtol=2e-5)
 
 
-def test_polarized_flux_is_that_of_the_tables():
-    """As above, ground of reflectance 0.8 less black ground. 1.2e-4: layers, and the table's last digit."""
+def test_polarized_flux_agrees_with_natraj_tables():
+    """Ground of reflectance 0.8 minus black ground. 1.2e-4: number of layers, and last digit of the table."""
     added = np.array([0.47382125 - 0.44129802, 0.23059806 - 0.16889020, 0.13280858 - 0.05300496])
     zenith = degrees(np.array([0.2, 0.02, 0.4, 1.0]))
     transmittance, albedo = flux_transmittance(0.0, 0.5, 1.0, PURE_RAYLEIGH, zenith, layers=200)
@@ -61,8 +61,8 @@ def test_polarized_flux_is_that_of_the_tables():
     np.testing.assert_allclose(found, added, rtol=1.2e-4)
 
 
-def test_polarizing_aerosol_is_that_of_siewert():
-    """Problem IIA of Siewert (2000), which has V: depth 1, flux pi. 5e-6: five times the tolerance of the orders."""
+def test_polarizing_aerosol_agrees_with_siewert():
+    """Problem IIA of Siewert (2000), with V: depth 1, flux pi. 5e-6: five times the tolerance of the orders."""
     mu_s, mu_v, raa = 0.6, np.array([1.0, 0.5, 0.2]), [180.0, 0.0, 90.0]
     published = [[0.0506873] * 3, [0.339136, 0.0684106, 0.124626], [0.751295, 0.0801523, 0.169216]]
     moments = SIEWERT / ORDERS[:12, None]
@@ -89,11 +89,11 @@ def disort(share_edges, tau_molecules, tau_aerosol, albedo, moments, mu_s, azimu
 
 @pytest.mark.filterwarnings("ignore:Some delta-scaled single-scattering albedos")
 @pytest.mark.parametrize("asymmetry", [0.3, 0.6])
-def test_mixed_atmosphere_is_that_of_discrete_ordinates(asymmetry):
+def test_mixed_atmosphere_agrees_with_discrete_ordinates(asymmetry):
     """
-    Exponential mixing in layers cut otherwise: evenly in the share of the molecules.
+    Exponential profiles in different layers: here with equal numbers of molecules.
 
-    2e-4: both have layers of even composition, and the other leaves out the moments from the 32nd on.
+    2e-4: both codes use homogeneous layers, and discrete ordinates use only the first 32 moments.
     """
     albedo, tau_molecules, tau_aerosol, sza = 0.9, 0.2, 0.4, 50.0
     moments, raa = asymmetry ** np.arange(64), np.array([0.0, 60.0, 120.0, 180.0])
@@ -108,8 +108,8 @@ def test_mixed_atmosphere_is_that_of_discrete_ordinates(asymmetry):
     np.testing.assert_allclose(transmittance, transmitted, rtol=2e-5)
 
 
-def test_thick_isotropic_layer_is_chandrasekhars_half_space():
-    r""":math:`\rho = \omega H(\mu_s) H(\mu_v) / 4 (\mu_s + \mu_v)`, H by iteration of its equation."""
+def test_thick_isotropic_layer_agrees_with_chandrasekhars_half_space():
+    r""":math:`\rho = \omega H(\mu_s) H(\mu_v) / 4 (\mu_s + \mu_v)`, with H from fixed-point iteration."""
     albedo, points, weights = 0.8, (leggauss(64)[0] + 1) / 2, leggauss(64)[1] / 2
 
     def step(mu, values):
@@ -126,8 +126,8 @@ def test_thick_isotropic_layer_is_chandrasekhars_half_space():
 
 
 @pytest.mark.parametrize("polarized", [False, True])
-def test_layer_that_absorbs_nothing_loses_no_flux(polarized):
-    """What is not reflected comes through, for one sun and for a whole sky. 1e-4: layers."""
+def test_conservative_layer_conserves_flux(polarized):
+    """Reflected and transmitted flux sum to 1, for direct and for isotropic light. 1e-4: number of layers."""
     points, weights = leggauss(24)
     mu, raa = (points + 1) / 2, np.arange(1.0, 180, 6)
     moments = 0.6 ** np.arange(64)
@@ -139,8 +139,8 @@ def test_layer_that_absorbs_nothing_loses_no_flux(polarized):
     assert (weights * mu * transmittance[1:]).sum() + albedo == pytest.approx(1, abs=1e-4)
 
 
-def test_sun_and_sensor_may_change_places():
-    """To the tolerance of the sums over orders."""
+def test_sun_and_view_are_reciprocal():
+    """5e-6: tolerance of the sum over orders."""
     zenith, raa = np.array([20.0, 45.0, 60.0]), [0.0, 70.0, 180.0]
     found = np.empty((3, 3, 3))
     for number, sza in enumerate(zenith):
@@ -149,8 +149,8 @@ def test_sun_and_sensor_may_change_places():
     np.testing.assert_allclose(found, found.swapaxes(0, 1), rtol=5e-6)
 
 
-def test_thin_layer_scatters_once():
-    """Where a depth of 1e-5 leaves a second order of about as much."""
+def test_thin_layer_gives_single_scattering():
+    """A depth of 1e-5 leaves a relative second order of similar size."""
     sza, vza, raa = 40.0, [0.0, 50.0], [0.0, 90.0, 180.0]
     scattering_cosine = cosine(sza, vza, raa)
     phase = henyey_greenstein(0.6, scattering_cosine)
@@ -160,8 +160,8 @@ def test_thin_layer_scatters_once():
     np.testing.assert_allclose(found, once, rtol=3e-4)
 
 
-def test_forward_peak_may_be_left_to_the_beam():
-    """Of .8 to the 32nd with 16 directions, to the 64th with 32: the reflectance is the same."""
+def test_forward_peak_truncation_does_not_change_reflectance():
+    """The truncated peak is 0.8^32 with 16 streams and 0.8^64 with 32 streams."""
     sza, vza, raa = 40.0, [0.0, 30.0, 55.0], [0.0, 90.0, 180.0]
     phase = henyey_greenstein(0.8, cosine(sza, vza, raa))
     air = 0.1, 0.6, 0.95, 0.8 ** np.arange(128), phase, sza, vza, raa
@@ -173,7 +173,7 @@ def sixs(polarized, aerosols):
 
 
 def mixed(row):
-    """Path reflectance of molecules and of the mixture, and fluxes, for a row of 6S."""
+    """Path reflectance of molecules and of the mixture, transmittances and albedo for a row of 6S."""
     optics = (function(row.aerosol, NODES, row.wavelength) for function in (aerosol_phase, aerosol_polarization))
     moments, polarized = matrix_moments(*optics, NODES, WEIGHTS, 48), bool(row.polarized)
     views = row.sza, [row.vza], [row.raa]
@@ -186,7 +186,7 @@ def mixed(row):
 
 
 def relative_difference(polarized, aerosols):
-    """Of path reflectance: molecules, mixture [1]; and the differences of the fluxes [1]."""
+    """Relative difference of path reflectance (molecules, mixture) and difference of fluxes, compared with 6S. [1]"""
     rows = sixs(polarized, aerosols)
     found = np.array([mixed(row) for row in rows.itertuples()])
     names = ["rayleigh_reflectance", "path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo"]
@@ -194,11 +194,11 @@ def relative_difference(polarized, aerosols):
     return found[:, :2] / expected[:, :2] - 1, found[:, 2:] - expected[:, 2:]
 
 
-def test_polarized_atmosphere_is_that_of_6s():
+def test_polarized_atmosphere_agrees_with_6s():
     """
     Continental and urban aerosol, 0.4 to 0.86 um.
 
-    6SV1 itself is stated to be within .7 % (Kotchenova et al. 2006), with 30 layers.
+    The stated accuracy of 6SV1 is 0.7 % (Kotchenova et al. 2006), with 30 layers.
     """
     reflectance, flux = relative_difference(1, ["continental", "urban"])
     assert np.abs(reflectance).max() < 0.007
@@ -206,8 +206,8 @@ def test_polarized_atmosphere_is_that_of_6s():
     assert np.abs(flux).max() < 0.0012
 
 
-def test_scalar_atmosphere_is_that_of_6s():
-    """Its scalar fluxes are .004 from its polarized ones and from ours: less converged."""
+def test_scalar_atmosphere_agrees_with_6s():
+    """The scalar fluxes of 6S differ by 0.004 from its polarized fluxes and from fifesim: less converged."""
     reflectance, flux = relative_difference(0, ["continental", "urban"])
     assert np.abs(reflectance).max() < 0.008
     assert np.abs(flux).max() < 0.004
@@ -224,7 +224,7 @@ SZA, VZA, RAA = 50.0, np.array([0.0, 30.0, 70.0]), np.array([-120.0, -30.0, 0.0,
 def spheres(tau_molecules, tau_aerosol, vza=VZA, raa=RAA, at_ground=False, **options):
     cosine = scattering_angle_cosine(SZA, np.asarray(vza)[:, None], np.asarray(raa)) * (-1 if at_ground else 1)
     phase = legval(cosine, SPHERES[:, 0])
-    # d^l_02 of degree 2 on: Legendre functions of order 2 by their norm.
+    # d^l_02 for l >= 2: normalized Legendre functions of order 2.
     degree = np.arange(2, 9)
     second = [legval(cosine, np.polynomial.legendre.legder(np.eye(9)[n], 2)) * (1 - cosine**2) for n in degree]
     norm = 1 / np.sqrt((degree - 1.0) * degree * (degree + 1) * (degree + 2))
@@ -238,13 +238,13 @@ def molecules(tau, sza, vza, raa, **options):
     return stokes_reflectance(tau, 0.0, 0.0, [1.0], none, none, sza, vza, raa, **options)
 
 
-def test_intensity_at_the_top_is_the_path_reflectance():
+def test_intensity_at_the_top_equals_the_path_reflectance():
     phase = legval(scattering_angle_cosine(SZA, VZA[:, None], RAA), SPHERES[:, 0])
     expected = path_reflectance(0.1, 0.3, 0.97, MOMENTS, phase, SZA, VZA, RAA)
     np.testing.assert_allclose(spheres(0.1, 0.3)[0], expected, rtol=1e-12)
 
 
-def test_ground_adds_what_fluxes_say():
+def test_light_added_by_ground_agrees_with_fluxes():
     transmittance, albedo = flux_transmittance(0.1, 0.3, 0.97, MOMENTS, [SZA, *VZA])
     added = spheres(0.1, 0.3, ground=0.4)[0] - spheres(0.1, 0.3)[0]
     expected = 0.4 * transmittance[0] * transmittance[1:, None] / (1 - 0.4 * albedo)
@@ -252,7 +252,7 @@ def test_ground_adds_what_fluxes_say():
 
 
 @pytest.mark.parametrize("ground", [0.0, 0.5])
-def test_flux_of_the_sky_is_what_comes_through_less_the_beam(ground):
+def test_sky_flux_is_total_minus_direct_transmittance(ground):
     points, weights = leggauss(24)
     mu, raa = (points + 1) / 2, np.arange(4.5, 180, 9)
     sky = spheres(0.1, 0.3, np.degrees(np.arccos(mu)), raa, at_ground=True, ground=ground)[0]
@@ -262,8 +262,8 @@ def test_flux_of_the_sky_is_what_comes_through_less_the_beam(ground):
 
 
 @pytest.mark.parametrize("at_ground", [False, True])
-def test_nothing_depends_on_the_direction_of_the_zenith(at_ground):
-    """Straight up or down the meridian is the azimuth's: polarization turns with it and keeps its degree."""
+def test_zenith_view_does_not_depend_on_azimuth(at_ground):
+    """At the zenith and nadir, polarization rotates with the azimuth of the meridian; its degree is constant."""
     intensity, along, aslant = spheres(0.1, 0.3, [0.0], RAA, at_ground)[:, 0]
     np.testing.assert_allclose(intensity, intensity[0], rtol=1e-12)
     np.testing.assert_allclose(np.hypot(along, aslant), np.hypot(along, aslant)[0], rtol=1e-6)
@@ -272,7 +272,7 @@ def test_nothing_depends_on_the_direction_of_the_zenith(at_ground):
 
 @pytest.mark.parametrize("at_ground", [False, True])
 def test_thin_air_polarizes_across_the_plane_of_scattering(at_ground):
-    """All orders of a depth of 1e-4 beside Rayleigh's matrix."""
+    """All orders at a depth of 1e-4 compared with the Rayleigh scattering matrix."""
     delta, sza = 0.1, 50.0
     cosine = scattering_angle_cosine(sza, VZA[:, None], np.array([0.0, 180.0]))
     found = molecules(1e-4, sza, VZA, [0.0, 180.0], at_ground=at_ground, depolarization=delta)
@@ -280,19 +280,16 @@ def test_thin_air_polarizes_across_the_plane_of_scattering(at_ground):
     np.testing.assert_allclose(-found[1] / found[0], expected, atol=1e-3)
 
 
-def test_depolarization_is_that_at_a_right_angle():
-    """What shakes across the plane over what shakes along it, once scattered by 90 degrees."""
+def test_depolarization_is_recovered_at_90_degrees():
+    """Ratio of the intensities polarized parallel and perpendicular to the scattering plane."""
     found = molecules(1e-5, 60.0, [30.0], [0.0], at_ground=True, depolarization=0.06)
     turned = molecules(1e-5, 60.0, [30.0], [180.0], at_ground=True, depolarization=0.06)[:, 0, 0]
     assert (turned[0] + turned[1]) / (turned[0] - turned[1]) == pytest.approx(0.06, rel=2e-3)
     assert found[0, 0, 0] > turned[0]
 
 
-def test_light_of_the_sky_below_the_sun_is_finite():
-    """The ways in and out are alike there: the integral over the depth is a limit."""
+def test_sky_light_in_the_solar_direction_is_finite():
+    """Both slant paths are equal there, so the integral over depth is a limit."""
     values = spheres(0.1, 0.3, [SZA - 1e-6, SZA, SZA + 1e-6], [0.0], at_ground=True)
     np.testing.assert_allclose(values[:, 0], values[:, 2], rtol=1e-5, atol=1e-9)
     np.testing.assert_allclose(values[:, 1], (values[:, 0] + values[:, 2]) / 2, rtol=1e-6, atol=1e-9)
-
-
-# ------------------------------------------------------------------------------------------ orders

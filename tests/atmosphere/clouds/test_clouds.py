@@ -1,4 +1,4 @@
-"""Light of cloud layers, and the place of clouds, their images and their shadows."""
+"""Radiative transfer in cloud layers, and positions of clouds, their images and their shadows."""
 
 import warnings
 from pathlib import Path
@@ -23,16 +23,16 @@ def table(name):
     return pd.read_csv(DATA / name, comment="#")
 
 
-def test_displacements_are_those_of_the_table():
-    """1e-6 m: the printed digits."""
+def test_displacements_agree_with_the_table():
+    """1e-6 m: printed digits of the table."""
     known = table("cloud_geometry.csv")
     found = cloud_displacement(*(known[name] for name in ("height", "sza", "saa", "vza", "vaa")))
     expected = known[["shadow_east", "shadow_north", "image_east", "image_north"]].to_numpy().T
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
 
 
-def test_two_stream_formula_and_exact_albedo():
-    """1e-10: the printed digits. Exact albedos differ by up to 0.03 for the sun at 18 degrees, 0.042 at the zenith."""
+def test_two_stream_formula_agrees_with_table_and_exact_albedo():
+    """1e-10: printed digits. Exact albedos differ by up to 0.03 for a solar zenith angle of 18 degrees, 0.042 for 0."""
     known = table("cloud_two_stream.csv")
     cloud = known["optical_depth"], known["asymmetry"]
     np.testing.assert_allclose(two_stream_reflectance(*cloud), known["cloud_reflectance"], rtol=1e-10)
@@ -44,7 +44,7 @@ def test_two_stream_formula_and_exact_albedo():
 
 
 def disort(thickness, co_albedo, sza, raa, ground=0.0):
-    """Cosines and reflectance of the upward nodes of 64 streams with exact single scattering, and transmittance."""
+    """Cosines and reflectance at the upward nodes of 64 streams, with exact single scattering, and transmittance."""
     pydisort = pytest.importorskip("PythonicDISORT.pydisort").pydisort
     moments, mu_s, depth = layer.ASYMMETRY ** np.arange(300), np.cos(np.radians(sza)), np.array([thickness])
     mu, _, down, _, radiance = pydisort(
@@ -63,8 +63,8 @@ def disort(thickness, co_albedo, sza, raa, ground=0.0):
         (60.0, 0.0, 70.0, 180.0), (60.0, 0.005, 28.0, 45.0), (2.05, 0.005, 0.5, 79.0), (0.35, 0.03, 2.0, 170.0),
     ],
 )  # fmt: skip
-def test_layer_is_that_of_discrete_ordinates(thickness, co_albedo, sza, raa):
-    """0.5 % in all views to 70 degrees, also within 5 degrees of nadir, and 2e-5 of the transmittance."""
+def test_layer_agrees_with_discrete_ordinates(thickness, co_albedo, sza, raa):
+    """0.5 % for all views up to 70 degrees, also within 5 degrees of nadir; transmittance to 2e-5."""
     mu, expected, transmitted = disort(thickness, co_albedo, sza, raa)
     for one, reflectance in zip(mu, expected, strict=True):
         if one > np.cos(np.radians(70)):
@@ -75,7 +75,7 @@ def test_layer_is_that_of_discrete_ordinates(thickness, co_albedo, sza, raa):
 
 @pytest.mark.filterwarnings("ignore:Some delta-scaled single-scattering albedos")
 @pytest.mark.parametrize(("thickness", "ground"), [(1.0, 0.3), (10.0, 0.8)])
-def test_overcast_above_lambertian_ground_is_that_of_discrete_ordinates(thickness, ground):
+def test_overcast_above_lambertian_ground_agrees_with_discrete_ordinates(thickness, ground):
     mu, expected, _ = disort(thickness, 0.0, 40.0, 70.0, ground)
     index = int(np.argmin(np.abs(mu - 0.8)))
     light = layer_light(np.array([thickness]), 0.0, 40.0, np.degrees(np.arccos(mu[index])), 70.0)
@@ -85,8 +85,8 @@ def test_overcast_above_lambertian_ground_is_that_of_discrete_ordinates(thicknes
 
 
 @pytest.mark.filterwarnings("ignore:Some delta-scaled single-scattering albedos")
-def test_thin_clouds_lower_ndvi_as_in_discrete_ordinates_and_less_than_as_an_isotropic_reflector():
-    """0.0002 of NDVI, for the sun of the FIFE image near nadir: drops scatter little to the side of the sun."""
+def test_thin_clouds_lower_ndvi_less_than_an_isotropic_reflector():
+    """NDVI agrees with discrete ordinates to 0.0002, for the sun of the FIFE image: drops scatter little backward."""
     ground = np.array([0.08, 0.25])
 
     def ndvi(red, near_infrared):
@@ -107,7 +107,7 @@ def test_thin_clouds_lower_ndvi_as_in_discrete_ordinates_and_less_than_as_an_iso
 
 
 def test_white_ground_and_conservative_clouds_return_all_light():
-    """1e-4, of the fluxes; the albedo and the transmittance of isotropic light are independent results."""
+    """1e-4: accuracy of the fluxes. The albedo and the transmittance of isotropic light are computed independently."""
     thickness = np.array([0.3, 3.0, 30.0, 60.0, 100.0])
     for sza in (0.0, 45.0, 70.0):
         light = layer_light(thickness, 0.0, sza, 0.0, 0.0)
@@ -131,7 +131,7 @@ def clouds_of(thickness, grid, height=1500.0):
     return xr.Dataset({"optical_thickness": cells, "base": height, "top": height})
 
 
-def test_thickness_zero_changes_nothing_and_a_missing_cell_stays_missing(site, reflectance):
+def test_zero_thickness_changes_nothing_and_missing_cells_stay_missing(site, reflectance):
     thickness = np.zeros(site.shape)
     clear = reflectance.fifesim.to_toa()
     with pytest.warns(UserWarning, match="the clouds end .* m too early"):
@@ -143,7 +143,7 @@ def test_thickness_zero_changes_nothing_and_a_missing_cell_stays_missing(site, r
 
 
 @pytest.mark.filterwarnings("ignore:the clouds end")
-def test_a_cloud_of_n_cells_hides_and_shades_n_cells(site, reflectance):
+def test_cloud_of_n_cells_obscures_and_shades_n_cells(site, reflectance):
     thickness = np.zeros(site.shape)
     thickness[20:25, 30:37] = 20.0
     geometry = fifesim.Geometry(40, 150, 30, 280)
@@ -154,7 +154,7 @@ def test_a_cloud_of_n_cells_hides_and_shades_n_cells(site, reflectance):
     moved = cloud_displacement(500.0, 40, 150 - turned, 30, 280 - turned)
     for name, east, north in (("shadow", *moved[:2]), ("cloud", *moved[2:])):
         rows, columns = np.nonzero(cells[name].values)
-        # The middle of the cloud, moved; half a cell by rounding.
+        # Displaced centre of the cloud, within 0.5 cells of rounding.
         assert abs(rows.mean() - (22 - north / 30)) <= 0.5
         assert abs(columns.mean() - (33 + east / 30)) <= 0.5
     both = reflectance.fifesim.to_toa(clouds=cells.drop_vars(["sza", "saa", "vza", "vaa"]))
@@ -165,7 +165,7 @@ def test_a_cloud_of_n_cells_hides_and_shades_n_cells(site, reflectance):
 
 
 @pytest.mark.filterwarnings("ignore:the clouds end")
-def test_clouds_of_different_heights_are_those_of_each_height_in_turn(site, reflectance):
+def test_clouds_of_two_heights_equal_the_sum_of_both(site, reflectance):
     rng = np.random.default_rng(4)
     thickness = np.where(rng.random(site.shape) < 0.2, 5.0, 0.0)
     high = rng.random(site.shape) < 0.5
@@ -180,7 +180,7 @@ def test_clouds_of_different_heights_are_those_of_each_height_in_turn(site, refl
         for part, height in ((~high, 700.0), (high, 1600.0))
     )
     for name in ("optical_thickness", "shadow_thickness", "overhead_thickness"):
-        # 900 m are divided into layers of 30 m / tan(50) = 25 m, so that the upper one is right to half of it.
+        # 900 m are divided into layers of 30 m / tan(50) = 25 m, so the upper height is accurate to half a layer.
         assert (found[name] == lower[name] + upper[name]).mean() > (0.99 if name == "overhead_thickness" else 0.6)
         assert float(found[name].sum()) == pytest.approx(float((lower[name] + upper[name]).sum()), rel=0.05)
     unknown = both.assign(top=both.top.where(both.optical_thickness == 0))
@@ -191,8 +191,8 @@ def test_clouds_of_different_heights_are_those_of_each_height_in_turn(site, refl
 
 
 @pytest.mark.filterwarnings("ignore:the clouds end")
-def test_shadow_on_relief_is_that_of_steps_along_the_sunbeam(site, reflectance):
-    """Brute force: from each cell toward the sun in steps of 1 m, until the beam is at the height of the clouds."""
+def test_shadow_on_relief_agrees_with_ray_marching(site, reflectance):
+    """Brute force: from each cell toward the sun in steps of 1 m up to the cloud height."""
     rng = np.random.default_rng(3)
     thickness = np.where(rng.random(site.shape) < 0.2, 5.0, 0.0)
     y, x = np.mgrid[:60, :60]
@@ -211,7 +211,7 @@ def test_shadow_on_relief_is_that_of_steps_along_the_sunbeam(site, reflectance):
         at = int(np.rint(row)), int(np.rint(column))
         inside = 0 <= at[0] < 60 and 0 <= at[1] < 60
         expected[i, j] = thickness[at] if inside else 0.0
-        # Within two metres of the edge of a cell, the steps are too coarse.
+        # Within 2 m of a cell edge, the steps are too coarse.
         nearby[i, j] = max(abs(row - at[0]), abs(column - at[1])) > 0.5 - 2 / 30
     np.testing.assert_array_equal(found[~nearby], expected[~nearby])
     assert (~nearby).mean() > 0.6
@@ -219,7 +219,7 @@ def test_shadow_on_relief_is_that_of_steps_along_the_sunbeam(site, reflectance):
 
 @pytest.mark.parametrize("relief", [False, True])
 def test_warning_of_a_small_field_names_the_margin_that_suffices(site, reflectance, relief):
-    """Ground 400 m below the altitude of the atmosphere, 0.4 km, has longer shadows."""
+    """Relief at 0 m lies 0.4 km below the altitude of the atmosphere, which lengthens the shadows."""
     dem = (
         xr.zeros_like(reflectance.isel(band=0, drop=True)).rename("elevation").assign_attrs(units="m")
         if relief
@@ -242,7 +242,7 @@ def test_warning_of_a_small_field_names_the_margin_that_suffices(site, reflectan
 
 
 def test_cover_is_exact_over_100_km_and_thickness_is_lognormal():
-    """0.5 points of the cover, anywhere; mean and standard deviation to 5 %, of a sample cut at 0.1 %."""
+    """Cover to 0.5 percentage points; mean and standard deviation to 5 %, since the outermost 0.1 % are cut."""
     place = np.arange(0, PERIOD, PERIOD // 1000) + 77_777_777
     for cover, length in ((0.1, 500.0), (0.4, 2000.0), (0.85, 15_000.0)):
         thickness = cloud_thickness(CloudCover(cover, (8.0, 6.0), length, 5), place, place)
@@ -258,15 +258,15 @@ def test_smallest_covers_have_at_most_one_cloud():
     assert 0 <= (cloud_thickness(CloudCover(1e-7, (8.0, 6.0), 2000.0, 5), place, place) > 0).mean() < 1e-4
 
 
-def test_correlation_falls_to_a_twentieth_at_the_length():
-    """Signs of a normal field about its median correlate by 2 / pi arcsin(0.05); 0.03 by sampling."""
+def test_correlation_is_5_percent_at_the_correlation_length():
+    """The sign of a normal field has the correlation 2 / pi arcsin(0.05); 0.03 is the sampling error."""
     place = np.arange(0, PERIOD, PERIOD // 1000)
     sign = np.sign(cloud_thickness(CloudCover(0.5, (8.0, 6.0), 2000.0, 5), place, place) - 1e-9)
     found = np.mean(sign * np.roll(sign, 20, axis=0)), np.mean(sign * np.roll(sign, 20, axis=1))
     np.testing.assert_allclose(found, 2 / np.pi * np.arcsin(0.05), atol=0.03)
 
 
-def test_window_chunks_cell_size_and_drift_show_the_same_clouds(site):
+def test_clouds_do_not_depend_on_window_chunks_or_cell_size_and_drift(site):
     sky = {"cover": 0.5, "seed": 11, "length": 800.0}
     whole = fifesim.cloud_field(site, **sky).optical_thickness
     window = fifesim.cloud_field(fifesim.fife_site(30, window=((13, 40), (7, 50))), **sky).optical_thickness
@@ -274,7 +274,7 @@ def test_window_chunks_cell_size_and_drift_show_the_same_clouds(site):
     with no_compute():
         lazy = fifesim.cloud_field(site, **sky, chunks={"y": 17, "x": 23})
     np.testing.assert_array_equal(lazy.optical_thickness.values, whole.values)
-    # The middle cells of 3 x 3 small cells have the centres of large ones.
+    # The middle of 3 x 3 small cells has the centre of the large cell.
     fine = fifesim.cloud_field(fifesim.fife_site(10, window=((0, 180), (0, 180))), **sky).optical_thickness
     np.testing.assert_array_equal(fine.values[1::3, 1::3], whole.values)
     # 6 m/s eastward and 3 m/s southward for 100 s are 20 and 10 cells.
@@ -287,7 +287,7 @@ def test_window_chunks_cell_size_and_drift_show_the_same_clouds(site):
     assert not np.array_equal(*(days.optical_thickness.values > 0))
 
 
-def test_lazy_scene_has_the_bits_of_the_scene_in_memory(site, reflectance):
+def test_lazy_scene_is_bitwise_equal_to_the_scene_in_memory(site, reflectance):
     sky = fifesim.cloud_field(site, 0.5, seed=11, length=800.0, margin=1200)
     whole = reflectance.fifesim.to_toa(clouds=sky)
     with no_compute():
@@ -300,7 +300,7 @@ def test_lazy_scene_has_the_bits_of_the_scene_in_memory(site, reflectance):
     xr.testing.assert_identical(sky, before)
 
 
-def test_dates_have_their_own_sun_and_sky(site):
+def test_each_date_has_a_separate_sun_and_cloud_field(site):
     dates = pd.to_datetime(["1987-05-01T16:35", "1987-06-06T16:35"])
     lai = fifesim.lai_scene(site, seed=7) * xr.DataArray([1.0, 1.0], coords={"time": dates}, dims="time")
     rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
@@ -323,12 +323,12 @@ def test_dates_have_their_own_sun_and_sky(site):
         ({"drift": (5.0, 0.0), "time": np.nan}, "time must be a finite number of seconds, got nan"),
     ],
 )
-def test_impossible_skies_are_refused(site, change, message):
+def test_invalid_cloud_field_raises(site, change, message):
     with pytest.raises(ValueError, match=message):
         fifesim.cloud_field(site, **change)
 
 
-def test_impossible_casts_are_refused(site, reflectance):
+def test_invalid_cloud_cast_raises(site, reflectance):
     other = fifesim.cloud_field(fifesim.fife_site(20), 0.4)
     with pytest.raises(ValueError, match="different lattices"):
         reflectance.fifesim.to_toa(clouds=other)
@@ -354,11 +354,11 @@ def test_impossible_casts_are_refused(site, reflectance):
         reflectance.fifesim.to_toa(clouds=sky.drop_vars("base"))
 
 
-def test_an_even_overcast_is_a_layer_above_a_reflector_and_a_shadow_keeps_the_skylight():
-    """By hand, with path reflectance and skylight: clouds alike in all directions dim everything below them alike."""
+def test_overcast_and_shadow_formulas():
+    """By hand: a uniform overcast dims path reflectance and skylight equally; a shadow keeps part of the skylight."""
     clear, path, diffuse, reflected, through, up, albedo = 0.3, 0.06, 0.2, 0.35, 0.6, 0.7, 0.4
     found = clouded_reflectance(clear, path, diffuse, reflected, through, through, through, up, albedo)
     assert found == pytest.approx(reflected + up * through * clear / (1 - clear * albedo), rel=1e-12)
-    # The sun is hidden and half of the skylight too; the air in the line of sight stays lit.
+    # 90 % of the sunlight and half of the skylight are blocked; the path reflectance is unchanged.
     found = clouded_reflectance(clear, path, diffuse, 0.0, 1.0, 0.1, 0.5, 1.0, 0.0)
     assert found == pytest.approx(path + (clear - path) * (0.8 * 0.1 + 0.2 * 0.5), rel=1e-12)
