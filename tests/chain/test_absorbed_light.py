@@ -45,8 +45,8 @@ def test_black_leaves_absorb_as_in_equation_6(leaf_angles):
     np.testing.assert_allclose(budget.green, expected, rtol=0, atol=1e-9)
 
 
-def test_shares_of_photons_are_those_of_the_standard_spectrum():
-    # ASTM G173 is for an air mass of 1.5, a tilted plane and less aerosol. Weights of energy instead of photons would
+def test_photon_shares_agree_with_the_standard_spectrum():
+    # ASTM G173 is for an air mass of 1.5, a tilted plane and less aerosol. Weights by energy instead of photons would
     # differ by 25 %.
     spectrum = pvlib.spectrum.get_reference_spectra(standard="ASTM G173-03")["global"]
     photons = spectrum * spectrum.index
@@ -85,7 +85,7 @@ def test_fpar_of_varying_leaves_and_soil_agrees_with_the_model(lai, leaves, even
     np.testing.assert_allclose(made, expected[0] + expected[1] * (leaves == "all"), rtol=0, atol=1e-6)
 
 
-def test_each_class_absorbs_with_its_own_leaves(site):
+def test_classes_absorb_according_to_their_leaves(site):
     pale = fifesim.Canopy(leaf_optics=fifesim.Leaf(chlorophyll=10))
     classes = {"green": fifesim.CoverClass(lai=2.0), "pale": fifesim.CoverClass(lai=2.0, canopy=pale)}
     land = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=classes, seed=7)
@@ -105,8 +105,10 @@ def test_energy_is_lazy_by_date_and_labelled(lai):
     assert "energy balance" in first.green.attrs["history"]
 
 
-def test_more_leaves_and_diffuse_light_absorb_as_published():
-    """Diffuse light enters at more slant angles, so that it is absorbed more than direct light of a high sun."""
+def test_absorption_increases_with_lai_and_diffuse_light_as_published():
+    """
+    Diffuse light enters at more oblique angles, so that more of it is absorbed than of direct light from a high sun.
+    """
     given = {"brown": 0, "sza": 28.5}
     lai = np.array([0.25, 0.5, 1, 2, 3])
     budget = layers.light_budget(lai, 0.09, 0.06, 0.09, 0.06, 0.13, diffuse_fraction=0.2, **given)
@@ -127,7 +129,7 @@ def test_more_leaves_and_diffuse_light_absorb_as_published():
         ({"leaves": "dead"}, "leaves"),
     ],
 )
-def test_impossible_requests_are_refused(lai, options, message):
+def test_invalid_arguments_are_rejected(lai, options, message):
     with pytest.raises((ValueError, TypeError), match=message):
         lai.fifesim.fpar(**{"method": "energy"} | options)
 

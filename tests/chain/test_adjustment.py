@@ -1,4 +1,4 @@
-"""From one sensor to another, on pairs that are known: the same ground through both."""
+"""Conversion from one sensor to another, for the same ground seen by both."""
 
 import numpy as np
 import pandas as pd
@@ -14,10 +14,10 @@ from fifesim.grids import directions
 from fifesim.grids import grid as grids
 from fifesim.ground.canopy.spectra import library_spectra
 
-# Bands of the MSI nearest to those of the TM.
+# MSI band nearest to each TM band.
 NEAREST = {"TM1": "MSI2", "TM2": "MSI3", "TM3": "MSI4", "TM4": "MSI8", "TM5": "MSI11", "TM7": "MSI12"}
 
-# Leaves and ground that are none of the library's.
+# Leaves and ground that are not in the library.
 LAND = {
     "green": fifesim.Canopy(
         leaf_optics=fifesim.Leaf(1.4, 42, 9, 0, 0.1, 0.009, 0.006),
@@ -58,12 +58,12 @@ def msi(lai):
     return lai.fifesim.surface_reflectance("MSI", canopy=LAND["green"])
 
 
-def test_bands_of_the_tm_are_found_from_those_of_the_msi(lai):
+def test_tm_bands_are_estimated_from_msi_bands(lai):
     """
-    More than twice as well as by the nearest band, in every band; leaves and mixtures of soils are held out.
+    The error is less than half the error of the nearest band, in every band, for leaves and soils not in the library.
 
-    In TM1, 2, 3, 4, 5 and 7: 0.0001, 0.0007, 0.0004, 0.0003, 0.0009, 0.0012; the nearest band 0.0022, 0.0068, 0.0063,
-    0.0009, 0.0051, 0.0074.
+    Errors in TM1, 2, 3, 4, 5 and 7 are 0.0001, 0.0007, 0.0004, 0.0003, 0.0009 and 0.0012. Errors of the nearest band
+    are 0.0022, 0.0068, 0.0063, 0.0009, 0.0051 and 0.0074.
     """
     errors, differences = [], []
     for land in LAND.values():
@@ -115,8 +115,8 @@ def held_out():
 
 
 @pytest.mark.parametrize(("source", "target"), PAIRS)
-def test_stated_error_is_that_of_other_leaves_and_soils(held_out, source, target):
-    """Of PROSPECT-D and SAIL by another code over other soils, with noise as uncertain as stated."""
+def test_stated_error_holds_for_other_leaves_and_soils(held_out, source, target):
+    """Spectra of PROSPECT-D and SAIL from another code over other soils, with noise of the stated uncertainty."""
     inside = [each.name for each in fifesim.instrument(source).bands if _inside(each)]
     seen = held_out.fifesim.to_bands(source, bands=inside)
     noise = np.random.Generator(np.random.Philox(7)).standard_normal(seen.shape)
@@ -130,55 +130,55 @@ def test_stated_error_is_that_of_other_leaves_and_soils(held_out, source, target
 
 
 def _inside(band):
-    """Whether the library reaches over a band."""
+    """Whether the library covers the response of a band."""
     return WAVELENGTH[0] <= band.response.limits[0] and band.response.limits[1] <= WAVELENGTH[-1]
 
 
 def _to_tm(name):
-    """Errors in bands of the TM from those of the MSI for measured spectra, by `adjust_bands` and by the nearest."""
+    """Errors in TM bands for measured spectra, by `adjust_bands` from MSI bands and by the nearest band."""
     table = files.table(name).set_index("wavelength")
     spectra = xr.DataArray(table.to_numpy().T, dims=("sample", "wavelength"), coords={"wavelength": table.index})
-    # The table has holes where the air is opaque.
+    # The table has gaps where the atmosphere is opaque.
     spectra = spectra.interp(wavelength=np.linspace(0.4, 2.45, 206))
     source, truth = (spectra.fifesim.to_bands(name) for name in ("MSI", "TM"))
     ours = rms(bands(source.fifesim.adjust_bands("TM")) - bands(truth))
     return ours, rms(bands(source.sel(band=list(NEAREST.values()))) - bands(truth))
 
 
-def test_measured_spectra_of_the_ground_are_found():
-    """Dead grass and soil that the library lacks, as they were measured, without a canopy's model between."""
+def test_measured_ground_spectra_are_estimated():
+    """Measured dead grass and soil that the library lacks, without a canopy model."""
     ours, nearest = _to_tm("ground_spectra.csv")
-    # TM5 reaches 0.1 um beyond the band that is nearest to it, into an absorption of dry grass.
+    # TM5 extends 0.1 um beyond the nearest band, into an absorption of dry grass.
     assert np.all(np.delete(ours <= nearest / 2, 4)) and ours[4] < 0.004
 
 
-def test_measured_soils_are_found():
-    """In TM7 clay minerals absorb beside the MSI's band, and the nearest band is as good."""
+def test_measured_soils_are_estimated():
+    """In TM7, clay minerals absorb outside the MSI band, and the nearest band is equally good."""
     ours, nearest = _to_tm("verification/held_out_soils.csv")
     assert np.all(ours[:5] <= nearest[:5] / 2) and ours[5] < 0.003
 
 
-def test_grey_stays_grey(msi):
-    """A road is none of the library's, and is not to become a leaf."""
+def test_grey_surfaces_stay_grey(msi):
+    """A road is not in the library and must not be converted to vegetation."""
     road = xr.full_like(msi, 0.2)
     np.testing.assert_allclose(road.fifesim.adjust_bands("TM"), 0.2, atol=0.0015)
 
 
-def test_it_is_a_raster_function(msi):
+def test_adjust_bands_is_a_raster_function(msi):
     found = check_raster_function(lambda each: each.fifesim.adjust_bands("TM"), msi, quantity="surface_reflectance")
     assert found["band"].values.tolist() == list(NEAREST) and found.attrs["instrument"] == "TM"
     assert found["adjustment_error"].attrs["units"] == "1"
     assert found.attrs["history"].endswith("MSI10 MSI11 MSI12, uncertainty 0.0005")
 
 
-def test_missing_band_is_missing_in_the_cell_alone(msi):
+def test_missing_band_affects_only_its_cell(msi):
     msi = msi.copy(deep=True)
     msi[2, 5, 6] = np.nan
     missing = np.argwhere(np.isnan(msi.fifesim.adjust_bands("TM").values))
     assert {tuple(each[1:]) for each in missing} == {(5, 6)} and len(missing) == 6
 
 
-def test_few_bands_do_and_say_that_they_know_less(msi):
+def test_fewer_bands_state_larger_errors(msi):
     ten_metres = msi.sel(band=["MSI2", "MSI3", "MSI4", "MSI8"])
     found = ten_metres.fifesim.adjust_bands("TM", bands=["TM3", "TM4"])
     all_bands = msi.fifesim.adjust_bands("TM", bands=["TM3", "TM4"])
@@ -196,13 +196,13 @@ def test_few_bands_do_and_say_that_they_know_less(msi):
         (lambda msi: msi, {"source": "SPOT"}, "SPOT"),
     ],
 )
-def test_what_is_not_known_is_refused(msi, change, options, said):
+def test_missing_or_invalid_information_is_rejected(msi, change, options, said):
     with pytest.raises(ValueError, match=said):
         change(msi).fifesim.adjust_bands("TM", **options)
 
 
-def test_another_instrument_sees_the_scene(lai):
-    """The image from MSI bands is that from the ground itself, within two digital numbers."""
+def test_image_of_another_instrument_agrees_with_direct_simulation(lai):
+    """The image from MSI bands equals the image from the ground within two digital numbers."""
     scenes = {name: lai.fifesim.surface_reflectance(name, canopy=LAND["green"]) for name in ("MSI", "TM")}
     seen = scenes["MSI"].fifesim.as_seen_by("TM", noise=(), seed=1)
     truth = scenes["TM"].fifesim.to_toa().fifesim.sense("TM")
@@ -211,7 +211,7 @@ def test_another_instrument_sees_the_scene(lai):
     assert seen["adjustment_error"].dims == ("band",)
 
 
-def test_the_sun_of_another_time_lights_it(msi):
+def test_sun_position_follows_the_given_time(msi):
     when = pd.Timestamp("1987-08-15T16:40Z")
     seen = msi.fifesim.as_seen_by("TM", bands=["TM3", "TM4"], time=when)
     sun = fifesim.sun_position(when, 39.1, -96.6)
@@ -225,8 +225,8 @@ def test_the_sun_of_another_time_lights_it(msi):
         msi.fifesim.as_seen_by("TM", time=when, geometry=fifesim.Geometry(30, 120))
 
 
-def test_lines_are_near_those_of_nasa():
-    """HLS took 500 spectra of 160 Hyperion scenes, deserts among them, and another blue response."""
+def test_adjustment_lines_agree_with_hls():
+    """HLS used 500 spectra from 160 Hyperion scenes, including deserts, and another blue response."""
     lines = fifesim.spectral_adjustment("Sentinel-2A", "OLI", bands=[f"OLI{number}" for number in range(1, 8)])
     assert lines["source_band"].values.tolist() == ["MSI1", "MSI2", "MSI3", "MSI4", "MSI8A", "MSI11", "MSI12"]
     reflectance = 0.15
@@ -238,7 +238,7 @@ def test_lines_are_near_those_of_nasa():
     assert np.all(lines["error"].values <= lines["difference"].values)
 
 
-def test_pairs_that_nobody_published_have_no_line_of_others():
+def test_unpublished_pairs_have_no_published_line():
     lines = fifesim.spectral_adjustment("AVHRR", "TM")
     assert lines["band"].values.tolist() == ["TM2", "TM3", "TM4"]
     assert np.isnan(lines["published_slope"].values).all() and set(lines["reference"].values) == {""}
@@ -246,7 +246,7 @@ def test_pairs_that_nobody_published_have_no_line_of_others():
         fifesim.spectral_adjustment("AVHRR", "TM", bands=["TM7"])
 
 
-def test_an_instrument_of_several_pixels_gives_a_tree(lai):
+def test_several_pixel_sizes_give_a_tree(lai):
     scene = lai.fifesim.surface_reflectance("MSI")
     tree = scene.fifesim.as_seen_by("OLI", bands=["OLI4", "OLI8"])
     assert sorted(node.path for node in tree.leaves) == ["/15m", "/30m"]
@@ -271,7 +271,7 @@ def grey_wave(names, period):
 
 
 def contrast(image, period):
-    """Amplitude of a wave in an image over the image's mean."""
+    """Amplitude of a wave in an image divided by the mean of the image."""
     x = image["x"].values - float(image["x"][0]) + 15.0
     rows = image.isel(y=slice(3, -3), x=slice(5, -5)).mean("y").values
     phase = 2 * np.pi * x[5:-5] / period
@@ -281,8 +281,8 @@ def contrast(image, period):
 
 
 @pytest.mark.parametrize(("target", "period"), [("TM", 75.0), ("L4TM", 75.0), ("L4TM", 150.0)])
-def test_contrast_is_that_of_the_other_instrument_alone(target, period):
-    """A wave that the MSI recorded has the contrast that the TM sees of the ground; the floor costs 1.1 % at 75 m."""
+def test_contrast_equals_direct_observation(target, period):
+    """A wave recorded by MSI has the contrast that TM would record; the regularisation costs 1.1 % at 75 m."""
     direct = grey_wave(["TM3", "TM4"], period).fifesim.to_toa().fifesim.sense(target, quantise=False)
     scene = grey_wave(TEN_METRES, period).fifesim.to_toa().fifesim.sense("MSI", quantise=False).fifesim.to_surface()
     assert scene.attrs["recorded_by"] == "MSI"
@@ -296,8 +296,8 @@ def test_contrast_is_that_of_the_other_instrument_alone(target, period):
     assert "less the blur of MSI" in seen.attrs["history"] and seen.attrs["recorded_by"] == target
 
 
-def test_a_scene_as_coarse_as_the_image_says_what_is_missing():
-    """OLI's pixels of 30 m pass 0.64 as detectors and 0.64 as cells at the Nyquist frequency of 30 m."""
+def test_coarse_scene_warns_about_missing_contrast():
+    """At the Nyquist frequency of 30 m, OLI passes 0.64 as a detector and 0.64 as square cells."""
     oli = fifesim.instrument("OLI", "detector")
     ground = grey_wave(["TM3", "TM4"], 150.0).assign_coords(band=["OLI4", "OLI5"]).drop_attrs(deep=False)
     scene = ground.fifesim.to_toa(instrument="OLI").fifesim.sense(oli, quantise=False).fifesim.to_surface()
@@ -307,7 +307,7 @@ def test_a_scene_as_coarse_as_the_image_says_what_is_missing():
     np.testing.assert_allclose(seen["contrast_left"], passed**2 * 1.04 / (passed**2 + 0.04), rtol=2e-3)
 
 
-def test_who_recorded_a_scene_travels_with_it():
+def test_recording_instrument_is_kept_in_attrs():
     cells = grey_wave(TEN_METRES, 150.0)
     image = cells.fifesim.to_toa().fifesim.sense("MSI")
     assert image.fifesim.to_reflectance().attrs["recorded_by"] == "MSI" and "recorded_by" not in cells.attrs
@@ -320,8 +320,8 @@ def test_who_recorded_a_scene_travels_with_it():
     xr.testing.assert_equal(again, adjusted.fifesim.as_seen_by("L4TM", bands=["TM3", "TM4"], recorded=False))
 
 
-def test_shares_of_bands_are_those_of_the_variance():
-    """A band of the source itself has all of the variance; shares of others sum to one."""
+def test_band_shares_are_shares_of_the_variance():
+    """A source band itself has all of the variance; shares of other bands sum to one."""
     sources = tuple(band.response for band in fifesim.instrument("MSI").select(TEN_METRES))
     shares = adjustment._variance_shares(sources, sources[2:], 1e-5)
     np.testing.assert_allclose(shares, [[0, 0, 1, 0], [0, 0, 0, 1]], rtol=0, atol=2e-3)
@@ -339,7 +339,7 @@ def test_shares_of_bands_are_those_of_the_variance():
         np.testing.assert_allclose(shares, expected, rtol=1e-9, atol=1e-12)
 
 
-def test_a_recorded_scene_is_the_same_in_any_chunks(msi):
+def test_as_seen_by_is_a_raster_function(msi):
     scene = msi.sel(band=TEN_METRES)
 
     def seen(raster):
@@ -348,7 +348,7 @@ def test_a_recorded_scene_is_the_same_in_any_chunks(msi):
     check_raster_function(seen, scene, quantity="dn")
 
 
-def test_coarser_cells_are_means_of_pixels_and_finer_ones_repeat_them():
+def test_coarser_cells_average_pixels_and_finer_cells_repeat_them():
     msi = fifesim.instrument("MSI")
     ten, twenty = msi.select(["MSI4", "MSI11"])
     for band, cells, widths in ((ten, (10, 10), [10]), (ten, (20, 20), [20, 20]), (twenty, (10, 10), [20])):

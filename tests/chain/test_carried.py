@@ -1,4 +1,4 @@
-"""What a raster carries of air, bands and directions, or is asked for."""
+"""Atmosphere, bands and directions that a raster carries in its attrs and coordinates, or that must be given."""
 
 import dataclasses
 import warnings
@@ -35,8 +35,8 @@ def user_raster(site, wavelengths):
     return grids.place(array, site)
 
 
-def test_user_raster_with_only_wavelengths_goes_through(site):
-    """No band names and no instrument: narrow bands, and the instrument's nearest ones."""
+def test_user_raster_needs_only_wavelengths(site):
+    """Without band names and instrument, bands are narrow, and the image has the nearest bands of the instrument."""
     mine = directions.with_geometry(user_raster(site, [0.665, 0.842]), fifesim.fife_geometry())
     toa = check_raster_function(fifesim.to_toa, mine, quantity="toa_reflectance")
     responses = tuple(
@@ -58,8 +58,8 @@ def test_user_raster_with_only_wavelengths_goes_through(site):
 
 
 @pytest.mark.parametrize("names", [[3, 4], ["B03", "B04"], ["red", "nir"], ["tm_3", "TM 4"]])
-def test_bands_by_the_names_that_people_have(site, names):
-    """They are the instrument's from here on, with its wavelengths."""
+def test_common_band_names_are_recognised(site, names):
+    """Bands get the names and wavelengths of the instrument."""
     mine = directions.with_geometry(user_raster(site, [0.66, 0.83]).drop_vars("wavelength"), fifesim.fife_geometry())
     toa = fifesim.to_toa(mine.assign_coords(band=names), AIR, instrument="Landsat 5")
     assert toa["band"].values.tolist() == TM34
@@ -75,7 +75,7 @@ def test_raster_without_bands_is_refused(site):
         fifesim.to_toa(user_raster(site, [0.66, 0.83]).drop_vars("wavelength"), AIR, time="1987-06-06T16:35Z")
 
 
-def test_air_of_a_raster_of_ones_own_is_no_silent_assumption(site, lai):
+def test_assumed_atmosphere_of_a_user_raster_is_a_warning(site, lai):
     mine = directions.with_geometry(user_raster(site, [0.66, 0.83]), fifesim.fife_geometry())
     with pytest.warns(
         UserWarning, match=r"the atmosphere over mine is unknown: .*altitude=0\.4 km.*give atmosphere="
@@ -97,7 +97,7 @@ def test_air_of_a_raster_of_ones_own_is_no_silent_assumption(site, lai):
         theirs.fifesim.surface_reflectance("TM", atmosphere=AIR)
 
 
-def test_geometry_travels_with_the_raster(lai):
+def test_geometry_is_kept_along_the_chain(lai):
     sun = Geometry(50.0, 140.0, 8.0, 20.0, 1.01)
     image = lai.fifesim.surface_reflectance("TM", bands=TM34, geometry=sun).fifesim.to_toa().fifesim.sense("TM")
     assert directions.geometry_of(image) == sun
@@ -105,7 +105,7 @@ def test_geometry_travels_with_the_raster(lai):
 
 
 def own_instrument(name, tm3):
-    """The Thematic Mapper with another name, or the response of another band in TM3."""
+    """The Thematic Mapper with another name, or with the response of another band in TM3."""
     tm = instrument("TM", "paper")
     bands = tuple(
         dataclasses.replace(band, srf=tm.select(tm3)[0].srf) if band.name == "TM3" else band for band in tm.bands
@@ -114,7 +114,7 @@ def own_instrument(name, tm3):
 
 
 @pytest.mark.parametrize("mine", [own_instrument("MINE", "TM3"), own_instrument("TM", "TM1")])
-def test_an_instrument_of_ones_own_travels_whole(lai, mine, tmp_path):
+def test_user_instrument_is_kept_along_the_chain(lai, mine, tmp_path):
     rho = fifesim.surface_reflectance(lai, mine, bands=TM34)
     toa = fifesim.to_toa(rho)
     np.testing.assert_array_equal(toa, fifesim.to_toa(rho, instrument=mine))
@@ -126,7 +126,7 @@ def test_an_instrument_of_ones_own_travels_whole(lai, mine, tmp_path):
     assert np.array_equal(as_tm, again.fifesim.to_surface()) == (mine.name == "MINE"), "its TM3 is TM1"
 
 
-def test_the_instrument_that_a_raster_carries_is_the_default(lai):
+def test_instrument_of_the_raster_is_the_default(lai):
     toa = fifesim.surface_reflectance(lai, "MSI", bands=["MSI4", "MSI8"]).fifesim.to_toa()
     assert toa.fifesim.sense().attrs["instrument"] == "MSI"
     assert toa.fifesim.sense("TM").attrs["instrument"] == "TM"
@@ -136,7 +136,7 @@ def test_the_instrument_that_a_raster_carries_is_the_default(lai):
 
 @pytest.fixture(scope="module")
 def hazy(site):
-    """Black, even ground and its image through haze, and the ground of a canopy."""
+    """Images of uniform black ground and of a canopy through haze."""
     dark = directions.with_geometry(user_raster(site, [0.665, 0.842]) * 0, fifesim.fife_geometry())
     canopy = dark + xr.DataArray([0.05, 0.4], dims="band")
     return {name: fifesim.to_toa(rho, fifesim.Atmosphere(visibility=10.0)) for name, rho in
@@ -144,17 +144,20 @@ def hazy(site):
 
 
 class TestAssumedAir:
-    """The classic experiment: a hazy image corrected as if the air were clear, and the other way round."""
+    """A hazy image corrected with a clear atmosphere, and vice versa."""
 
-    def test_is_asked_for(self, hazy):
+    def test_must_be_requested(self, hazy):
         clear = fifesim.Atmosphere(visibility=40.0)
         with pytest.raises(ValueError, match=r"made for another atmosphere.*to_surface\(\.\.\., assume=True\)"):
             hazy["dark"].fifesim.to_surface(clear)
         with pytest.raises(ValueError, match="assume=True needs the atmosphere to assume"):
             hazy["dark"].fifesim.to_surface(assume=True)
 
-    def test_leaves_the_path_reflectance_that_was_not_taken_off(self, hazy):
-        """Over black ground all that is left is the difference of two paths, through the clear air's transmittance."""
+    def test_leaves_uncorrected_path_reflectance(self, hazy):
+        """
+        Over black ground, the result is the difference of the two path reflectances, divided by the clear
+        transmittance.
+        """
         clear = fifesim.Atmosphere(visibility=40.0)
         found = check_raster_function(
             lambda toa: toa.fifesim.to_surface(clear, assume=True), hazy["dark"], quantity="surface_reflectance"
@@ -171,7 +174,7 @@ class TestAssumedAir:
         np.testing.assert_allclose(found[:, 0, 0], expected, rtol=1e-12)
         assert found.attrs["atmosphere"] == clear.text
 
-    def test_haze_left_lowers_ndvi_and_haze_overdone_raises_it(self, hazy):
+    def test_uncorrected_haze_lowers_ndvi_and_overcorrection_raises_it(self, hazy):
         """Path reflectance is larger in the red, where a canopy is dark."""
         ndvi = {
             visibility: float(
@@ -183,6 +186,6 @@ class TestAssumedAir:
         assert ndvi[10.0] == pytest.approx(0.35 / 0.45, abs=1e-12)
         assert ndvi[40.0] < ndvi[10.0] - 0.02 and ndvi[7.0] > ndvi[10.0] + 0.02
 
-    def test_same_air_is_no_error_and_makes_none(self, hazy):
+    def test_same_atmosphere_changes_nothing(self, hazy):
         same = hazy["canopy"].fifesim.to_surface(fifesim.Atmosphere(visibility=10.0), assume=True)
         xr.testing.assert_identical(same, hazy["canopy"].fifesim.to_surface())

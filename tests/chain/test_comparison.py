@@ -1,4 +1,4 @@
-"""One scene through many instruments."""
+"""Simulation of one scene for many instruments."""
 
 import warnings
 from dataclasses import replace
@@ -17,7 +17,7 @@ from fifesim.sensor.description.spectral_response import ResponseList
 NAMES = ["TM", "OLI", "MSI"]
 
 
-def test_each_image_is_that_of_the_chain(lai):
+def test_images_equal_the_chain(lai):
     images = fifesim.compare(lai, ["TM", "OLI"])
     assert isinstance(images, xr.DataTree) and list(images.children) == ["TM", "OLI"]
     rho = fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"])
@@ -29,8 +29,8 @@ def test_each_image_is_that_of_the_chain(lai):
     xr.testing.assert_identical(oli, rho.fifesim.to_toa().fifesim.sense("OLI"))
 
 
-def test_one_pass_makes_them_all(lai):
-    """Lazy until asked, the same bits, and each chunk of the scene is read once."""
+def test_all_images_are_computed_in_one_pass(lai):
+    """The result is lazy and identical to separate runs, and each chunk of the scene is read once."""
     reads = []
 
     def read(block):
@@ -66,12 +66,12 @@ def test_bands_and_options_reach_the_instruments(lai):
         (["TM", "MT"], {}, "MT"),
     ],
 )
-def test_what_cannot_be_compared_is_refused(lai, instruments, options, message):
+def test_invalid_comparison_is_rejected(lai, instruments, options, message):
     with pytest.raises(ValueError, match=message):
         fifesim.compare(lai, instruments, **options)
 
 
-def test_a_band_beyond_the_spectra_is_named(lai):
+def test_band_beyond_the_spectra_is_named(lai):
     tm = fifesim.instrument("TM")
     far = replace(tm.bands[0], name="far", srf=ResponseList((2.4, 2.5, 2.6), (0.0, 1.0, 0.0)))
     with pytest.raises(
@@ -80,13 +80,13 @@ def test_a_band_beyond_the_spectra_is_named(lai):
         fifesim.compare(lai, [replace(tm, bands=(*tm.bands, far))], bands={"TM": ["far"]})
 
 
-def test_bands_of_several_resolutions_are_nodes_below(lai):
+def test_resolutions_are_separate_nodes(lai):
     images = fifesim.compare(lai, ["MSI", "TM"], bands={"MSI": ["MSI4", "MSI11"]})
     assert sorted(node.path for node in images.leaves) == ["/MSI/10m", "/MSI/20m", "/TM"]
     assert images["MSI/20m/dn"]["band"].values.tolist() == ["MSI11"]
 
 
-def test_table_has_a_row_for_each_instrument(lai):
+def test_table_has_one_row_per_instrument(lai):
     images = fifesim.compare(in_chunks(lai, {"y": 23, "x": 27}), ["MSI", "TM"])
     table = images.fifesim.comparison_table(truth=lai)
     assert table.index.tolist() == ["MSI", "TM"] and table.index.name == "instrument"
@@ -101,8 +101,8 @@ def test_table_has_a_row_for_each_instrument(lai):
     assert "r2" not in images.fifesim.comparison_table()
 
 
-def test_images_of_an_instrument_s_other_pixels_have_rows_of_their_own(lai):
-    """Bands without a red and a near infrared have no NDVI."""
+def test_pixel_sizes_of_an_instrument_have_separate_rows(lai):
+    """NDVI is missing without a red and a near infrared band."""
     image = fifesim.compare(lai, ["TM"])["TM"]
     tree = xr.DataTree.from_dict({"/TM/30m": image.to_dataset(), "/TM/red": image["dn"].isel(band=[0]).to_dataset()})
     table = tree.fifesim.comparison_table()
@@ -110,12 +110,12 @@ def test_images_of_an_instrument_s_other_pixels_have_rows_of_their_own(lai):
     assert np.isnan(table.loc["TM/red", "ndvi_mean"]) and table.loc["TM/red", "bands"] == "TM3"
 
 
-def test_table_of_something_else_is_refused(lai):
+def test_table_of_other_trees_is_rejected(lai):
     with pytest.raises(ValueError, match="TM has no dn or toa_radiance, but lai"):
         xr.DataTree.from_dict({"/TM": lai.to_dataset(name="lai")}).fifesim.comparison_table()
 
 
-def test_a_landscape_is_compared_as_its_chain_sees_it(site):
+def test_comparison_of_a_landscape_equals_the_chain(site):
     land = fifesim.landscape(site, seed=3, soil=fifesim.Field(sd=0.03))
     images = land.fifesim.compare(["TM", "MSI"])
     rho = land.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
@@ -123,7 +123,7 @@ def test_a_landscape_is_compared_as_its_chain_sees_it(site):
     assert list(images.children) == ["TM", "MSI"]
 
 
-# An instrument whose blur was measured, one whose blur is assumed, and one of which only the detector is known.
+# Instruments with measured blur, with assumed blur, and with unknown blur (only the detector is known).
 MIXED = ["MSI", "OLI", "SuperDove"]
 
 
@@ -134,7 +134,7 @@ def mixed():
         return fifesim.compare(fifesim.lai_scene(grid, seed=7), MIXED)
 
 
-def test_comparison_of_measured_assumed_and_unknown_blur_names_the_instruments(lai):
+def test_different_origins_of_blur_and_noise_are_a_warning(lai):
     said = r"blur in-flight \(MSI\), assumed \(OLI\), unknown \(SuperDove\)"
     with pytest.warns(UserWarning, match=said) as caught:
         fifesim.compare(lai, MIXED)
@@ -145,13 +145,13 @@ def test_comparison_of_measured_assumed_and_unknown_blur_names_the_instruments(l
         )
 
 
-def test_comparison_of_one_kind_of_description_does_not_warn(lai):
+def test_equal_origins_are_no_warning(lai):
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         fifesim.compare(lai, ["MSI", "MSI-C", "TM"])
 
 
-def test_every_comparison_states_origins_and_a_dash_for_the_unknown(mixed, monkeypatch):
+def test_table_and_plot_state_origins_and_dashes_for_unknown_terms(mixed, monkeypatch):
     table = fifesim.comparison_table(mixed)
     assert table["blur"].to_dict() == {"MSI": "in-flight ± 0.03", "OLI": "assumed ± 0.06", "SuperDove": "–"}
     assert table["geolocation"].to_dict() == {"MSI": "in-flight ± 1 m", "OLI": "in-flight ± 4 m", "SuperDove": "–"}

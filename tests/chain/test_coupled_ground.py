@@ -1,4 +1,4 @@
-"""Ground that reflects by direction, from leaf area or kernels to the top of the atmosphere."""
+"""Coupling of directional ground reflectance with the atmosphere, from leaf area or BRDF models."""
 
 from dataclasses import fields, replace
 
@@ -40,8 +40,8 @@ def directional():
     return ground(streams="directional").fifesim.to_toa()
 
 
-def test_cells_have_the_sum_over_the_sky(directional):
-    """SAIL at the leaf area of a cell, without the table."""
+def test_cells_agree_with_the_sum_over_the_sky(directional):
+    """Expected values from SAIL at the leaf area of a cell, without the table."""
     lai = float(LAI[3, 4])
     for name in BANDS:
         (band,) = (each.response for each in fifesim.instrument("TM").select([name]))
@@ -59,7 +59,7 @@ def test_cells_have_the_sum_over_the_sky(directional):
 
 
 @pytest.mark.parametrize("coupling", ["directional", "four-stream"])
-def test_one_pass_is_streams_and_coupling(coupling):
+def test_one_pass_equals_streams_and_coupling(coupling):
     streams = ground(streams="directional" if coupling == "directional" else True)
     assert tuple(streams.stream.values) == STREAMS_OF[coupling] and streams.dims == ("stream", "band", "y", "x")
     with no_compute():
@@ -82,7 +82,7 @@ def test_equal_streams_are_lambertian():
 
 
 def test_streams_of_a_landscape_and_of_varying_soil():
-    """Classes and a background by cell have the streams of uniform scenes."""
+    """With a background by cell, streams equal the streams of uniform scenes."""
     soil = xr.DataArray(np.where(np.arange(72) < 36, 0.15, 0.25) * np.ones((60, 1)), dims=("y", "x"))
     soil = LAI.copy(data=soil.values).rename("background").drop_attrs()
     both = ground(streams="directional", canopy=GRASS.replace(background=soil))
@@ -97,7 +97,7 @@ def sides(values):
 
 
 @pytest.mark.parametrize("given", [{"brown": (0.15, 0.6)}, {"crown_cover": (0.4, 0.8), "crown_shape": 0.5}])
-def test_streams_of_a_varying_share_are_those_of_numbers(given):
+def test_streams_of_a_varying_fraction_equal_uniform_scenes(given):
     (name, values), *others = given.items()
     canopy = GRASS.replace(brown_leaf=(0.2, 0.1), **dict(others))
     both = ground(streams=True, canopy=canopy.replace(**{name: sides(values)}))
@@ -106,8 +106,8 @@ def test_streams_of_a_varying_share_are_those_of_numbers(given):
         np.testing.assert_allclose(both[..., part], one[..., part], rtol=0, atol=2e-5)
 
 
-def test_directional_streams_of_a_varying_share_are_those_of_its_tables(monkeypatch):
-    """At the shares of two tables."""
+def test_directional_streams_of_a_varying_fraction_are_exact_at_the_nodes(monkeypatch):
+    """The fractions are the nodes of two tables."""
     monkeypatch.setitem(coupled_ground._SHARES, "brown", 2)
     canopy, values = GRASS.replace(brown_leaf=(0.2, 0.1)), (1 - (chebpts1(2) / 2 + 0.5)).tolist()
     both = ground(streams="directional", canopy=canopy.replace(brown=sides(values)))
@@ -117,7 +117,7 @@ def test_directional_streams_of_a_varying_share_are_those_of_its_tables(monkeypa
 
 
 @pytest.mark.parametrize("surface", [fifesim.RossLi(0.3, 0.0, 0.0), fifesim.RPV([0.1] * 6, 1.0, 0.0, 1.0)])
-def test_lambertian_kernels_have_the_equation_of_the_atmosphere(surface):
+def test_lambertian_surfaces_agree_with_the_uniform_equation(surface):
     terms = band_terms(HAZE, [b.response for b in fifesim.instrument("TM").select(None)], 50.0, 30.0, SLANT.raa)
     rho = float(np.ravel(surface.reflectance(0.0, 0.0, 0.0))[0])
     for coupling in ("directional", "four-stream", "lambert"):
@@ -126,7 +126,9 @@ def test_lambertian_kernels_have_the_equation_of_the_atmosphere(surface):
 
 
 def test_to_surface_inverts_with_the_shape_of_the_ground():
-    """Every cell is a multiple of one RPV surface; its reflectance factor under sun and sky comes back."""
+    """
+    Every cell is a multiple of one RPV surface; the ratios of its reflectance factors under sun and sky are recovered.
+    """
     shape, factor = fifesim.RPV(0.1, 0.75, -0.1, 0.2), np.array([[0.5, 1.0], [2.0, 3.0]])
     grid = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=20, height=20, cell=10)
     given = {"instrument": "TM", "geometry": SLANT}
@@ -146,7 +148,7 @@ def test_to_surface_inverts_with_the_shape_of_the_ground():
         image.fifesim.to_surface(HAZE, like=shape, adjacency=True, **given)
 
 
-def test_refusals():
+def test_invalid_arguments_are_rejected():
     with pytest.raises(ValueError, match="needs stream >o, ao"):
         ground(streams=True).fifesim.to_toa(coupling="directional")
     with pytest.raises(ValueError, match="holds one reflectance factor"):
@@ -179,7 +181,7 @@ def test_refusals():
 
 
 @pytest.mark.parametrize("make", [ground, lambda: ground(LAI.chunk(y=31)), lambda: fifesim.RossLi(0.2, 0.1, 0.03)])
-def test_a_wrong_coupling_is_refused(make):
+def test_unknown_coupling_is_rejected(make):
     with pytest.raises(ValueError, match="coupling must be 'directional', 'four-stream' or 'lambert'"):
         fifesim.to_toa(make(), HAZE, instrument="TM", geometry=SLANT, coupling="directionl")
 
@@ -187,13 +189,13 @@ def test_a_wrong_coupling_is_refused(make):
 @pytest.mark.parametrize(
     "option", [{"elevation": LAI}, {"adjacency": True}, {"surroundings": 0.2}, {"time": "1987-07-01T17:00"}]
 )
-def test_a_surface_takes_no_options_of_rasters(option):
+def test_uniform_surface_rejects_raster_options(option):
     (name,) = option
     with pytest.raises(ValueError, match=f"{name} needs rasters"):
         fifesim.to_toa(fifesim.RossLi(0.2, 0.1, 0.03), HAZE, instrument="TM", geometry=SLANT, **option)
 
 
-def test_streams_of_other_directions_or_beyond_reflectance_are_refused():
+def test_streams_for_other_directions_or_out_of_range_are_rejected():
     streams = ground(streams=True)
     lazy = ground(LAI.chunk(y=31))
     for name in ("sza", "vza"):
@@ -225,8 +227,8 @@ def test_discrete_ordinates_have_no_directional_streams():
         LAI[:2, :2].fifesim.surface_reflectance("TM", bands=BANDS, streams="directional", **known, **exact)
 
 
-def test_adjacency_of_equal_streams_is_lambertian_and_of_even_ground_nothing():
-    """With the streams of one factor, also in a bright environment; of an even scene, in itself."""
+def test_adjacency_of_equal_streams_is_lambertian_and_has_no_effect_on_uniform_ground():
+    """Equal streams are also Lambertian with a bright environment."""
     level = ground()
     for given in ({}, {"surroundings": [0.05, 0.3]}):
         expected = level.fifesim.to_toa(adjacency=True, **given)
@@ -242,8 +244,10 @@ def test_adjacency_of_equal_streams_is_lambertian_and_of_even_ground_nothing():
     np.testing.assert_allclose(lazy.compute(), ground(streams="directional").fifesim.to_toa(adjacency=True), rtol=1e-12)
 
 
-def test_surroundings_enter_by_the_streams_that_do_not_lead_to_the_view():
-    """A dark cell in an even bright scene: its own streams to the view, and those of the scene for the sky."""
+def test_surroundings_affect_only_the_streams_into_the_sky():
+    """
+    A dark cell in a uniform bright scene: streams to the view are from the cell, streams to the sky from the scene.
+    """
     streams = ground(1.5 + 0 * LAI, streams="directional").load()
     bright = streams.isel(y=0, x=0).values
     dark = streams.copy()
@@ -261,7 +265,7 @@ def test_surroundings_enter_by_the_streams_that_do_not_lead_to_the_view():
     assert abs(found / alone - 1).min() > 0.01
 
 
-def test_streams_of_slopes_are_scaled_as_the_factor():
+def test_streams_of_slopes_are_scaled_like_the_reflectance_factor():
     dem = fifesim.flint_hills(GRID, seed=7)
     given = {"canopy": GRASS, "atmosphere": HAZE, "geometry": SLANT, "bands": BANDS}
     for slopes in ("kt", "upright"):
@@ -272,8 +276,8 @@ def test_streams_of_slopes_are_scaled_as_the_factor():
 
 
 @pytest.mark.parametrize("coupling", ["directional", "four-stream"])
-def test_a_setup_is_its_steps(coupling):
-    """Hills, classes, adjacency and clouds together, and the flat scene that is coupled in one pass."""
+def test_setup_equals_the_steps(coupling):
+    """Hills, classes, adjacency and clouds together, and a flat scene that is coupled in one pass."""
     land = fifesim.landscape(GRID, cover=fifesim.Patches("voronoi", 60), classes=CLASSES, seed=3)
     sky = fifesim.cloud_field(GRID, 0.5, seed=1, margin=3000)
     own = {"atmosphere": HAZE, "geometry": SLANT, "bands": BANDS, "dem": fifesim.flint_hills(GRID, seed=7)}
@@ -289,14 +293,17 @@ def test_a_setup_is_its_steps(coupling):
 
 
 @pytest.mark.parametrize("surface", [fifesim.RossLi(0.3, 0.1, 0.02), fifesim.RPV(0.1, 0.75, -0.1, 0.2)])
-def test_rasters_of_kernels_are_their_numbers(surface):
-    """Cell by cell and band by band, lazily; with NaN; as streams, adjacency of even ground changes nothing."""
+def test_rasters_of_brdf_parameters_agree_with_numbers(surface):
+    """
+    Cells and bands agree with uniform surfaces, also lazily and with NaN; adjacency changes TOA reflectance by 0.1 to
+    20 %.
+    """
     first, *others = (each.name for each in fields(surface))
     value = getattr(surface, first)
     by_cell = xr.where(np.arange(72) < 36, value, 0.8 * value) + 0 * LAI.drop_attrs()
     by_cell = by_cell.where(LAI[0, 0] != LAI).transpose("y", "x").odc.assign_crs(GRID.crs)
     by_band = xr.concat([by_cell, 0.9 * by_cell], "band").assign_coords(band=BANDS)
-    # A Ross-Li surface is brighter by all weights, RPV by the first.
+    # All weights scale a Ross-Li surface; the first parameter scales RPV.
     scaled = [first, *others] if isinstance(surface, fifesim.RossLi) else [first]
     shape = {name: by_band / value * getattr(surface, name) for name in scaled}
     raster = replace(surface, **shape)
@@ -323,7 +330,7 @@ def test_rasters_of_kernels_are_their_numbers(surface):
 
 @pytest.mark.parametrize("lazy", [False, True])
 def test_to_surface_inverts_with_the_shape_of_a_canopy(lazy):
-    """The reflectance factor of every cell comes back, which one reflectance factor misses by up to 2 %."""
+    """The reflectance factor of every cell is recovered; a single reflectance factor has errors up to 2 %."""
     factor, toa = ground(), ground(streams="directional").fifesim.to_toa()
     seen = in_chunks(toa, {"y": 31}) if lazy else toa
     with no_compute():

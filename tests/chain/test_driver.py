@@ -28,7 +28,7 @@ def setup():
     )
 
 
-def test_steps_are_the_labelled_steps_to_the_bit(lai, setup):
+def test_steps_equal_the_labelled_steps_to_the_bit(lai, setup):
     driver, labelled = Driver(setup), reflectance_of(setup, lai)
     level = driver.reflectance(lai.values)
     np.testing.assert_array_equal(level, labelled)
@@ -40,7 +40,7 @@ def test_steps_are_the_labelled_steps_to_the_bit(lai, setup):
         np.testing.assert_array_equal(driver.fpar(lai.values, 0.94, leaves), expected)
 
 
-def test_slopes_are_those_of_the_labelled_steps(lai, setup):
+def test_slopes_equal_the_labelled_steps(lai, setup):
     dem = fifesim.flint_hills(GRID.pad(1), seed=2)
     setup = replace(setup, upwelling=False)
     light = light_on_slopes(dem, grids.geobox(lai), setup.geometry)
@@ -48,7 +48,7 @@ def test_slopes_are_those_of_the_labelled_steps(lai, setup):
     np.testing.assert_array_equal(found, reflectance_of(replace(setup, dem=dem), lai))
 
 
-def test_digital_numbers_lead_back_to_their_reflectance(setup):
+def test_reflectance_is_recovered_from_digital_numbers(setup):
     driver = Driver(setup)
     reflectance = np.linspace(0.05, 0.3, 60).reshape(2, 5, 6)
     dn = driver.recorded(driver.radiance(reflectance))
@@ -78,7 +78,7 @@ def test_varying_parts_are_named(lai, setup):
         {"quantise": False, "interval": 45.0, "min_valid": 0.8},
     ],
 )
-def test_an_image_is_the_labelled_one_to_the_bit(lai, own):
+def test_image_equals_the_labelled_image_to_the_bit(lai, own):
     setup = fifesim.Setup(**{"bands": ("TM3", "TM4"), "geometry": fifesim.fife_geometry()} | own)
     driver, level = Driver(setup), reflectance_of(setup, lai)
     found, expected = driver.image(driver.toa(level.values), GRID), image_of(setup, level)
@@ -89,7 +89,7 @@ def test_an_image_is_the_labelled_one_to_the_bit(lai, own):
     np.testing.assert_array_equal(means, fifesim.aggregate(lai, 35.0, min_valid=setup.min_valid))
 
 
-def test_a_shared_driver_draws_the_noise_of_each_seed(lai):
+def test_shared_driver_draws_noise_by_seed(lai):
     setup = fifesim.Setup("OLI", bands=("B4", "B5"), geometry=fifesim.fife_geometry(), noise=("thermal",))
     driver = Driver(setup)
     toa = driver.toa(driver.reflectance(lai.values))

@@ -1,4 +1,4 @@
-"""Engines beside each other."""
+"""Comparison of atmospheric engines."""
 
 import numpy as np
 import pytest
@@ -20,8 +20,8 @@ def both():
     return compare_engines(setup_of())
 
 
-def test_terms_are_those_of_each_engine(both):
-    """Reflectance by the equation of a uniform surface, written out."""
+def test_comparison_has_the_terms_of_the_engine(both):
+    """Reflectance from the equation of a uniform surface, written out."""
     bands = [fifesim.instrument("TM").select(name)[0].response for name in ("TM4", "TM3")]
     terms = band_terms(HAZE, bands, 70.0, 0.0, 120.0)
     found = both.sel(engine="5S")
@@ -35,8 +35,8 @@ def test_terms_are_those_of_each_engine(both):
     assert float(found["ndvi"]) == pytest.approx((infrared - red) / (infrared + red), rel=1e-12)
 
 
-def test_engines_see_one_surface_in_one_haze_differently(both):
-    """Urban haze under a low sun: 5S is more than 2 % bright in red and near infrared."""
+def test_engines_differ_in_haze(both):
+    """Urban haze under a low sun: 5S is more than 2 % too bright in red and near infrared."""
     assert both["surface_reflectance"].dims == ("band",)
     toa = both["toa_reflectance"]
     error = toa.sel(engine="5S") / toa.sel(engine="successive-orders") - 1
@@ -44,8 +44,8 @@ def test_engines_see_one_surface_in_one_haze_differently(both):
     assert float(both["sza"]) == 70 and "visibility=6" in both.attrs["atmosphere"]
 
 
-def test_quick_error_is_that_of_the_bands(both):
-    """At one wavelength a band and without gases: .5 %."""
+def test_quick_error_agrees_with_the_bands(both):
+    """The quick error uses one wavelength per band and no gases, which costs 0.5 %."""
     toa = both["toa_reflectance"]
     expected = toa.sel(engine="5S") / toa.sel(engine="successive-orders") - 1
     found = engine_error(setup_of())
@@ -54,19 +54,19 @@ def test_quick_error_is_that_of_the_bands(both):
 
 
 def test_quick_error_names_the_bands_in_any_order():
-    """5S is 3 % low in the red over leaves, in the paper's own case."""
+    """5S is 3 % too low in the red over leaves, in the case of the paper."""
     for bands in (("TM4", "TM3"), ("TM3", "TM4")):
         error = engine_error(fifesim.Setup(bands=bands))
         assert list(error) == list(bands)
         assert -0.04 < error["TM3"] < -0.02 < error["TM4"] < 0
 
 
-def test_quick_error_of_successive_orders_is_none():
+def test_quick_error_of_successive_orders_is_zero():
     air = fifesim.Atmosphere(aerosol="urban", visibility=6, engine="successive-orders")
     assert engine_error(setup_of(air)) == {"TM4": 0.0, "TM3": 0.0}
 
 
-def test_reflectance_of_ones_own():
+def test_surface_reflectance_can_be_given():
     found = compare_engines(setup_of(bands=("TM3",)), reflectance=0.25, engines="5S")
     assert found["surface_reflectance"].values.tolist() == [0.25] and "ndvi" not in found
     for wrong in (1.2, [0.1, 0.2, 0.3], np.nan):

@@ -1,4 +1,4 @@
-"""What an image of any kind tells."""
+"""NDVI and other indices of images of any kind."""
 
 import numpy as np
 import pytest
@@ -25,15 +25,15 @@ def test_index_is_from_planetary_reflectance(whole):
 @pytest.mark.parametrize(
     "step", [lambda image: image.fifesim.aggregate(60), lambda image: image[0].fifesim.regress(image[1])]
 )
-def test_digital_numbers_are_no_values_to_average(lai, step):
-    """Their 0 is no data and would be taken for dark ground."""
+def test_digital_numbers_are_not_averaged(lai, step):
+    """Digital number 0 is no data and would count as dark ground."""
     image = fifesim.sense(fifesim.to_toa(fifesim.surface_reflectance(lai, bands=["TM3", "TM4"])))
     with pytest.raises(ValueError, match="digital numbers"):
         step(image)
 
 
-def test_names_that_contradict_wavelengths_have_no_index():
-    """Exchanged wavelengths of TM3 and TM4 would change the sign; bands that no instrument names so may be anywhere."""
+def test_band_names_that_contradict_wavelengths_are_rejected():
+    """Swapped wavelengths of TM3 and TM4 would change the sign. Bands with other names may have any wavelength."""
     values = np.stack([np.full((4, 4), 0.06), np.full((4, 4), 0.30)])
     rho = xr.DataArray(values, dims=("band", "y", "x"), coords={"wavelength": ("band", [0.83, 0.66])})
     rho = rho.assign_coords(x=705000 + 30.0 * np.arange(4), y=4334000 - 30.0 * np.arange(4)).rio.write_crs(26914)

@@ -1,4 +1,4 @@
-"""The equation of the atmosphere treats a canopy as Lambertian: docs/physics.md states what that costs."""
+"""Errors of the equation for a Lambertian surface over canopies, which docs/physics.md states."""
 
 import re
 from functools import cache
@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "physics.md").read_text(encoding="utf-8")
 TEXT = " ".join(PAGE.split())
 
-# The paper's leaf reflectance, transmittance and background, at the middle of the band [um].
+# Leaf reflectance, transmittance and background of the paper, at the centre of the band [um].
 BANDS = {"TM3": (0.66, 0.07, 0.04, 0.15), "TM4": (0.83, 0.45, 0.42, 0.19)}
 LAI = (0.25, 0.74, 2.0, 6.0)
 
@@ -59,13 +59,13 @@ def canopy(lai, leaf_reflectance, leaf_transmittance, background, hotspot=0.0):
 
 
 def lambertian(air, ground, sza, vza, raa):
-    """One reflectance factor, in sunlight and isotropic skylight, below the equation of a Lambertian surface."""
+    """The equation of a Lambertian surface with one reflectance factor for sunlight and isotropic skylight."""
     mixed = (1 - air.skylight) * ground.directional(sza, vza, raa) + air.skylight * ground.of_skylight(vza)
     return np.squeeze(apparent_reflectance(mixed, air.path, air.down, air.up, air.albedo))
 
 
 def errors(visibility, sza, vza=0.0, raa=0.0, lais=LAI, hotspot=0.0):
-    """Percent of apparent reflectance by band and leaf area, and the error of NDVI by leaf area."""
+    """Error in percent of apparent reflectance by band and leaf area, and the error of NDVI by leaf area."""
     found = []
     for wavelength, *optics in BANDS.values():
         air = air_of(visibility, wavelength, sza, vza, raa)
@@ -92,7 +92,7 @@ def rpv(sza, vza, raa):
 
 @cache
 def rpv_ground():
-    """The surface of RAMI4ATM; its hemispherical factors by quadrature, the same both ways."""
+    """Surface of RAMI4ATM; hemispherical factors by quadrature, equal in both directions."""
     points, weights = leggauss(48)
     mu, share = (points + 1) / 2, (points + 1) * weights / 2  # 2 mu dmu
     zeniths, azimuths = np.degrees(np.arccos(mu)), np.arange(1.0, 180, 2)
@@ -105,7 +105,7 @@ def rpv_ground():
 
 
 def rami_air(vza, raa):
-    """Molecules and aerosol of the reference, the latter evenly below 2 km."""
+    """Molecules and aerosol of the reference, with aerosol evenly distributed below 2 km."""
     table = files.table("verification/rami4atm_phase.csv")
     knots, phase = table[["scattering_cosine", "phase"]].to_numpy().T
     nodes, weights = benchmarks._between(knots, 4)
@@ -131,7 +131,7 @@ def rami_air(vza, raa):
 
 @cache
 def over_rpv(step=1):
-    """Views within 61 degrees: reflectance of Eradiate without gases, its noise, and reflectance by the equation."""
+    """Views within 61 degrees: reflectance by Eradiate without gases, its noise, and reflectance by the equation."""
     table = (
         pd.read_csv(ROOT / "tests" / "data" / "rami4atm_rpv.csv", comment="#")
         .query("abs(vza) <= 61")
@@ -153,15 +153,15 @@ def percent(found, expected):
 
 
 def numbers(text):
-    """Numbers that a page prints, with a true minus."""
+    """Numbers printed on a page, with a typographic minus."""
     return [float(each.replace("−", "-").replace("+", "")) for each in re.findall(r"[−+]?\d+(?:\.\d+)?", text)]
 
 
 ROWS = re.findall(r"^\| (\d+) km \| ([\d.]+)° \| (.+?) \| (.+?) \| (.+?) \|$", PAGE, re.MULTILINE)
 
 
-def test_production_makes_one_reflectance_factor_of_sunlight_and_skylight():
-    """`surface_reflectance` and `to_toa` do what `lambertian` does, band by band."""
+def test_production_uses_one_reflectance_factor_for_sunlight_and_skylight():
+    """`surface_reflectance` and `to_toa` agree with `lambertian`, band by band."""
     air = fifesim.Atmosphere(visibility=15)
     grid = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=20, height=20, cell=10)
     lai = wrap_xr(np.full((2, 2), 0.74), grid)
@@ -189,14 +189,14 @@ def test_production_makes_one_reflectance_factor_of_sunlight_and_skylight():
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row[0]}-{row[1]}")
-def test_errors_at_nadir_are_those_of_the_page(row):
+def test_errors_at_nadir_match_the_physics_page(row):
     visibility, sza, *printed = row
     found, ndvi = errors(float(visibility), float(sza))
     for text, values, digit in zip(printed, (*found, ndvi), (0.1, 0.1, 0.001), strict=True):
         np.testing.assert_allclose(numbers(text), [values.min(), values.max()], rtol=0, atol=0.6 * digit)
 
 
-def test_errors_in_the_hot_spot_are_those_of_the_page():
+def test_errors_in_the_hot_spot_match_the_physics_page():
     text = re.search(
         r"the equation is ([\d.]+) to ([\d.]+) % too bright at 45 km and ([\d.]+) to ([\d.]+) % at 15 km", TEXT
     )
@@ -211,8 +211,8 @@ def test_errors_in_the_hot_spot_are_those_of_the_page():
     assert max(around) == pytest.approx(beside, abs=0.06)
 
 
-def test_integration_agrees_with_eradiate_and_the_equation_does_not():
-    """Over an RPV surface, in the mean of every sixth view."""
+def test_integration_agrees_with_eradiate_and_the_equation_is_biased():
+    """Mean over every sixth view of an RPV surface."""
     table = over_rpv(6)
     sun, ground = benchmarks.RAMI_SZA, rpv_ground()
     exact = [coupled_reflectance(view.air, ground, sun, abs(float(view.vza)), view.raa) for view in table.itertuples()]
@@ -222,7 +222,7 @@ def test_integration_agrees_with_eradiate_and_the_equation_does_not():
 
 
 @pytest.mark.slow
-def test_errors_over_the_surface_of_eradiate_are_those_of_the_page():
+def test_errors_compared_with_eradiate_match_the_physics_page():
     text = re.search(r"is ([\d.]+) % too bright there on average .+ and ([\d.]+) % within 8° of the hot spot", TEXT)
     table = over_rpv()
     found = percent(table["equation"], table["reflectance"])
@@ -230,8 +230,8 @@ def test_errors_over_the_surface_of_eradiate_are_those_of_the_page():
     np.testing.assert_allclose([float(each) for each in text.groups()], [found.mean(), found[near].mean()], atol=0.06)
 
 
-def test_lambertian_ground_needs_no_integration():
-    """The equation is exact over it; the quadrature of the sky is good to 1e-3 of the skylight."""
+def test_equation_is_exact_for_lambertian_ground():
+    """The equation is exact for Lambertian ground; quadrature of the sky is accurate to 1e-3 of the skylight."""
     air = air_of(15, 0.66, 45.0, 30.0, 0.0)
     even = Ground(
         lambda sza, vza, raa: 0.3 + 0 * (sza + vza + raa),
@@ -244,7 +244,7 @@ def test_lambertian_ground_needs_no_integration():
 
 
 @pytest.mark.parametrize(("visibility", "sza", "vza"), [(45.0, 28.5, 0.0), (10.0, 60.0, 0.0), (10.0, 60.0, 45.0)])
-def test_directional_coupling_is_the_sum_over_the_sky(visibility, sza, vza):
+def test_directional_coupling_agrees_with_the_sum_over_the_sky(visibility, sza, vza):
     """A canopy with a hot spot, in both bands and in NDVI."""
     air, found = fifesim.Atmosphere(visibility=visibility), []
     for wavelength, *optics in BANDS.values():

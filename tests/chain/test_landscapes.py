@@ -1,4 +1,4 @@
-"""Landscapes through the chain: classes with canopies of their own, and the closed form of a pixel of two."""
+"""Landscapes through the chain: classes with different canopies, and the closed form of a pixel of two classes."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def rho(land):
     return land.fifesim.surface_reflectance("TM", bands=TM34)
 
 
-def test_each_class_has_the_bits_of_a_scene_of_it_alone(land, rho):
+def test_class_is_identical_to_a_scene_of_this_class(land, rho):
     for code, canopy in enumerate((GRASS, WOOD, BARE), 1):
         alone = land.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=canopy)
         of_class = (land.cover == code).values
@@ -42,7 +42,7 @@ def test_each_class_has_the_bits_of_a_scene_of_it_alone(land, rho):
 
 @pytest.mark.parametrize("chunks", [CHUNKS, ODD_CHUNKS], ids=["chunked", "odd-chunks"])
 @pytest.mark.parametrize("exact", [False, True])
-def test_reflectance_is_lazy_and_has_the_same_bits_in_chunks(land, rho, chunks, exact):
+def test_reflectance_is_lazy_and_identical_in_chunks(land, rho, chunks, exact):
     lazy = xr.Dataset({name: in_chunks(each, chunks) for name, each in land.data_vars.items()})
     with no_compute():
         made = lazy.fifesim.surface_reflectance("TM", bands=TM34, exact=exact)
@@ -51,8 +51,8 @@ def test_reflectance_is_lazy_and_has_the_same_bits_in_chunks(land, rho, chunks, 
     xr.testing.assert_identical(made.compute(), expected)
 
 
-def test_arguments_are_those_of_classes_that_leave_them_open(land, rho, lai):
-    """Rasters as well: here of the background of the one class that says none."""
+def test_arguments_apply_to_classes_that_do_not_set_them(land, rho, lai):
+    """Arguments can be rasters, here the background of the only class that sets none."""
     open_one = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed")}
     scene = fifesim.landscape(grids.geobox(land.lai), cover=fifesim.Patches("voronoi", 30), classes=open_one, seed=7)
     litter = (0.1 + lai / 20).rename("litter").drop_attrs(deep=False)
@@ -63,13 +63,13 @@ def test_arguments_are_those_of_classes_that_leave_them_open(land, rho, lai):
     np.testing.assert_array_equal(made.values[:, ~grass], rho.values[:, ~grass])
 
 
-def test_argument_that_would_change_nothing_is_refused(land):
+def test_argument_without_effect_is_rejected(land):
     with pytest.raises(ValueError, match="background is given and also defined by all classes of the landscape"):
         land.fifesim.surface_reflectance("TM", canopy=fifesim.Canopy(background=0.1))
 
 
-def test_view_and_leaves_that_vary_are_taken_by_class(land):
-    """Where directions differ SAIL is evaluated at every cell, of each class with its own canopy."""
+def test_varying_directions_are_combined_with_classes(land):
+    """Where directions vary, SAIL is evaluated at every cell with the canopy of its class."""
     sza = (xr.zeros_like(land.lai) + 30 + 0.01 * np.arange(land.sizes["x"])).rename("sza").drop_attrs(deep=False)
     sun = xr.Dataset({"sza": sza, "saa": 120.0, "vza": 10.0, "vaa": 90.0, "earth_sun_distance": 1.0})
     made = land.fifesim.surface_reflectance("TM", bands=TM34, geometry=sun)
@@ -89,7 +89,7 @@ def test_cells_without_class_or_leaf_area_have_no_reflectance(land, rho):
     np.testing.assert_array_equal(made.values[:, ~missing], rho.values[:, ~missing])
 
 
-def test_landscape_comes_back_from_a_file(tmp_path, land, rho):
+def test_landscape_is_restored_from_a_file(tmp_path, land, rho):
     land.to_netcdf(tmp_path / "land.nc")
     again = xr.open_dataset(tmp_path / "land.nc", decode_coords="all")
     xr.testing.assert_equal(again.fifesim.surface_reflectance("TM", bands=TM34), rho)
@@ -114,12 +114,12 @@ def test_other_datasets_are_refused(land, change, message):
         change(land).fifesim.surface_reflectance("TM", bands=TM34)
 
 
-# A canopy of one leaf inclination over a dark ground, beside bare soil.
+# A canopy of one leaf inclination over dark ground, next to bare soil.
 LEAF, DARK, SOIL, DENSE = {"TM3": (0.07, 0.04), "TM4": (0.46, 0.41)}, 0.08, 0.19, 2.3
 
 
 def two_uniform_classes():
-    """Classes that part each pixel of 9 x 9 cells after so many rows: 0, 1, ... 9."""
+    """Two classes that divide pixels of 9 x 9 cells after 0, 1, ... 9 rows."""
     grid = fifesim.fife_site(30 / 9, window=((0, 9), (0, 90)))
     codes = np.where(np.arange(9)[:, None] < np.repeat(np.arange(10), 9), 1, 2)
     table = {
@@ -131,12 +131,13 @@ def two_uniform_classes():
     return fifesim.landscape(grid, cover=labelled(grid, codes).drop_attrs(deep=False), classes=table)
 
 
-def test_pixel_of_two_uniform_classes_is_the_closed_form():
+def test_pixel_of_two_uniform_classes_agrees_with_the_closed_form():
     r"""
-    Mean reflectance, NDVI and its bias of shares f and 1 - f, to 1e-9.
+    Mean reflectance, NDVI and its bias for shares f and 1 - f, to 1e-9.
 
-    With S the sum and N the NDVI of a class, :math:`f (1 - f) (N_a - N_b) (S_b - S_a) / (f S_a + (1 - f) S_b)` is the
-    bias. The canopy's reflectance is that of leaf equations solved by a matrix exponential.
+    With S the sum and N the NDVI of a class, the bias is
+    :math:`f (1 - f) (N_a - N_b) (S_b - S_a) / (f S_a + (1 - f) S_b)`. Canopy reflectance is from the leaf equations,
+    solved by a matrix exponential.
     """
     sun = fifesim.Geometry(30.0, 120.0, 20.0, 80.0)
     land = two_uniform_classes()
@@ -163,7 +164,7 @@ def test_pixel_of_two_uniform_classes_is_the_closed_form():
     assert np.abs(bias).max() > 0.01
 
 
-def test_means_of_a_landscape_are_those_of_its_variables(land):
+def test_means_of_a_landscape_are_means_of_its_variables(land):
     brown = (land.lai / 4).clip(max=1).rename("brown")
     of_all = land.assign(brown=brown, crown_cover=0.7).fifesim.aggregate(30)
     assert set(of_all.data_vars) == {"lai", "brown", "crown_cover", "class_share"}
@@ -174,7 +175,7 @@ def test_means_of_a_landscape_are_those_of_its_variables(land):
     assert np.abs(of_all.brown - brown.fifesim.aggregate(30)).max() > 0.01
 
 
-def test_codes_are_counted_not_averaged(land):
+def test_class_codes_are_counted_not_averaged(land):
     shares = land.fifesim.aggregate(30).class_share
     assert shares.dims == ("class", "y", "x") and shares["class"].values.tolist() == ["grass", "wood", "bare"]
     blocks = land.cover.values.reshape(5, 9, 6, 9).swapaxes(1, 2).reshape(5, 6, 81)
@@ -189,7 +190,7 @@ def test_codes_are_counted_not_averaged(land):
     xr.testing.assert_allclose(made.compute(), land.fifesim.aggregate(30), rtol=1e-14)
 
 
-def test_light_absorbed_goes_by_the_leaf_angles_of_a_class(land):
+def test_fpar_depends_on_the_leaf_angles_of_the_class(land):
     fpar = land.fifesim.fpar()
     for code, angles in ((1, "erectophile"), (2, "spherical"), (3, "spherical")):
         alone = land.lai.fifesim.fpar(canopy=fifesim.Canopy(leaf_angles=angles))
@@ -204,8 +205,8 @@ def test_light_absorbed_goes_by_the_leaf_angles_of_a_class(land):
 DEAD = fifesim.Canopy(brown=0.4, dissociation=0.5, crown_cover=0.7, crown_shape=0.5)
 
 
-def test_dead_leaves_and_crowns_are_those_of_a_class(site, land):
-    """What a class says of them has the bits of a scene of it alone, and other classes go on without."""
+def test_dead_leaves_and_crowns_can_be_set_by_class(site, land):
+    """The class is identical to a scene of this class alone, and other classes are unchanged."""
     canopy = DEAD.replace(brown_leaf={"TM3": (0.3, 0.1), "TM4": (0.4, 0.3)})
     table = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed", canopy=canopy)}
     scene = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=table, seed=7)
@@ -220,7 +221,7 @@ def test_dead_leaves_and_crowns_are_those_of_a_class(site, land):
     np.testing.assert_allclose(green.values[grass], expected[grass], rtol=1e-12)
 
 
-def test_variables_of_a_landscape_win_over_its_classes(site, land):
+def test_variables_of_a_landscape_override_its_classes(site, land):
     brown = (land.lai / 5).drop_attrs(deep=False).rename("brown")
     table = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed", canopy=fifesim.Canopy(brown=0.9))}
     scene = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=table, seed=7, brown=brown)
@@ -236,7 +237,7 @@ def test_variables_of_a_landscape_win_over_its_classes(site, land):
     )
 
 
-def test_landscape_of_several_dates_goes_date_by_date(land, rho):
+def test_landscape_of_several_dates_is_computed_by_date(land, rho):
     days = xr.Variable("time", np.array(["1987-06-06T16:35", "1987-07-06T16:35"], "M8[ns]"))
     season = land.assign(lai=xr.concat([land.lai, 1.2 * land.lai], dim=days, combine_attrs="override"))
     made = season.fifesim.surface_reflectance("TM", bands=TM34)

@@ -1,4 +1,4 @@
-"""Propagated noise compared with that of many noisy images, and with derivatives by finite differences."""
+"""Propagated noise compared with the noise of many images, and with finite differences."""
 
 import numpy as np
 import pytest
@@ -40,11 +40,13 @@ def value(image, quantity):
 
 @pytest.mark.parametrize("quantity", ["radiance", "reflectance", "ndvi"])
 @pytest.mark.parametrize("model", [None, MODEL])
-def test_noise_is_that_of_many_images(toa, quantity, model):
+def test_propagated_noise_agrees_with_many_images(toa, quantity, model):
     """
-    Within 2 % in each stripe, as 20 images of 2000 pixels have a relative standard error of 0.4 %.
+    Standard deviations agree within 2 % in each stripe: 20 images of 2000 pixels have a relative standard error of 0.4
+    %.
 
-    Without a model, shot and thermal noise of OLI; else the fixed pattern of 100 detectors too.
+    Without a model, noise is shot and thermal noise of OLI; with a model, it includes the fixed pattern of 100
+    detectors.
     """
     options = {"noise_models": model}
     std = toa.fifesim.sense("OLI").fifesim.noise_std(quantity, **options)
@@ -62,7 +64,7 @@ def value_of_radiance(radiance, quantity):
     return radiance.fifesim.to_reflectance() if quantity == "reflectance" else radiance.fifesim.ndvi()
 
 
-def test_it_is_a_raster_function(toa):
+def test_noise_std_is_a_raster_function(toa):
     image = toa.fifesim.sense("OLI")
     for quantity, name in (
         ("radiance", "toa_radiance_std"),
@@ -74,7 +76,7 @@ def test_it_is_a_raster_function(toa):
         assert found.dims == (("y", "x") if quantity == "ndvi" else ("band", "y", "x"))
 
 
-def test_missing_pixel_is_missing_in_its_cell_and_band(toa):
+def test_missing_pixel_affects_only_its_cell_and_band(toa):
     image = toa.fifesim.sense(fifesim.instrument("OLI", "detector")).copy(deep=True)
     image[0, 5, 6] = 0
     assert np.argwhere(np.isnan(image.fifesim.noise_std("radiance").values)).tolist() == [[0, 5, 6]]
@@ -83,7 +85,7 @@ def test_missing_pixel_is_missing_in_its_cell_and_band(toa):
 
 
 def test_radiance_reflectance_and_digital_numbers_agree(toa):
-    """Steps of digital numbers are the only difference, and their variance is that of a uniform error."""
+    """Only quantisation differs, and its variance is the variance of a uniform error."""
     image = toa.fifesim.sense("OLI")
     radiance, reflectance = image.fifesim.to_radiance(), image.fifesim.to_reflectance()
     for quantity in ("radiance", "reflectance", "ndvi"):
@@ -103,7 +105,7 @@ def test_kinds_of_noise_add_up_in_variance(toa):
     assert float(radiance.fifesim.noise_std(noise=()).max()) == 0
 
 
-def test_bands_have_models_of_their_own(toa):
+def test_noise_models_are_assigned_to_bands_by_name(toa):
     models = {"OLI4": fifesim.NoiseModel(0.5, 0.0), "OLI5": fifesim.NoiseModel(0.2, 0.0)}
     radiance = toa.fifesim.sense("OLI", quantise=False)
     for order in (["OLI4", "OLI5"], ["OLI5", "OLI4"]):
@@ -111,8 +113,8 @@ def test_bands_have_models_of_their_own(toa):
         assert std.max(["y", "x"]).to_series().to_dict() == {"OLI4": 0.5, "OLI5": 0.2}
 
 
-def test_scale_of_square_roots_has_steps_that_grow(toa):
-    """The steps of MSS on Landsat-2 from the radiances of neighbouring numbers."""
+def test_square_root_scale_has_increasing_steps(toa):
+    """Steps of MSS on Landsat-2 from the radiances of neighbouring digital numbers."""
     mss = toa.assign_coords(band=["MSS5", "MSS6"]).fifesim.sense("MSS2")[:, 2:-2, 2:-2]
     assert float(mss["compression"].sel(band="MSS5")) == 63
     std = mss.fifesim.noise_std("radiance", noise=())
@@ -120,7 +122,7 @@ def test_scale_of_square_roots_has_steps_that_grow(toa):
         (mss.astype(int) + step).assign_coords(mss.coords).assign_attrs(mss.attrs).fifesim.to_radiance()
         for step in (1, -1)
     )
-    # The middle of the radiances of a number n lies 1 / (8 n^2) beyond that of the number.
+    # The centre of the radiances of digital number n deviates by a relative 1 / (8 n^2) from the radiance of n.
     np.testing.assert_allclose(std, (up - down) / 2 / np.sqrt(12), rtol=1 / (8 * 5**2))
 
 
@@ -139,6 +141,6 @@ def test_scale_of_square_roots_has_steps_that_grow(toa):
         (lambda image: image.fifesim.to_reflectance().fifesim.to_surface(), {}, "to_toa"),
     ],
 )
-def test_impossible_requests_are_refused(toa, change, options, message):
+def test_invalid_noise_requests_are_rejected(toa, change, options, message):
     with pytest.raises(ValueError, match=message):
         change(toa.fifesim.sense("OLI")).fifesim.noise_std(**options)

@@ -1,4 +1,4 @@
-"""Canopy and air in one pass are to the bit those of two, and are taken where cells differ in leaf area alone."""
+"""Canopy and atmosphere in one pass equal two passes to the bit; one pass is used if cells differ only in leaf area."""
 
 import dask
 import numpy as np
@@ -25,7 +25,7 @@ def chains(lai, exact=False, **canopy):
 
 
 @pytest.mark.parametrize("canopy", [{}, {"hotspot": 0.1, "soil": 0.05}], ids=["plain", "hot spot, bright soil"])
-def test_one_pass_is_to_the_bit_two(canopy):
+def test_one_pass_equals_two_passes_to_the_bit(canopy):
     with no_compute():
         reflectance, lazy = chains(scene({"y": 31, "x": 29}), **canopy)
         assert seen_through_air(reflectance) is not None
@@ -34,13 +34,13 @@ def test_one_pass_is_to_the_bit_two(canopy):
 
 
 @pytest.mark.parametrize("canopy", [{"brown": 0.2}, {"crown_cover": 0.7}, {"exact": True}], ids=lambda each: str(each))
-def test_other_canopies_go_step_by_step(canopy):
+def test_other_canopies_use_two_passes(canopy):
     reflectance, lazy = chains(scene({"y": 90, "x": 40}), **canopy)
     assert seen_through_air(reflectance) is None
     xr.testing.assert_identical(lazy.compute(), chains(scene({"y": 90, "x": 40}).compute(), **canopy)[1])
 
 
-def test_changed_values_are_not_made_again():
+def test_changed_reflectance_is_not_recomputed():
     reflectance, _ = chains(scene({"y": 90, "x": 40}))
     halved = (0.5 * reflectance).assign_attrs(reflectance.attrs)
     assert seen_through_air(halved) is None and seen_through_air(reflectance.compute()) is None
@@ -55,20 +55,20 @@ def test_missing_cells_are_missing():
     clear = dict(zip(names, np.repeat([[0.0], [1.0], [1.0], [0.0], [1.0]], 3, axis=1), strict=True))
     found = seen_reflectance(lai, background=canopy.background, scene=canopy.scene, terms=clear)
     assert np.isnan(found[:, 0, 1]).all()
-    # Through no air, bare ground is seen as it is.
+    # Without atmosphere, bare ground has the reflectance of the background.
     np.testing.assert_allclose(found[:, 0, 0], canopy.background, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("lai", "message"), [(-1.0, "negative"), (35.0, "at most 20")])
-def test_leaf_area_that_cannot_be_is_refused_as_elsewhere(lai, message):
+def test_invalid_leaf_area_is_rejected(lai, message):
     cells = scene({"y": 90, "x": 40})
     toa = chains(cells.copy(data=cells.data * 0 + lai))[1]
     with pytest.raises(ValueError, match=message):
         toa.compute()
 
 
-def test_image_and_index_together_are_those_alone():
-    """Asked for together, and with the truth, they are to the bit those asked for alone."""
+def test_image_and_index_are_the_same_together_and_alone():
+    """Computed together and with the truth, they are identical to the bit to separate computations."""
     lai = scene({"y": 45, "x": 36})
     toa = chains(lai)[1]
     image = toa.fifesim.sense("TM")
@@ -79,7 +79,7 @@ def test_image_and_index_together_are_those_alone():
         np.testing.assert_array_equal(one, alone.compute())
 
 
-def test_image_and_index_together_cost_one_scene():
+def test_image_and_index_together_compute_the_scene_once():
     made = []
 
     def counted(block):

@@ -1,4 +1,4 @@
-"""A setup says once what the steps of the chain take one by one."""
+"""A Setup holds the arguments of all steps of the chain."""
 
 from dataclasses import fields, replace
 
@@ -8,7 +8,7 @@ import fifesim
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.grids import grid as grids
 
-# Every field of the ground, the air and the sampling away from its default, as the public functions take them.
+# Every field of ground, atmosphere and sampling differs from its default, as arguments of the public functions.
 GROUND = {
     "bands": ("TM3", "TM4"),
     "atmosphere": fifesim.Atmosphere(visibility=23),
@@ -27,7 +27,7 @@ SENSOR = {
 }
 
 
-def test_every_field_reaches_its_step(lai, site):
+def test_all_fields_reach_their_steps(lai, site):
     dem = fifesim.flint_hills(site.pad(1), seed=7)
     horizon = fifesim.horizon(fifesim.flint_hills(site.pad(40), seed=7))
     air = {"adjacency": True, "surroundings": 0.3}
@@ -44,22 +44,22 @@ def test_every_field_reaches_its_step(lai, site):
     own = GROUND | {"canopy": upright.canopy, "slopes": "upright"}
     expected = fifesim.surface_reflectance(lai, "TM", dem=dem, horizon=horizon, **own)
     xr.testing.assert_identical(reflectance_of(upright, lai), expected)
-    # The coupling has tests of its own.
+    # Coupling has separate tests.
     assert {field.name for field in fields(Setup)} - told == {"onto", "slopes", "coupling"}
 
 
-def test_pixels_may_lie_on_a_grid_of_ones_own(lai, site, whole):
+def test_pixels_can_be_on_a_given_grid(lai, site, whole):
     pixels = fifesim.grid_at(site.crs, site.affine.c + 7.0, site.affine.f - 11.0, 90, 60, 30)
     setup = replace(Setup(bands=("TM3", "TM4")), onto=pixels)
     xr.testing.assert_identical(image_of(setup, whole["rho"]), whole["toa"].fifesim.sense("TM", onto=pixels))
 
 
-def test_defaults_are_those_of_the_functions(lai, whole):
+def test_defaults_equal_the_defaults_of_the_functions(lai, whole):
     setup = Setup(bands=("TM3", "TM4"))
     xr.testing.assert_identical(image_of(setup, reflectance_of(setup, lai)), whole["image"])
 
 
-def test_setup_tells_what_is_not_the_default(lai):
+def test_repr_shows_fields_that_differ_from_defaults(lai):
     assert repr(Setup()) == "Setup(instrument='TM')"
     said = repr(Setup("OLI", dem=lai, canopy=fifesim.Canopy(hotspot=0.1), onto=grids.geobox(lai), noise=("shot",)))
     assert said == (

@@ -1,4 +1,4 @@
-"""Slopes below the air."""
+"""Slopes combined with the atmosphere."""
 
 import pytest
 import xarray as xr
@@ -8,8 +8,8 @@ from fifesim.chain.steps import kt_and_reflectance
 from fifesim.grids import grid as grids
 
 
-def test_sky_above_slopes_is_in_a_graph_once(lai):
-    """Reflectance on slopes and Kt share all but the last layer that each makes of the light."""
+def test_reflectance_and_kt_share_the_sky_view_in_the_graph(lai):
+    """Reflectance on slopes and Kt share all layers of the graph except the last layer of each."""
     grid = grids.geobox(lai)
     lai, dem = lai.chunk({"y": 20, "x": 30}), fifesim.flint_hills(grid, seed=7, chunks=25)
     level, slopes = (lai.fifesim.surface_reflectance("TM", bands=["TM4"], dem=each) for each in (None, dem))
@@ -17,8 +17,8 @@ def test_sky_above_slopes_is_in_a_graph_once(lai):
     assert len(own) == 1, own
 
 
-def test_kt_warns_where_the_elevation_is_not_that_of_the_air(lai):
-    """As reflectance on the same slopes does."""
+def test_kt_warns_if_elevation_and_atmosphere_altitude_differ(lai):
+    """Reflectance on the same slopes warns too."""
     level = lai.fifesim.surface_reflectance("TM", bands=["TM4"])
     dem = fifesim.flint_hills(grids.geobox(lai), seed=7)
     with pytest.warns(UserWarning, match="beside an altitude of the atmosphere of 0.4 km"):
@@ -26,8 +26,8 @@ def test_kt_warns_where_the_elevation_is_not_that_of_the_air(lai):
 
 
 @pytest.mark.parametrize("upwelling", [True, False])
-def test_one_pass_gives_what_both_steps_give(lai, upwelling):
-    """With the labels of both, and lazily."""
+def test_one_pass_equals_both_steps(lai, upwelling):
+    """Labels are equal too, and the results are lazy."""
     dem = fifesim.flint_hills(grids.geobox(lai), seed=7)
     level = fifesim.surface_reflectance(lai.chunk(20), bands=["TM3", "TM4"])
     found = kt_and_reflectance(level, dem, upwelling=upwelling)
@@ -40,7 +40,7 @@ def test_one_pass_gives_what_both_steps_give(lai, upwelling):
         xr.testing.assert_identical(one.compute(), other.compute())
 
 
-def test_a_wrong_model_of_slopes_is_refused(lai):
+def test_unknown_slope_model_is_rejected(lai):
     with pytest.raises(ValueError, match="slopes must be 'kt' or 'upright', got 'uprigt'"):
         lai.fifesim.surface_reflectance("TM", bands=["TM4"], slopes="uprigt")
     dem = fifesim.flint_hills(grids.geobox(lai), seed=7)

@@ -1,4 +1,4 @@
-"""Spectra of uniform canopies: equal to a raster of the same canopies, and their derivatives to differences."""
+"""Spectra of uniform canopies compared with a raster, and their derivatives compared with finite differences."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ BANDS = ["OLI3", "OLI4", "OLI5", "OLI6"]
 
 
 def drawn(count=12, seed=3):
-    """Values of every quantity, inside their ranges."""
+    """Random values of every quantity, inside the valid ranges."""
     ranges = {
         "lai": (0.1, 6),
         "brown": (0.05, 0.9),
@@ -38,7 +38,7 @@ def drawn(count=12, seed=3):
     return {name: random.uniform(*each, count) for name, each in ranges.items()}
 
 
-def test_spectra_are_those_of_a_raster_of_the_same_canopies():
+def test_spectra_equal_a_raster_of_the_same_canopies():
     lai = fifesim.lai_scene(fifesim.fife_site(30, window=((0, 8), (0, 8))), seed=1)
     canopy = fifesim.Canopy(brown=0.2, dissociation=0.3, hotspot=0.1, soil=0.02, moisture=0.2, crown_cover=0.8)
     known = {"canopy": canopy, "geometry": fifesim.fife_geometry(), "atmosphere": fifesim.Atmosphere()}
@@ -48,7 +48,7 @@ def test_spectra_are_those_of_a_raster_of_the_same_canopies():
     np.testing.assert_allclose(spectra.reflectance, raster.values.reshape(len(raster.band), -1).T, rtol=1e-13)
 
 
-def test_each_canopy_is_that_of_its_own_description():
+def test_spectra_equal_one_canopy_at_a_time():
     values = drawn(5)
     found = fifesim.canopy_spectra(values, "OLI", bands=BANDS)
     names = ("brown", "dissociation", "crown_cover", "crown_shape", "hotspot", "soil", "moisture")
@@ -62,8 +62,8 @@ def test_each_canopy_is_that_of_its_own_description():
 
 
 @pytest.mark.parametrize("name", drawn(1))
-def test_derivatives_are_those_of_differences(name):
-    """Differences of eighth order, by steps that stay between the kinks of the leaf angle classes."""
+def test_derivatives_agree_with_finite_differences(name):
+    """Eighth-order differences, with steps that stay between the kinks of the leaf angle classes."""
     values = drawn()
     angle = name in ("sza", "vza", "raa")
     values |= {each: np.floor(values[each]) + offset for each, offset in (("sza", 0.2), ("vza", 0.3))}
@@ -91,7 +91,7 @@ def test_derivatives_at_the_ends_of_the_range_are_one_sided():
 
 
 @pytest.mark.parametrize("name", ["lai", "brown", "sza", "leaf_water", "background", "moisture"])
-def test_a_missing_value_is_a_missing_spectrum(name):
+def test_missing_value_gives_a_missing_spectrum(name):
     values = drawn(3)
     whole = fifesim.canopy_spectra(values, "OLI", bands=BANDS, derivatives=["lai"])
     values[name][1] = np.nan
@@ -107,7 +107,7 @@ def test_results_do_not_depend_on_the_number_of_canopies():
     np.testing.assert_array_equal(whole.reflectance[4000:4100], part.reflectance)
 
 
-def test_a_dataset_keeps_its_dimension_and_coordinates():
+def test_dataset_keeps_its_dimension_and_coordinates():
     lai = xr.DataArray([0.5, 1.0], dims="site", coords={"site": ["a", "b"], "height": ("site", [0.3, 0.6])})
     found = fifesim.canopy_spectra(xr.Dataset({"lai": lai}), "TM", geometry=SUN)
     assert found.reflectance.dims == ("site", "band") and found.site.values.tolist() == ["a", "b"]
@@ -130,6 +130,6 @@ def test_a_dataset_keeps_its_dimension_and_coordinates():
         ({"lai": 1.0}, {"geometry": SUN, "derivatives": ["water"]}, "'water' is no quantity of canopies"),
     ],
 )
-def test_mistakes_are_refused(values, options, message):
+def test_invalid_canopy_values_are_rejected(values, options, message):
     with pytest.raises(ValueError, match=message):
         fifesim.canopy_spectra(values, "TM", bands=["TM3"], **options)

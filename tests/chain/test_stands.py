@@ -1,4 +1,4 @@
-"""Canopies as they are given, and the warning about those of FIFE's tallgrass on other ground."""
+"""Canopies from arguments, and the warning about the tallgrass of FIFE on other ground."""
 
 import warnings
 
@@ -27,7 +27,7 @@ def own_map(grid=GRID):
         (GREEN | BARE | {"brown": 0.2}, "tallgrass for dead leaves; give brown_leaf="),
     ],
 )
-def test_tallgrass_on_a_map_of_ones_own_is_a_warning(given, message):
+def test_assumed_tallgrass_on_a_user_map_is_a_warning(given, message):
     lai = own_map()
     for function in (
         lambda: lai.fifesim.surface_reflectance("TM", **KNOWN, canopy=fifesim.Canopy(**given)),
@@ -39,7 +39,7 @@ def test_tallgrass_on_a_map_of_ones_own_is_a_warning(given, message):
         assert {each.filename for each in said if each.category is UserWarning} == {__file__}
 
 
-def test_a_canopy_that_is_given_is_no_warning():
+def test_given_canopy_is_no_warning():
     with warnings.catch_warnings(action="error", category=UserWarning):
         canopy = fifesim.Canopy(**GREEN, **BARE)
         own_map().fifesim.surface_reflectance("TM", **KNOWN, canopy=canopy)
@@ -51,7 +51,7 @@ def test_a_canopy_that_is_given_is_no_warning():
 
 
 def test_classes_with_leaves_need_optics():
-    """Water needs no leaves, and the call stands in for what a class does not have."""
+    """Water needs no leaves, and arguments of the call fill the gaps of a class."""
     water = fifesim.CoverClass(lai=0, canopy=fifesim.Canopy(background=0.03))
     forest = fifesim.CoverClass(lai=4.0, canopy=fifesim.Canopy(leaf_optics=fifesim.Leaf(chlorophyll=50)))
     patches = fifesim.Patches("voronoi", 100)
@@ -64,7 +64,7 @@ def test_classes_with_leaves_need_optics():
         land.fifesim.surface_reflectance("TM", **KNOWN, canopy=fifesim.Canopy(background=0.1))
 
 
-def test_cells_win_over_classes_and_classes_over_the_call():
+def test_cells_override_classes_and_classes_override_arguments():
     kind = fifesim.CoverClass("grass", lai=1.0, canopy=fifesim.Canopy(hotspot=0.1, brown=0.3), code=4)
     canopy = fifesim.Canopy(brown=0.1, crown_cover=0.9)
     alone = stands_of((), canopy, {"brown": 0.5})[None]

@@ -1,4 +1,4 @@
-"""Figure 1 end to end: what its users write, eagerly and lazily, and what one stage hands to another."""
+"""Figure 1 end to end: calls by users, eager and lazy, and the values passed between stages."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ TM34 = ["TM3", "TM4"]
 
 
 @pytest.mark.parametrize("chunks", [{"y": 27, "x": 36}, {"y": 23, "x": 31}, "auto"], ids=str)
-def test_chain_has_the_same_bits_lazily_and_computes_nothing_early(site, contract, whole, chunks):
+def test_lazy_chain_is_identical_and_computes_nothing_early(site, contract, whole, chunks):
     with no_compute():
         lazy = contract(site, chunks=chunks)
     for name, array in lazy.items():
@@ -27,7 +27,7 @@ def test_chain_has_the_same_bits_lazily_and_computes_nothing_early(site, contrac
     assert fifesim.regress(lazy["truth"], lazy["ndvi"]) == fifesim.regress(whole["truth"], whole["ndvi"])
 
 
-def test_every_step_lies_where_it_should(site, whole):
+def test_every_step_is_on_the_right_grid(site, whole):
     for name in ("lai", "rho", "toa"):
         assert grids.same_grid(grids.geobox(whole[name]), site)
     pixels = grids.aligned_grid(site, 30.0)
@@ -37,7 +37,7 @@ def test_every_step_lies_where_it_should(site, whole):
     assert (whole["truth"] + whole["ndvi"]).shape == tuple(pixels.shape)
 
 
-def test_history_tells_every_stage(whole):
+def test_history_lists_every_stage(whole):
     verbs = [line.split(":")[0] for line in whole["ndvi"].attrs["history"].splitlines()]
     assert verbs == ["lai_scene", "surface_reflectance", "to_toa", "sense", "to_radiance", "to_reflectance", "ndvi"]
     assert whole["ndvi"].attrs["rng_seed"] == "7"
@@ -53,7 +53,7 @@ def test_defaults_are_the_paper_case(lai):
 
 
 def test_skylight_of_the_atmosphere_reaches_the_ground(lai):
-    """The diffuse fraction of 5S mixes SAIL's two reflectances; a haze changes both stages."""
+    """The diffuse fraction of 5S mixes the two reflectances of SAIL; haze changes both stages."""
     haze = fifesim.Atmosphere(visibility=10.0)
     rho = lai.fifesim.surface_reflectance("TM", bands=TM34, atmosphere=haze)
     bands = instrument("TM").select(TM34)
@@ -82,20 +82,20 @@ def test_background_is_a_number_a_mapping_or_a_raster(lai):
     np.testing.assert_allclose(exact[0], exact[1], rtol=1e-12)
 
 
-def test_there_and_back_through_the_atmosphere(whole):
+def test_to_surface_inverts_to_toa(whole):
     np.testing.assert_allclose(whole["toa"].fifesim.to_surface(), whole["rho"], rtol=0, atol=1e-12)
 
 
-def test_image_goes_back_to_the_surface_within_its_counts(whole):
-    """Half a count is 0.002 of reflectance in TM3 and 0.001 in TM4, more below the atmosphere: 0.004."""
+def test_surface_reflectance_is_recovered_within_quantisation(whole):
+    """Half a count is 0.002 in reflectance in TM3 and 0.001 in TM4, and more at the surface: 0.004."""
     truth = fifesim.aggregate(whole["rho"], 30.0)
     back = whole["image"].fifesim.to_surface()
     assert back.name == "surface_reflectance"
-    # The line spread weighs the middle of a pixel more than the mean does: compare the averages of the image.
+    # The line spread function gives the centre of a pixel more weight than a mean, so image averages are compared.
     np.testing.assert_allclose(back.mean(("y", "x")), truth.mean(("y", "x")), rtol=0, atol=0.004)
 
 
-def test_hole_in_the_ground_is_no_data_in_the_image(lai):
+def test_gap_in_the_ground_is_no_data_in_the_image(lai):
     lai[18:27, 27:36] = np.nan
     paper = fifesim.instrument("TM", response="paper")
     image = lai.fifesim.surface_reflectance("TM", bands=TM34).fifesim.to_toa().fifesim.sense(paper)

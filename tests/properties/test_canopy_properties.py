@@ -1,4 +1,4 @@
-"""What must hold for every canopy."""
+"""Physical properties of every canopy."""
 
 import numpy as np
 from hypothesis import given, settings
@@ -31,13 +31,13 @@ def test_reflectance_is_finite_reciprocal_and_not_negative(lai, rho, share, sza,
     back = with_background(sail(lai, rho, tau, sza=vza, vza=sza, raa=raa, leaf_angles=shape, hotspot=hotspot), r)
     assert np.isfinite(there.rso) and there.rso >= 0
     np.testing.assert_allclose(there.rso, back.rso, rtol=1e-12, atol=1e-300)
-    # A beam into the canopy and a view out of it are one problem read from two ends.
+    # Reciprocity: a beam into the canopy and a view out of it are the same problem.
     np.testing.assert_allclose(there.rsd, back.rdo, rtol=1e-12, atol=1e-300)
 
 
 @modest
 @given(lai, fraction, fraction, zenith, leaf_angles, fraction)
-def test_no_more_light_leaves_than_came(lai, rho, share, sza, shape, r):
+def test_canopies_do_not_create_light(lai, rho, share, sza, shape, r):
     canopy = sail(lai, rho, share * (1 - rho), sza=sza, leaf_angles=shape)
     assert canopy.rdd + canopy.tdd <= 1 + 1e-12
     assert canopy.rsd + canopy.tsd + canopy.tss <= 1 + 1e-12
@@ -55,8 +55,8 @@ def test_conservative_leaves_lose_no_light(lai, rho, sza, shape):
 
 @modest
 @given(lai, lai, fraction, fraction, zenith, leaf_angles, fraction)
-def test_two_layers_add_up_to_one(upper, lower, rho, share, sza, shape, r):
-    """The surface below may itself be a canopy: for diffuse light, layers combine as a layer and its background."""
+def test_two_layers_equal_one_thick_layer(upper, lower, rho, share, sza, shape, r):
+    """The surface below may be a canopy too: for diffuse light, two layers combine like a layer and its background."""
     tau = share * (1 - rho)
     below = with_background(sail(lower, rho, tau, sza=sza, leaf_angles=shape), r).rdd
     stacked = with_background(sail(upper, rho, tau, sza=sza, leaf_angles=shape), below).rdd

@@ -1,4 +1,4 @@
-"""Whatever the chunks: the same image to the bit, and nothing computed early."""
+"""Images are identical to the bit in any chunks, and nothing is computed early."""
 
 from itertools import pairwise
 
@@ -24,7 +24,7 @@ IMAGE = image_of(LAI)
 
 @st.composite
 def pieces(draw, size, most):
-    """Lengths that add up to a size."""
+    """Tuples of lengths that add up to `size`."""
     cuts = draw(st.lists(st.integers(1, size - 1), unique=True, max_size=most - 1))
     edges = [0, *sorted(cuts), size]
     return tuple(end - start for start, end in pairwise(edges))
@@ -42,7 +42,7 @@ def test_scene_and_image_are_the_same_in_any_chunks(rows, columns):
 
 @settings(max_examples=25)
 @given(pieces(ROWS, 9), pieces(COLUMNS, 9), pieces(ROWS, 5), st.sampled_from([(2,), (1, 1)]))
-def test_chunks_may_change_on_the_way(rows, columns, later, bands):
+def test_chunks_can_change_between_steps(rows, columns, later, bands):
     with no_compute():
         rho = fifesim.surface_reflectance(in_chunks(LAI, {"y": rows, "x": columns}), bands=BANDS)
         image = in_chunks(rho, {"y": later, "band": bands}).fifesim.to_toa().fifesim.sense("TM")

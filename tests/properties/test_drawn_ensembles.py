@@ -1,7 +1,7 @@
 """
-Whatever a scene is told, its realisation in an ensemble has the bits of the scene simulated alone.
+Realisations of an ensemble are identical to the bit to scenes simulated alone, for drawn scenarios.
 
-A dozen scenes in the suite; more by
+The suite draws 12 scenes. To draw more:
 
     FIFESIM_DRAWS=1000 pytest tests/properties/test_drawn_ensembles.py
 """
@@ -61,11 +61,11 @@ PLACE = st.tuples(st.integers(-40, 900), st.integers(-40, 900))
 
 @settings(max_examples=DRAWS, suppress_health_check=list(HealthCheck))
 @given(GROUND, st.none() | st.fixed_dictionaries(SUN), AIR, SENSOR, NOISE, PLACE)
-def test_a_drawn_realisation_has_the_bits_of_the_scene_alone(ground, sun, air, sensor, noise, place):
+def test_realisation_is_identical_to_the_scene_alone(ground, sun, air, sensor, noise, place):
     if ("leaf_reflectance" in ground) != ("leaf_transmittance" in ground):
         ground = {key: value for key, value in ground.items() if not key.startswith("leaf_")}
     for band in ground.get("leaf_reflectance", ()):
-        # Leaves cannot give more light than falls on them.
+        # Reflectance and transmittance of a leaf must not exceed 1 together.
         ground["leaf_transmittance"][band] = min(ground["leaf_transmittance"][band], 0.5)
     down, across = place
     sensor = sensor | noise

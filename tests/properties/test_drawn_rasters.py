@@ -1,7 +1,7 @@
 """
-Whatever the file: a raster, or one line that says what is wrong with it.
+Any file opens as a raster or is rejected with a message of one line.
 
-A thousand: ``FIFESIM_DRAWS=1000 pytest tests/properties/test_drawn_rasters.py``
+To draw a thousand files: ``FIFESIM_DRAWS=1000 pytest tests/properties/test_drawn_rasters.py``
 """
 
 import json
@@ -81,7 +81,7 @@ TRANSFORMS = st.one_of(
     ),
 )
 
-# What is drawn of a raster, beside what an ordinary one has.
+# ORDINARY is the normal raster, and DRAWN the values that replace up to four of its keys.
 ORDINARY = {
     "driver": "GTiff", "dtype": "float32", "shape": (40, 40), "count": 1, "crs": "EPSG:26914", "transform": PLACED,
     "nodata": None, "scaling": (1.0, 0.0), "gcps": False, "tag": None, "unit": None, "wavelength": None,
@@ -104,12 +104,12 @@ DRAWN = {
 
 @st.composite
 def rasters(draw):
-    """Keywords of `write`: an ordinary raster, but for a few of them."""
+    """Keywords of `write`: an ordinary raster with up to four keys drawn."""
     return ORDINARY | {key: draw(DRAWN[key]) for key in draw(st.sets(st.sampled_from(sorted(DRAWN)), max_size=4))}
 
 
 def write(path, *, driver, dtype, shape, count, crs, transform, nodata, scaling, gcps, tag, unit, wavelength):
-    """The file, or what of it the library agrees to write."""
+    """Write the file and return its path."""
     profile = {
         "driver": "GTiff",
         "dtype": dtype,
@@ -140,7 +140,7 @@ def write(path, *, driver, dtype, shape, count, crs, transform, nodata, scaling,
 
 
 def damage(path, flips, share):
-    """Change bytes of a file, and keep a share of it."""
+    """Flip bytes of a file and truncate it to a share of its length."""
     data = bytearray(path.read_bytes())
     for place, value in flips:
         data[int(place * (len(data) - 1))] ^= value
@@ -167,7 +167,7 @@ DOORS = {
 
 
 def outcome(door, path):
-    """Checked result of a door, or the error's class."""
+    """Checked result of an opening function: "raster" or the name of the error class."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         warnings.simplefilter("ignore", PendingDeprecationWarning)
@@ -188,7 +188,7 @@ def outcome(door, path):
 SEEN = {}
 
 
-def test_drawn_rasters_are_opened_or_refused_in_one_line():
+def test_drawn_rasters_open_or_are_rejected_in_one_line():
     try_a_drawn_raster()
     assert {"raster", "ValueError"} <= set(SEEN)
 
@@ -202,7 +202,7 @@ def try_a_drawn_raster(raster, broken, door):
             with ErrorsOfGdal("cannot draw"):
                 path = write(f"{folder}/drawn.tif", **raster)
         except (OSError, ValueError, OverflowError, TypeError, SystemError):
-            # Not every file that can be drawn can be written; what there is of it is a file.
+            # Some drawn files cannot be written; test the partial file.
             path = Path(f"{folder}/drawn.tif")
             path.touch()
         damage(path, *broken) if path.stat().st_size else None

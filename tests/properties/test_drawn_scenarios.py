@@ -1,7 +1,7 @@
 """
-Whatever is typed into a scenario: it is refused in a few lines, or it runs.
+Any scenario file runs or is rejected with a short message.
 
-Keys are drawn from the schema, a new one without a change here. 150 scenarios in the suite; ten thousand by
+Keys are drawn from the schema, so that new keys need no change here. The suite draws 150 scenarios. To draw more:
 
     FIFESIM_DRAWS=10000 pytest tests/properties/test_drawn_scenarios.py --hypothesis-show-statistics
 """
@@ -31,11 +31,11 @@ from fifesim.scenario.toml import check_spelling, write_scenario
 
 DRAWS = int(os.environ.get("FIFESIM_DRAWS", 150))
 
-# Nine pixels of nine cells, on level ground: what is not drawn.
+# Keys that are not drawn: 9 x 9 cells, 3 x 3 pixels, on level ground.
 SMALL = {"grid": {"width": 90.0, "height": 90.0, "cell": 10.0}, "terrain": {"dem": "flat"}}
 FEW_CELLS = 3000
 
-# Names that no description has; what no key takes is tried with every one.
+# Values that the descriptions do not mention; most are invalid for most keys.
 NAMES = [
     *("EPSG:26914", "EPSG:32614", "EPSG:3857", "EPSG:5041", "EPSG:2277", "EPSG:4326", "EPSG:26914+5703", "+proj=utm"),
     *fifesim.instrument_names(),
@@ -53,18 +53,18 @@ ODD_NUMBERS += [math.nan, math.inf, -math.inf]
 
 
 def words(field):
-    """Names that the description of a key tells."""
+    """Words in the description of a key, and its default."""
     return re.findall(r"[\w-]+", field.description) + [f"{field.default}"]
 
 
 def limits(field):
-    """Numbers at which the range of a key ends."""
+    """Ends of the valid range of a key."""
     ends = ("ge", "gt", "le", "lt")
     return [float(getattr(each, end)) for each in field.metadata for end in ends if hasattr(each, end)]
 
 
 def sound_numbers(field):
-    """Inside the range of a key and at its ends."""
+    """Numbers inside the range of a key and at its ends."""
     ends = limits(field)
     found = [end for end in ends if end < 1000] or [1.0, 30.0]
     if len(ends) == 2 and ends[1] < 1e6:
@@ -76,7 +76,7 @@ def sound_numbers(field):
 
 
 def odd_numbers(field):
-    """Beside the ends of the range of a key, and far from it."""
+    """Numbers just outside the range of a key, and far from it."""
     beside = [math.nextafter(end, way) for end in limits(field) for way in (math.inf, -math.inf)]
     return st.sampled_from([*beside, *ODD_NUMBERS]) | st.floats() | st.integers()
 
@@ -92,7 +92,7 @@ def odd_texts(field):
 
 
 def of_type(annotation, field, numbers, texts):
-    """Values of the type of a key."""
+    """Strategy for values of the type of a key."""
     kinds = get_args(annotation) if isinstance(annotation, UnionType) else (annotation,)
     found = []
     for kind in kinds:
@@ -117,10 +117,10 @@ ANYTHING = SCALARS | LISTS | st.dictionaries(st.text(max_size=9), SCALARS | LIST
 
 @st.composite
 def scenarios(draw):
-    """A small scenario, some keys of which are anything."""
+    """A small scenario in which some keys have arbitrary values."""
     found = {name: dict(keys) for name, keys in SMALL.items()}
     if draw(st.integers(0, 9)) == 0:
-        # The whole site, or what a map covers.
+        # The grid is the whole site or the extent of a map.
         del found["grid"]
         found["ground"] = {"lai_file": "lai.tif"} if draw(st.booleans()) else {}
     classes = [("classes", "grass"), ("classes", "wood")]
@@ -150,7 +150,7 @@ def scenarios(draw):
 
 
 def toml(value):
-    """TOML of a value, tables inline."""
+    """TOML text of a value, with inline tables."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{toml(key)} = {toml(each)}" for key, each in value.items()) + "}"
     if isinstance(value, list):
@@ -164,7 +164,7 @@ def toml(value):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Files beside the scenario, good and bad; what is slow the first time is done."""
+    """Folder with valid and invalid files next to the scenario; one simulation warms up the caches."""
     folder = tmp_path_factory.mktemp("drawn")
     tm = files.path("instruments/tm.toml").read_text(encoding="utf-8")
     (folder / "mine.toml").write_text(tm, encoding="utf-8")
@@ -197,7 +197,7 @@ def check_refusal(error):
 
 
 def few(scenario):
-    """Whether a scenario is computed in a moment."""
+    """Whether a scenario is quick to compute."""
     terrain = scenario.terrain
     cheap = scenario.atmosphere.engine == "5S" and not scenario.atmosphere.adjacency
     near = terrain.dem == "flat" or (terrain.dem == "flint-hills" and terrain.horizon_reach < 1000)
@@ -205,7 +205,7 @@ def few(scenario):
 
 
 def check_image(scenario, run):
-    """Counts within their bits, and a truth that leaves can have."""
+    """Check that digital numbers are within their bits, and that LAI and FPAR are physical."""
     run = run.compute()
     dn, truth = run["image"]["dn"], run["truth"]
     assert min(dn.sizes["y"], dn.sizes["x"]) >= 2
@@ -216,7 +216,7 @@ def check_image(scenario, run):
 
 @settings(max_examples=DRAWS)
 @given(scenarios())
-def test_a_drawn_scenario_is_refused_in_a_few_lines_or_runs(folder, drawn):
+def test_drawn_scenario_runs_or_is_rejected_in_a_few_lines(folder, drawn):
     text = "\n".join(f"{toml(name)} = {toml(keys)}" for name, keys in drawn.items())
     tomllib.loads(text)
     path = folder / "drawn.toml"
@@ -247,7 +247,7 @@ def test_a_drawn_scenario_is_refused_in_a_few_lines_or_runs(folder, drawn):
         try:
             check_image(scenario, run)
         except ValueError as error:
-            # Whether crowns can hold their leaves is known in advance unless one of the two varies.
+            # Crowns that cannot hold their leaves are detected in advance unless LAI or crown cover varies.
             assert scenario.ground.lai_file or scenario.landscape.deviations.get("crown_cover"), error
             check_refusal(error)
             assert "leaf area index within the crowns" in str(error)
@@ -257,6 +257,6 @@ def test_a_drawn_scenario_is_refused_in_a_few_lines_or_runs(folder, drawn):
 
 
 def check_same(path, scenario):
-    """What is written reads as the same."""
+    """Check that a written scenario reads back unchanged."""
     path.write_text(write_scenario(scenario), encoding="utf-8")
     assert read_scenario(path) == scenario

@@ -1,7 +1,7 @@
 """
-Whatever another program did to a file: the right bands and values, or a refusal.
+Files edited by other programs open with the right bands and values, or are rejected.
 
-Two thousand draws: ``FIFESIM_EDITS=2000 pytest tests/properties/test_edited_files.py``
+To draw two thousand edits: ``FIFESIM_EDITS=2000 pytest tests/properties/test_edited_files.py``
 """
 
 import os
@@ -30,7 +30,7 @@ RADIANCE = "W m-2 sr-1 um-1"
 
 
 def cells(seed, bands, low, high):
-    """Values of alike bands, so that one is a plausible other."""
+    """Bands of similar values, so that swapped bands look plausible."""
     return np.random.default_rng(seed).uniform(low, high, (bands, *GRID.shape))
 
 
@@ -51,7 +51,7 @@ def variables():
 
 @cache
 def written(kind):
-    """Copy of a file of some kind, and the physical values and names of its bands."""
+    """Copy of a file of one kind, with the physical values and the names of its bands."""
     raster = {
         "TM": lambda: digital_numbers("TM", ["TM2", "TM3", "TM4"], np.uint8, 255),
         "MSI": lambda: digital_numbers(
@@ -73,7 +73,7 @@ def written(kind):
 
 
 class Edited:
-    """A copy of a file that was edited, and what its bands truly are."""
+    """An edited copy of a file, with the true names and values of its bands."""
 
     def __init__(self, kind):
         first, physical, self.wavelengths = written(kind)
@@ -83,14 +83,14 @@ class Edited:
         }
         self.names, self.physical = list(self.copy.descriptions), physical.copy()
         self.counted = kind in ("TM", "MSI", "MSS")
-        # Whether values stand for the physical ones by a scale that a file can have.
+        # Whether a scale that the file can have converts the stored values to the physical values.
         self.sound = True
 
     def select(self, bands):
         self.names, self.physical = [self.names[band] for band in bands], self.physical[bands]
 
     def resample(self, crs, transform, shape):
-        """Nearest neighbours on another grid."""
+        """Resample to another grid by nearest neighbour."""
         copy, nodata = self.copy, self.copy.nodata
         missing = nodata if nodata is not None else np.nan if copy.values.dtype.kind == "f" else 0
         missing = 0 if nodata is None and self.counted else missing
@@ -117,7 +117,7 @@ def subset(edited, number):
 
 
 def reorder_values(edited, number):
-    """rioxarray leaves descriptions and scales behind, and drops units."""
+    """Reorder values only: rioxarray keeps the old descriptions and scales, and drops units."""
     bands = list(range(len(edited.names)))[::-1]
     edited.copy.values = edited.copy.values[bands]
     edited.copy.units = [None] * len(bands)
@@ -137,13 +137,13 @@ def unscale(edited, number):
     scale, offset = (np.array(each)[:, None, None] for each in (copy.scales, copy.offsets))
     copy.values = (copy.values * scale + offset).astype([np.float32, np.float64, copy.values.dtype][number % 3])
     copy.units = [None] * len(copy.units)
-    # Once in three, the scales stay behind, as rioxarray leaves them.
+    # In one case of three the scales remain, as with rioxarray.
     if number % 3 < 2:
         copy.scales, copy.offsets = [1.0] * len(copy.scales), [0.0] * len(copy.scales)
 
 
 def rescale(edited, number):
-    """``gdal_translate -scale`` keeps scales and drops units."""
+    """Rescale like ``gdal_translate -scale``, which keeps scales and drops units."""
     copy = edited.copy
     factor = [1 / 255, 100 / 255, 2.0, 0.5, 1000.0][number % 5]
     copy.values = copy.values.astype(float) * factor
@@ -223,7 +223,7 @@ RESAMPLED = {reproject, coarsen, shift}
 
 
 def leave_no_evidence(edits):
-    """Whether nothing is left in a file that could contradict its descriptions and values."""
+    """Whether the edits remove all metadata that could contradict descriptions and values."""
     resampled = bool(edits & RESAMPLED)
     return (
         {other_nodata, drop_nodata} <= edits
@@ -242,7 +242,7 @@ EDITS = st.lists(
 
 
 def check_values(found, edited, tagged):
-    """Names, wavelengths and physical values that an opened file claims."""
+    """Check names, wavelengths and physical values of an opened file."""
     found = found if "band" in found.dims else found.expand_dims(band=[found.name])
     names = found["band"].values.tolist()
     nameless = not tagged and names == [f"band{number}" for number in range(1, len(names) + 1)]
@@ -258,14 +258,14 @@ def check_values(found, edited, tagged):
     if not claimed:
         assert not tagged
         return "plain"
-    # Values may become no data, which is no wrong number.
+    # Values may become missing, which is not a wrong number.
     assert edited.sound or np.isnan(radiance).all(), "values that stand for nothing were read as physical ones"
     np.testing.assert_allclose(radiance, edited.physical if edited.sound else np.nan, rtol=3e-7, atol=1e-9)
     return "right"
 
 
 def outcome(kind, edits):
-    """What comes of a file: ``right``, ``plain`` without a claim, or ``refused``."""
+    """Outcome for an edited file: ``right``, ``plain`` without a claim, or ``refused``."""
     edited = Edited(kind)
     for edit, number in edits:
         edit(edited, number)
@@ -281,7 +281,7 @@ def outcome(kind, edits):
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_edited_files_open_right_or_are_refused():
+def test_edited_files_open_correctly_or_are_rejected():
     outcomes, kept = Counter(), Counter()
 
     @settings(
@@ -292,7 +292,7 @@ def test_edited_files_open_right_or_are_refused():
         came = outcome(kind, edits)
         outcomes[came] += 1
         names = {edit for edit, _ in edits}
-        # GDAL drops the units of a crop, and cells that were resampled are known by them only.
+        # GDAL drops the units when cropping, and resampled cells are recognised by units only.
         if names <= set(HARMLESS) and not (crop in names and names & RESAMPLED):
             kept[came] += 1
             assert came == "right", "an ordinary edit was refused"
@@ -307,8 +307,8 @@ def test_edited_files_open_right_or_are_refused():
 @pytest.mark.parametrize("change", ["none", "crop", "reorder", "half"])
 @pytest.mark.parametrize("kind", ["TM", "truth"])
 @pytest.mark.filterwarnings("ignore")
-def test_files_written_by_rioxarray_open_right_or_are_refused(tmp_path, kind, change, masked):
-    """It writes descriptions and scales of other bands than it writes values, and unscales without a word."""
+def test_files_written_by_rioxarray_open_correctly_or_are_rejected(tmp_path, kind, change, masked):
+    """rioxarray writes descriptions and scales of other bands than the values, and unscales silently."""
     edited = Edited(kind)
     opened = rioxarray.open_rasterio(edited.copy.write(tmp_path / "written.tif"), mask_and_scale=masked)
     changed = {

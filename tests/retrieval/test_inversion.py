@@ -1,4 +1,4 @@
-"""Optimal estimation against closed solutions, and the lookup table against the normal posterior."""
+"""Optimal estimation against closed-form solutions, and the lookup table against the normal posterior."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ def forward_of(slope):
     return lambda states, pixels: (states @ slope.T, np.broadcast_to(slope, (len(states), *slope.shape)))
 
 
-def test_linear_problems_have_the_closed_solution():
+def test_linear_problems_agree_with_the_closed_form():
     for own in PROBLEMS.values():
         found = optimal_estimation(
             own["y"].T, forward_of(own["K"]), own["xa"][:, 0], own["Sa"], own["Se"], tolerance=1e-9
@@ -38,12 +38,12 @@ def test_linear_problems_have_the_closed_solution():
 
 
 def saturating(states, pixels):
-    """Two measurements that saturate with one state, as reflectance does with leaf area."""
+    """Two measurements that saturate with one state, as reflectance saturates with leaf area."""
     decay = np.exp(-states)
     return np.hstack([0.4 - 0.3 * decay, 0.05 + 0.1 * decay]), np.stack([0.3 * decay, -0.1 * decay], axis=1)
 
 
-def test_estimate_is_the_least_of_the_cost():
+def test_estimate_minimises_the_cost():
     measured = np.array([[0.31, 0.09], [0.2, 0.14]])
     prior, spread, error = np.array([1.0]), np.array([[0.5]]), np.diag([1e-4, 4e-4])
     found = optimal_estimation(measured, saturating, prior, spread, error, tolerance=1e-8)
@@ -65,8 +65,8 @@ def test_missing_measurements_and_limits():
     assert found.state[1, 0] == 3.0
 
 
-def test_lookup_converges_to_the_normal_posterior_as_the_root_of_the_members():
-    """Root mean square error of the posterior mean over 40 tables, by the number of members."""
+def test_lookup_error_decreases_with_the_square_root_of_the_table_size():
+    """Root mean square error of the posterior mean over 40 tables, by number of members."""
     slope, spread = np.array([[1.0], [0.5]]), 1.0
     whole = 1 / (1 / spread**2 + (slope**2).sum())
     measured = np.array([[0.8, -0.2]])
@@ -86,8 +86,8 @@ def test_lookup_converges_to_the_normal_posterior_as_the_root_of_the_members():
     assert quantiles == pytest.approx(stats.norm(mean, np.sqrt(whole)).ppf([0.1, 0.5, 0.9]), abs=0.02)
 
 
-def test_lookup_by_brute_force():
-    """Weights and quantiles of a small table, written out."""
+def test_lookup_agrees_with_brute_force():
+    """Weights and quantiles of a small table, computed pixel by pixel."""
     rng = np.random.default_rng(4)
     members, states, measured = rng.normal(size=(30, 2)), rng.normal(size=(30, 2)), rng.normal(size=(5, 2))
     wanted = np.array([0.05, 0.4, 0.5, 0.95])

@@ -1,4 +1,4 @@
-"""SL2P against its published cases, its domain against its rule, and the training of quantiles."""
+"""SL2P against its published cases and the definition of its domain, and the training of quantiles."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def test_sl2p_gives_the_published_values(quantity, bound):
 
 
 def domain_by_the_rule(spectrum, ranges, cells):
-    """Whether a spectrum is inside: bands within their ranges, and their tenths a cell of the list."""
+    """Whether bands are within their ranges and their decile cell is in the list."""
     text = ""
     for name, value in zip(networks.SL2P_BANDS, spectrum, strict=True):
         low, high = ranges.loc[name, "domain_min"], ranges.loc[name, "domain_max"]
@@ -34,7 +34,7 @@ def domain_by_the_rule(spectrum, ranges, cells):
     return text in cells
 
 
-def test_domain_of_sl2p_follows_its_rule():
+def test_domain_of_sl2p_follows_its_definition():
     ranges = files.table("sl2p/ranges.csv")
     ranges = ranges[ranges.variable == "LAI"].set_index("quantity")
     cells = set(files.table("sl2p/domain_cells.csv").cell.astype(str))
@@ -50,7 +50,7 @@ def test_domain_of_sl2p_follows_its_rule():
 
 
 def test_values_beyond_the_range_by_less_than_the_tolerance_are_clipped():
-    """In the published cases of FAPAR, one is clipped at 0; raw outputs of some spectra lie above 0.94."""
+    """One published case of FAPAR is clipped at 0; raw outputs of some spectra are above 0.94."""
     cases = CASES[CASES.variable == "FAPAR"]
     found, outside = networks.sl2p(
         cases[list(networks.SL2P_BANDS)].to_numpy(), *(cases[name].to_numpy() for name in ANGLES), "FAPAR"
@@ -64,7 +64,7 @@ def test_values_beyond_the_range_by_less_than_the_tolerance_are_clipped():
     assert (np.maximum(-value, value - 8)[beyond] > 0.2).all()
 
 
-def test_trained_quantiles_are_those_of_a_known_distribution():
+def test_trained_quantiles_agree_with_a_known_distribution():
     """The target is normal with mean 2 x and standard deviation 0.2 + 0.3 |x|."""
     rng = np.random.default_rng(5)
     x = rng.uniform(-1, 1, (20_000, 1))
@@ -76,7 +76,7 @@ def test_trained_quantiles_are_those_of_a_known_distribution():
     assert np.abs(networks.network(at, layers) - expected).max() < 0.06
 
 
-def test_slopes_are_the_derivatives_of_the_loss():
+def test_gradients_agree_with_finite_differences():
     rng = np.random.default_rng(2)
     found = [rng.normal(size=shape) for shape in ((3, 4), (4, 4), (4, 2), (4,), (4,), (2,))]
     inputs, targets = rng.normal(size=(50, 3)), rng.normal(size=(50, 2))

@@ -1,4 +1,4 @@
-"""Optimal estimation of leaves and canopies that were computed with prosail."""
+"""Optimal estimation of leaves and canopies computed with prosail."""
 
 from pathlib import Path
 
@@ -19,18 +19,18 @@ CASES = [rows for _, rows in TABLE.groupby("case")]
 NANOMETRES = CASES[0].wavelength_nm.to_numpy()
 STEP = 1e-30
 SOILS = prosail.spectral_library.get_spectra().soil
-# Eighteen classes of prosail, whose fractions differ from exact ones by up to 0.001.
+# The 18 classes of prosail, whose fractions differ from exact ones by up to 0.001.
 ANGLES = LeafAngles((np.arange(18) + 0.5) * 5, campbell(57.3, 18))
 
 
 def slope_of(function, states):
-    """Values of shape (n, m) and their derivatives by a complex step, shape (n, m, k)."""
+    """Values, shape (n, m), and their complex-step derivatives, shape (n, m, k)."""
     steps = np.eye(states.shape[1]) * 1j * STEP
     return function(states), np.stack([function(states + step).imag / STEP for step in steps], axis=-1)
 
 
 def gap_in_twenty_steps(lai, ks, ko, alpha):
-    """Gap fraction of both beams and the leaf area that both reach, by the quadrature of prosail (Verhoef 1998)."""
+    """Gap fraction of both beams and the leaf area visible in both, by the quadrature of prosail (Verhoef 1998)."""
     share = np.arange(20)[:, None] / 20
     depth = np.vstack([-np.log1p(share * np.expm1(-alpha)) / alpha, [[1.0]]])
     exponent = -(ks + ko) * lai * depth - np.sqrt(ks * ko) * lai * np.expm1(-alpha * depth) / alpha
@@ -50,8 +50,8 @@ def canopy(rows, lai):
     return with_background(found, ground[:, None]).rso.T
 
 
-def test_lai_of_known_leaves_and_soil(monkeypatch):
-    """Without prosail's approximate hot spot, LAI would differ by up to 0.011, because reflectance differs by 3e-4."""
+def test_lai_is_retrieved_with_known_leaves_and_soil(monkeypatch):
+    """Uses the approximate hot spot of prosail; otherwise reflectance differs by 3e-4 and LAI by up to 0.011."""
     monkeypatch.setattr(sail_model, "bidirectional_gap", gap_in_twenty_steps)
     for rows in [each for each in CASES if each.lai.iloc[0] <= 4]:
         found = optimal_estimation(
@@ -69,7 +69,7 @@ TYPICAL = np.array([1.5, 40.0, 8.0, 0.1, 0.012, 0.006])
 
 
 def leaves(states):
-    """Reflectance and transmittance of leaves from their contents relative to typical ones, shape (n, 18)."""
+    """Leaf reflectance and transmittance from contents relative to typical ones, shape (n, 18)."""
     structure, chlorophyll, carotenoids, brown, water, dry_matter = (states * TYPICAL).T
     weights = np.zeros((2101, len(NANOMETRES)))
     weights[NANOMETRES - 400, np.arange(len(NANOMETRES))] = 1
@@ -77,7 +77,7 @@ def leaves(states):
     return leaf_band_means(contents, weights).reshape(2 * len(NANOMETRES), -1).T
 
 
-def test_leaves_from_reflectance_and_transmittance():
+def test_leaf_contents_are_retrieved_from_reflectance_and_transmittance():
     measured = np.array([np.concatenate([rows.leaf_reflectance, rows.leaf_transmittance]) for rows in CASES])
     true = np.array([rows.iloc[0][CONTENTS].astype(float) for rows in CASES])
     found = optimal_estimation(
@@ -87,5 +87,5 @@ def test_leaves_from_reflectance_and_transmittance():
         limits=(np.array([1 / 1.5, 0, 0, 0, 0, 0]), np.full(6, 20.0)), iterations=60,
     )  # fmt: skip
     assert found.converged.all()
-    # Brown pigments are absent from half of the leaves.
+    # Half of the leaves have no brown pigments.
     assert found.state * TYPICAL == pytest.approx(true, rel=0.01, abs=1e-4)

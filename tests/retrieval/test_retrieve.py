@@ -1,4 +1,4 @@
-"""Training on a study, and retrieval from images: intervals, flags, files and refusals."""
+"""Training on a study, and retrieval from images: intervals, flags, files and error messages."""
 
 from dataclasses import replace
 from functools import partial
@@ -42,8 +42,8 @@ def image():
     return fifesim.simulate(CHIP.replace(width=180, height=150, **{"ground.seed": 1234}))
 
 
-def test_intervals_hold_on_unseen_landscapes(retrieval):
-    """The part for testing has 6 landscapes, so coverage is known to some percent."""
+def test_intervals_have_their_coverage_on_unseen_landscapes(retrieval):
+    """The test part has 6 landscapes, so that coverage has a standard error of a few percent."""
     score = retrieval.score
     assert float(score.rmse.sel(quantity="lai")) < 0.25
     for level in (0.5, 0.8, 0.95):
@@ -61,7 +61,7 @@ def test_retrieved_map_is_near_the_truth_and_on_its_grid(retrieval, image):
     assert bool((inside.lai_low <= inside.lai_high).where(inside.lai.notnull(), True).all())
     assert bool((inside.lai_low.diff("level") <= 0).where(inside.lai.notnull(), True).all())
     if retrieval.method == "line":
-        # Normal errors, where the lower end is not clipped.
+        # The intervals are normal where the lower end is not clipped.
         width = (found.lai_high - found.lai_low).sel(level=0.8).where(found.lai_low.sel(level=0.8) > 0)
         np.testing.assert_allclose(width / (2 * 1.28155 * found.lai_sd), np.where(width > 0, 1, np.nan), rtol=0.01)
     assert found.flag.dtype == np.int8
@@ -79,7 +79,7 @@ def test_retrieve_is_lazy_and_the_same_in_any_chunks(retrieval, image):
         xr.testing.assert_identical(lazy.compute(), whole)
 
 
-def test_training_is_repeated_to_the_bit(chips):
+def test_training_is_reproducible_to_the_bit(chips):
     chips = chips.isel(chip=slice(24))
     one, two = (fifesim.train(chips, "quantiles", seed=3) for _ in range(2))
     assert all(np.array_equal(one.tables[name], two.tables[name]) for name in one.tables)
@@ -87,7 +87,7 @@ def test_training_is_repeated_to_the_bit(chips):
     assert not np.array_equal(one.tables["weight0"], other.tables["weight0"])
 
 
-def test_file_keeps_the_retrieval(retrieval, image, tmp_path):
+def test_retrieval_is_restored_from_its_file(retrieval, image, tmp_path):
     retrieval.to_netcdf(tmp_path / "mine.nc")
     again = fifesim.read_retrieval(tmp_path / "mine.nc")
     assert replace(again, tables={}, score=None) == replace(retrieval, tables={}, score=None)
@@ -97,7 +97,7 @@ def test_file_keeps_the_retrieval(retrieval, image, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["mine.nc"]
 
 
-def test_geotiff_has_a_layer_for_each_level(retrieval, image, tmp_path):
+def test_geotiff_has_a_band_for_each_level(retrieval, image, tmp_path):
     found = image["image"]["dn"].fifesim.to_reflectance().fifesim.retrieve(retrieval, intervals=[0.5, 0.95])
     path = found.fifesim.to_geotiff(tmp_path / "lai.tif")
     again = fifesim.open_image(path)
@@ -106,12 +106,12 @@ def test_geotiff_has_a_layer_for_each_level(retrieval, image, tmp_path):
     assert np.array_equal(again.sel(band="lai_low_95"), found.lai_low.sel(level=0.95), equal_nan=True)
 
 
-def test_foreign_spectra_and_the_edge_of_the_prior_are_flagged(retrieval, image):
+def test_spectra_outside_the_training_are_flagged(retrieval, image):
     light = image["image"]["dn"].fifesim.to_reflectance().compute()
     water = light.copy(data=np.broadcast_to(np.array([0.03, 0.02, 0.01])[:, None, None], light.shape).copy())
     assert (water.fifesim.retrieve(retrieval).flag.values & 1).all()
     assert float((light.fifesim.retrieve(retrieval).flag > 0).mean()) < 0.1
-    # Dense grass: brighter in the near infrared and darker in red than any pixel of the training.
+    # Dense grass is brighter in the near infrared and darker in the red than all training pixels.
     dense = light.where(light.band == "MSI8", 0.04).where(light.band != "MSI8", 0.42)
     assert (dense.fifesim.retrieve(retrieval).flag.values[1:-1, 1:-1] > 0).all()
 
@@ -120,8 +120,8 @@ def test_ends_of_intervals_are_ordered_around_the_median():
     np.testing.assert_allclose(methods.probabilities_of((0.5, 0.8)), [0.1, 0.25, 0.5, 0.75, 0.9])
 
 
-def test_stretch_gives_every_landscape_the_same_weight():
-    """Intervals of one landscape are too narrow, of the other too wide; the first has ten times the pixels."""
+def test_stretch_factors_weight_landscapes_equally():
+    """Intervals are too narrow in one landscape and too wide in the other; the first has ten times the pixels."""
     rng = np.random.default_rng(0)
     landscape = np.repeat([0, 1], [10_000, 1000])
     truth = rng.normal(size=(11_000, 1)) * np.where(landscape == 0, 3.0, 0.5)[:, None]
@@ -133,7 +133,7 @@ def test_stretch_gives_every_landscape_the_same_weight():
     assert inside.mean() < 0.7
 
 
-def test_lookup_knows_the_covariance_of_the_error_within_chips():
+def test_lookup_estimates_the_error_covariance_within_chips():
     rng = np.random.default_rng(1)
     chip = np.repeat(np.arange(40), 100)
     lai = rng.uniform(0, 4, 4000)
@@ -148,8 +148,8 @@ def test_lookup_knows_the_covariance_of_the_error_within_chips():
     assert np.linalg.inv(scale @ scale.T) == pytest.approx(np.array([[4e-4, 3e-4], [3e-4, 9e-4]]), rel=0.1)
 
 
-def test_table_of_optimal_estimation_is_the_chain_and_its_derivatives(chips):
-    """Against the chain at states between the nodes, and against central differences."""
+def test_table_of_optimal_estimation_agrees_with_the_chain(chips):
+    """Compared with the chain at states between the nodes, and with central differences."""
     tables = fifesim.train(chips, "optimal-estimation", quantities=["lai", "fpar"]).tables
     study = training.study_of(chips, "test")
     axes, rng = methods._axes(tables), np.random.default_rng(5)
@@ -186,7 +186,7 @@ def test_diagnostics_of_optimal_estimation(chips, image, monkeypatch):
     kernels = [found[f"averaging_kernel_{name}"] for name in ("lai", "soil", "log_aot")]
     assert np.allclose(sum(kernels), found.degrees_of_freedom, atol=1e-5, equal_nan=True)
     assert float(found.degrees_of_freedom.max()) < 3 and float(found.averaging_kernel_lai.min()) > 0.5
-    # The misfit has as many degrees of freedom as bands, less because blur and registration errors depend on LAI.
+    # The expected misfit is the number of bands, minus a part because blur and registration errors depend on LAI.
     spectra = chips.toa_reflectance.transpose("chip", "y", "x", "band").values.reshape(-1, 3).astype(float)
     estimates = retrieval.estimate(spectra, np.tile([28.5, 0.0, 0.0], (len(spectra), 1)))
     assert 1.5 < estimates.diagnostics[1].mean() < 3.2
@@ -196,8 +196,8 @@ def test_diagnostics_of_optimal_estimation(chips, image, monkeypatch):
     assert bool((hasty.flag & 4).where(hasty.flag >= 0, 4).all())
 
 
-def test_uniform_ground_is_each_canopy_and_is_corrected_exactly(chips):
-    """SAIL of each pixel by another way than the table of leaf area, and the way back to the surface."""
+def test_uniform_ground_is_corrected_exactly(chips):
+    """Expected values from SAIL for each pixel, without the table of leaf area."""
     scenario = next(training._scenarios(chips, "test"))
     lai = np.linspace(0.1, 3, 900).reshape(30, 30)
     toa = uniform_reflectance(scenario, {"lai": lai})
@@ -210,8 +210,8 @@ def test_uniform_ground_is_each_canopy_and_is_corrected_exactly(chips):
 
 
 @pytest.mark.parametrize("method", ["quantiles", "optimal-estimation"])
-def test_training_at_the_surface_and_on_uniform_ground(chips, image, method):
-    """Surface images are retrieved about as well as those with atmosphere; so is a method fitted to uniform ground."""
+def test_training_at_the_surface_or_on_uniform_ground_is_as_accurate(chips, image, method):
+    """The RMSE of these retrievals is at most 1.5 times the RMSE at the top of the atmosphere."""
     light = image["image"]["dn"].fifesim.to_reflectance()
     surface = light.fifesim.to_surface()
     rmse = {}
@@ -222,7 +222,7 @@ def test_training_at_the_surface_and_on_uniform_ground(chips, image, method):
     assert max(rmse.values()) < 1.5 * rmse["toa", "chain"]
 
 
-def test_training_that_needs_the_study_is_refused_without_it(chips):
+def test_training_without_the_required_study_is_rejected(chips):
     bare = chips.drop_attrs(deep=False).assign_attrs(instrument="MSI")
     for options in ({"method": "optimal-estimation"}, {"level": "surface"}, {"pixels": "uniform"}):
         with pytest.raises(ValueError, match="needs the study of the chips"):
@@ -270,7 +270,7 @@ def test_sl2p_maps_sentinel_2_reflectance(image):
         (lambda light: light.isel(band=0, drop=True), "no dimension band"),
     ],
 )
-def test_images_that_do_not_fit_are_refused(chips, image, change, message):
+def test_unsuitable_images_are_rejected(chips, image, change, message):
     retrieval = fifesim.train(chips, "line")
     with pytest.raises(ValueError, match=message):
         change(image["image"]["dn"].fifesim.to_reflectance()).fifesim.retrieve(retrieval)
@@ -282,7 +282,7 @@ def test_digital_numbers_and_unknown_levels_are_refused(chips, image):
         image["image"]["dn"].fifesim.retrieve(retrieval)
     with pytest.raises(ValueError, match="digital numbers"):
         image["image"]["dn"].drop_vars(["gain", "offset"]).fifesim.retrieve(retrieval)
-    # Numbers with a fraction cannot be told from reflectance.
+    # Digital numbers with fractions are indistinguishable from reflectance; they are flagged.
     light = image["image"]["dn"].fifesim.to_reflectance()
     assert bool((light.copy(data=1e4 * light.data).fifesim.retrieve(retrieval).flag != 0).all())
     light = image["image"]["dn"].fifesim.to_reflectance()
@@ -305,12 +305,12 @@ def test_digital_numbers_and_unknown_levels_are_refused(chips, image):
         ({"method": "line", "bands": ["MSI3", "MSI4"]}, "needs a red and a near infrared band"),
     ],
 )
-def test_impossible_training_is_refused(chips, options, message):
+def test_invalid_training_options_are_rejected(chips, options, message):
     with pytest.raises(ValueError, match=message):
         fifesim.train(chips, **options)
 
 
-def test_files_that_are_no_retrieval_are_refused(tmp_path, chips):
+def test_files_without_a_retrieval_are_rejected(tmp_path, chips):
     with pytest.raises(ValueError, match="no such file"):
         fifesim.read_retrieval(tmp_path / "none.nc")
     xr.Dataset({"a": 1.0}).to_netcdf(tmp_path / "other.nc")
