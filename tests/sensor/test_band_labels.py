@@ -1,4 +1,4 @@
-"""Hyperspectral images and field spectra as the bands of an instrument, and the unit of their wavelengths."""
+"""Hyperspectral images and field spectra converted to bands of an instrument, and wavelength units."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from fifesim.sensor.response.spectral import band_weights, covered_steps
 
 @pytest.fixture(scope="module")
 def leaf():
-    """Reflectance and transmittance of a leaf, as two field spectra."""
+    """Reflectance and transmittance of a leaf as two field spectra."""
     wavelength, reflectance, transmittance = leaf_spectrum(Leaf())
     values = np.stack([reflectance, transmittance])
     return xr.DataArray(values, dims=("sample", "wavelength"), coords={"wavelength": wavelength})
@@ -22,7 +22,7 @@ def leaf():
 
 @pytest.fixture(scope="module")
 def cube(site):
-    """A leaf's spectrum of changing brightness in steps of 20 nm."""
+    """Leaf spectrum in steps of 20 nm, with a different brightness in each cell."""
     wavelength, reflectance, _ = leaf_spectrum(Leaf())
     brightness = np.random.Generator(np.random.Philox(5)).uniform(0.2, 1, site.shape)
     values = reflectance[::20, None, None] * brightness
@@ -55,7 +55,7 @@ def test_bands_are_weighted_sums_of_samples(leaf):
     assert image.dims == ("sample", "band") and image["band"].values.tolist() == ["TM4", "TM2"]
 
 
-def test_missing_sample_is_missing_in_its_bands_and_cell_alone(cube):
+def test_missing_sample_affects_only_its_bands_and_cell(cube):
     cube = cube.copy(deep=True)
     cube[{"band": int(np.argmin(abs(cube["wavelength"].values - 865))), "y": 3, "x": 4}] = np.nan
     image = cube.fifesim.to_bands("OLI")
@@ -64,13 +64,13 @@ def test_missing_sample_is_missing_in_its_bands_and_cell_alone(cube):
     assert missing[0, 1:].tolist() == [3, 4]
 
 
-def test_radiance_is_weighted_by_the_response_alone():
+def test_radiance_is_weighted_by_the_response_only():
     wavelength = np.linspace(0.4, 1.0, 121)
     radiance = xr.DataArray(100 * wavelength, dims="wavelength", coords={"wavelength": wavelength})
     radiance.attrs["units"] = "W m-2 sr-1 um-1"
     found = radiance.fifesim.to_bands("OLI", bands=["OLI4"])
     assert found.name == "toa_radiance" and found.attrs["units"] == "W m-2 sr-1 um-1"
-    # The mean of the wavelength over the response is the band's centre.
+    # The mean wavelength over the response is the band centre.
     assert float(found[0]) == pytest.approx(100 * fifesim.instrument("OLI").select("OLI4")[0].wavelength, rel=1e-5)
     assert "solar_irradiance" in found.coords
     reflectance = radiance.drop_attrs() / 100
@@ -97,14 +97,14 @@ def without(leaf, low, high):
         (lambda leaf: leaf.assign_coords(wavelength=leaf["wavelength"] * 1000), {}, "without a unit"),
     ],
 )
-def test_what_cannot_be_bands_is_refused(leaf, change, options, said):
+def test_unusable_spectra_raise(leaf, change, options, said):
     with pytest.raises(ValueError, match=said) as error:
         change(leaf).fifesim.to_bands("OLI", **options)
     assert len(str(error.value)) <= 500
 
 
-def test_widths_decide_what_a_gap_is(leaf):
-    """What is missing in a gap that is accepted has no weight, and the rest keeps the mean of a flat spectrum."""
+def test_fwhm_determines_gaps(leaf):
+    """An accepted gap has no weight, and a flat spectrum keeps its mean."""
     flat = without(xr.full_like(leaf, 0.3), 1.58, 1.61).fifesim.to_bands("OLI", bands="OLI6", min_coverage=0.5)
     np.testing.assert_allclose(flat, 0.3, rtol=0, atol=1e-12)
     sparse = leaf.isel(wavelength=slice(None, None, 20))
@@ -114,7 +114,7 @@ def test_widths_decide_what_a_gap_is(leaf):
         narrow.fifesim.to_bands("OLI", bands="OLI6")
 
 
-def test_packed_cubes_are_unpacked_and_looked_at(leaf):
+def test_packed_cubes_are_unpacked_and_checked(leaf):
     whole = (leaf * 10000).round().fillna(-1).astype("int16").drop_attrs(deep=False)
     packed = whole.assign_attrs(scale_factor=1e-4, _FillValue=-1).assign_coords(wavelength=leaf["wavelength"])
     unpacked = (whole * 1e-4).drop_attrs(deep=False).assign_coords(wavelength=leaf["wavelength"])
@@ -133,7 +133,7 @@ def spectra(wavelength, units=None, dim="band", **coords):
     return found.assign_coords(wavelength=(dim, wavelength, attrs), **coords)
 
 
-def test_wavelengths_and_widths_have_a_unit_or_are_micrometres():
+def test_wavelengths_and_widths_default_to_micrometres():
     for units in ("nm", "Nanometers", "nanometre"):
         np.testing.assert_allclose(spectral_axis(spectra([500.0, 600.0], units)).wavelength, [0.5, 0.6], rtol=1e-15)
     for units in (None, "um", "µm", "micrometers"):
@@ -161,6 +161,6 @@ def test_wavelengths_and_widths_have_a_unit_or_are_micrometres():
         (spectra([0.5, 0.6], fwhm=("band", [0.01, -0.01])), "fwhm must be positive"),
     ],
 )
-def test_wavelengths_that_are_not_known_are_refused(cube, said):
+def test_invalid_wavelengths_raise(cube, said):
     with pytest.raises(ValueError, match=said):
         spectral_axis(cube)

@@ -1,4 +1,4 @@
-"""Instruments that rasters carry, their bands by name and wavelength, and their spread and noise as rasters."""
+"""Instruments in raster attributes, bands by name and wavelength, and PSF, MTF and noise as rasters."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def raster(**attrs):
 
 
 @pytest.mark.parametrize("name", instrument_names())
-def test_an_instrument_of_ones_own_comes_back_whole(name):
+def test_user_instrument_round_trips_through_attributes(name):
     own = replace(instrument(name), name="MINE")
     again = carried_instrument(raster(**attributes_of(own)))
     assert [band.response for band in again.bands] == [band.response for band in own.bands]
@@ -40,7 +40,7 @@ def test_an_instrument_of_ones_own_comes_back_whole(name):
     assert one == other
 
 
-def test_one_of_fifesims_is_a_name():
+def test_built_in_instrument_is_stored_by_name():
     assert attributes_of(TM) == {"instrument": "TM"}
     assert carried_instrument(raster(instrument="TM")) == TM
     assert carried_instrument(raster(instrument="landsat 5")) == TM, "an alias"
@@ -48,7 +48,7 @@ def test_one_of_fifesims_is_a_name():
     assert carried_instrument(raster(**attributes_of(replace(TM, bits=10)))).bits == 10, "another of the same name"
 
 
-def test_given_wins_over_carried(lai):
+def test_argument_overrides_the_attribute(lai):
     assert given_instrument("MSI", raster(instrument="TM")).name == "MSI"
     assert given_instrument(None, raster(instrument="OLI")).name == "OLI"
     assert given_instrument(None, lai).name == "TM"
@@ -79,21 +79,21 @@ def matched(array, name):
     [
         ("TM", ["TM3", "TM4"], [0.83, 0.66], r"band TM3 has the wavelength 0.83 um, and TM3 of TM is at 0.661 um"),
         ("TM", ["TM4"], [0.66], "band TM4 has the wavelength 0.66 um"),
-        # The catalogue has other instruments with bands of these names, at the same wavelengths.
+        # Other instruments in the catalogue have bands with these names and wavelengths.
         ("L4TM", ["TM3", "TM4"], [0.83, 0.66], "band TM3 has the wavelength 0.83 um, and TM3 of L4TM"),
         ("MSI", ["MSI8", "MSI8A"], [0.865, 0.833], "band MSI8A has the wavelength 0.833 um"),
         ("MSS", ["MSS5", "MSS4"], [0.55, 0.65], "band MSS5 has the wavelength 0.55 um"),
         ("OLI", ["OLI4", "OLI8"], [0.592, 0.655], "band OLI4 has the wavelength 0.592 um"),
     ],
 )
-def test_names_that_contradict_wavelengths_are_refused(name, bands, wavelengths, said):
+def test_names_that_contradict_wavelengths_raise(name, bands, wavelengths, said):
     with pytest.raises(ValueError, match=f"{said}.*contradict each other.*drop_vars"):
         matched(named(bands, wavelengths), name)
     assert matched(named(bands), name) == bands
 
 
-def test_names_that_two_instruments_share_hold_where_the_wavelength_is_the_bands():
-    """MSS4 is green on Landsat-1, near infrared on Landsat-5; MSI4 is red on each Sentinel-2."""
+def test_shared_names_apply_if_the_wavelength_matches():
+    """MSS4 is green on Landsat-1 and near infrared on Landsat-5; MSI4 is red on every Sentinel-2."""
     first = named(["MSS4", "MSS5"], [0.55, 0.65])
     assert (matched(first, "MSS"), matched(first, "MSS5")) == (["MSS4", "MSS5"], ["MSS1", "MSS2"])
     for wavelength, names in ((0.553, ("MSS4", "MSS1")), (0.93, ("MSS7", "MSS4"))):
@@ -101,12 +101,12 @@ def test_names_that_two_instruments_share_hold_where_the_wavelength_is_the_bands
         assert tuple(matched(seen, name)[0] for name in ("MSS", "MSS5")) == names
     assert matched(named(["MSS4", "MSS5"], [np.nan, np.nan]), "MSS") == ["MSS4", "MSS5"]
     assert matched(named(["MSI4", "MSI8"], [0.665, 0.842]), "MSI-B") == ["MSI4", "MSI8"]
-    # Bands TM3 and TM4 that the raster's own instrument has elsewhere are matched by wavelength.
+    # If the instrument of the raster defines TM3 and TM4 differently, wavelengths decide.
     own = replace(TM, name="mine", bands=tuple(replace(TM.bands[k], name=n) for k, n in ((3, "TM3"), (2, "TM4"))))
     assert matched(named(["TM3", "TM4"], [0.84, 0.66], **attributes_of(own)), "TM") == ["TM4", "TM3"]
 
 
-def test_only_names_of_an_instrument_are_checked():
+def test_only_names_of_instrument_bands_are_checked():
     wavelengths = [0.83, 0.66]
     for array in (
         named(None, wavelengths),
@@ -121,8 +121,8 @@ def test_only_names_of_an_instrument_are_checked():
         check_wavelengths(named(["TM3", "TM4"], wavelengths, instrument="unknown"))
 
 
-def test_a_wavelength_finds_the_narrow_band_beside_a_panchromatic_one():
-    """The panchromatic bands, 0.52 to 0.90 and 0.50 to 0.68 um, respond there too, and at some of them more."""
+def test_wavelength_matches_the_narrow_band_instead_of_panchromatic():
+    """The panchromatic bands, 0.52 to 0.90 um and 0.50 to 0.68 um, also respond there, sometimes more strongly."""
     known = {"ETM+": {"TM2": "ETM2", "TM3": "ETM3", "TM4": "ETM4"}, "OLI": {"TM2": "OLI3", "TM3": "OLI4"}}
     for name, expected in known.items():
         wavelengths = [band.wavelength for band in TM.select(list(expected))]
@@ -130,7 +130,7 @@ def test_a_wavelength_finds_the_narrow_band_beside_a_panchromatic_one():
 
 
 def test_responses_are_relative_to_their_peak():
-    """A twentieth of the peak is no response, whatever the unit of the response."""
+    """The threshold is 5 % of the peak, in any unit of the response."""
     table = TM.bands[2].response
     strong = ResponseList(table.wavelength, tuple(50 * value for value in table.response))
     own = replace(TM, name="mine", bands=(*TM.bands[:2], replace(TM.bands[2], srf=strong), *TM.bands[3:]))
@@ -140,7 +140,7 @@ def test_responses_are_relative_to_their_peak():
         check_wavelengths(named(["TM3"], [edge], **attributes_of(own)), own)
 
 
-def test_bands_of_another_instrument_are_warned_of_and_no_others(recwarn):
+def test_only_bands_of_another_instrument_warn(recwarn):
     for array, name in ((named(["TM3"], instrument="TM"), "TM"), (named(["OLI4"], instrument="TM"), "OLI")):
         warn_of_others(array, instrument(name), matching_bands(array, instrument(name)))
     assert not recwarn
@@ -148,15 +148,15 @@ def test_bands_of_another_instrument_are_warned_of_and_no_others(recwarn):
         warn_of_others(named(["TM3"], instrument="TM"), instrument("OLI"), instrument("OLI").select("OLI4"))
 
 
-# ------------------------------------------------------------------------------------------ spread and transfer
+# ------------------------------------------------------------------------------------------ PSF and MTF
 
 
-def test_psf_holds_the_whole_response():
+def test_psf_integrates_to_one():
     spread = fifesim.psf(PAPER, "TM4")
     step = float(spread["x"][1] - spread["x"][0])
     assert float(spread.sum()) * step**2 == pytest.approx(1.0, rel=1e-12)
     np.testing.assert_allclose(spread, spread.T, rtol=1e-12)
-    # The paper's cosine: half at the ends, both of its axes at the centre.
+    # Squared peak density of the cosine of the paper, which is half at its ends.
     peak = (2 * np.pi / (3 * PAPER.line_spread.width) / np.sqrt(3)) ** 2
     assert float(spread.sel(x=0, y=0)) == pytest.approx(peak, rel=1e-3)
     assert spread["x"].attrs["units"] == "m" and spread.attrs["units"] == "m-2" and spread["band"] == "TM4"
@@ -164,7 +164,7 @@ def test_psf_holds_the_whole_response():
         fifesim.psf("TM", spacing=0)
 
 
-def test_axes_stand_where_they_belong():
+def test_along_and_across_responses_are_on_the_right_axes():
     along, across = BoxcarResponse("boxcar", width=90 / 705e3), CosineResponse("cosine", step=4.778e-6, count=9)
     mixed = replace(PAPER, lsf=TwoAxesResponse(along, across))
     spread = fifesim.psf(mixed, spacing=1.0)
@@ -174,7 +174,7 @@ def test_axes_stand_where_they_belong():
     assert transfer.sel(direction="across")[1] > 0.8
 
 
-def test_mtf_reaches_to_the_frequency_of_the_samples_of_each_band():
+def test_mtf_extends_to_the_sampling_frequency_of_each_band():
     transfer = fifesim.mtf("TM", "TM3")
     assert transfer.dims == ("band", "direction", "frequency")
     assert float(transfer["frequency"][-1]) == pytest.approx(1 / 30.315)
@@ -185,7 +185,7 @@ def test_mtf_reaches_to_the_frequency_of_the_samples_of_each_band():
     assert float(transfer["nyquist"].sel(band="MSI1", direction="across")) == pytest.approx(0.5 / 60, rel=1e-3)
     assert float(transfer["product_nyquist"].sel(band="MSI11")) == 0.5 / 20
     np.testing.assert_allclose(transfer["at_nyquist"].sel(band="MSI4"), [0.24, 0.31], rtol=0, atol=0.01)
-    # A detector passes sinc(1/2) at half a sample per width; sampled more closely than it is wide, less.
+    # A boxcar detector passes sinc(width times frequency).
     modis = fifesim.mtf(fifesim.instrument("MODIS", response="detector"), ["MODIS1"]).sel(direction="along")
     width = instrument("MODIS").ground_fields(instrument("MODIS").bands[0]).along
     np.testing.assert_allclose(modis["at_product_nyquist"], np.sinc(width * modis["product_nyquist"]), rtol=1e-12)
@@ -197,8 +197,8 @@ def test_mtf_reaches_to_the_frequency_of_the_samples_of_each_band():
 # ------------------------------------------------------------------------------------------ noise
 
 
-def test_ratio_is_that_of_the_specification_and_follows_the_share_of_shot_noise():
-    """MSI4: 223 at 108 W m-2 sr-1 um-1. What is left of the variance at none of the light is not shot noise."""
+def test_snr_agrees_with_the_specification_and_the_shot_share():
+    """MSI4: 223 at 108 W m-2 sr-1 um-1. The variance at zero radiance is not shot noise."""
     (band,) = instrument("MSI").select("MSI4")
     assert float(snr("MSI", "msi4", 108.0)) == pytest.approx(223.0, rel=1e-12)
     full = (108.0 / 223.0) ** 2
@@ -215,7 +215,7 @@ def test_ratio_is_that_of_the_specification_and_follows_the_share_of_shot_noise(
         (["TM3", "TM4"], 50.0, TypeError, "band must be a name, got a list of 2"),
     ],
 )
-def test_noise_that_is_not_known_is_refused(band, radiance, error, said):
+def test_unknown_noise_raises(band, radiance, error, said):
     silent = replace(TM, bands=tuple(replace(each, noise=None) for each in TM.bands))
     with pytest.raises(error, match=said):
         fifesim.snr(TM if radiance != 50.0 else silent, band, radiance)

@@ -1,4 +1,4 @@
-"""The sensor on labelled rasters: images, their calibration, digital numbers of products, and noise."""
+"""Sensor on labelled rasters: images, calibration, digital numbers of products, and noise."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ SUN = Geometry(40.0, 120.0, earth_sun_distance=1.0148)
 
 
 def scene(grid, bands=("TM3", "TM4"), sun=SUN, seed=2, **coords):
-    """Reflectance at the top of the atmosphere, different in each cell."""
+    """Random top-of-atmosphere reflectance in each cell."""
     values = np.random.default_rng(seed).uniform(0.02, 0.5, (len(bands), *grid.shape))
     return directions.with_geometry(products.labelled(values, grid, list(bands), coords), sun)
 
@@ -36,7 +36,7 @@ def toa(site):
 
 
 def radiance_by_kernels(toa, pixels):
-    """Footprints, then radiance, called directly."""
+    """Radiance of pixels from direct calls of the footprint and calibration kernels."""
     cells = grids.geobox(toa)
     rows, columns = (
         axis_operator(
@@ -61,7 +61,7 @@ ONTO = {
 }
 
 
-def test_dates_have_their_own_registration_error_and_response(toa):
+def test_offset_and_gain_drift_may_differ_by_date(toa):
     dates = np.array(["1987-05-01T16:35", "1987-06-06T16:35"], "M8[ns]")
     both = xr.concat([toa.assign_coords(time=each) for each in dates], "time")
     south = xr.DataArray([0.3, -0.2], coords={"time": dates}, dims="time")
@@ -86,7 +86,7 @@ def test_dates_have_their_own_registration_error_and_response(toa):
 
 
 @pytest.mark.parametrize("onto", ONTO.values(), ids=ONTO.keys())
-def test_sense_keeps_its_word_and_equals_the_kernels(toa, site, onto):
+def test_sense_follows_the_raster_rules_and_equals_the_kernels(toa, site, onto):
     image = check_raster_function(lambda toa: fifesim.sense(toa, "TM", onto=onto), toa, quantity="dn")
     pixels = grids.aligned_grid(site, 30.0) if onto is None else onto
     assert grids.same_grid(grids.geobox(image), pixels)
@@ -95,12 +95,12 @@ def test_sense_keeps_its_word_and_equals_the_kernels(toa, site, onto):
     radiance = radiance_by_kernels(toa, pixels)
     np.testing.assert_array_equal(image, calibration.radiance_to_dn(radiance, gain, offset, bits=8))
     assert image.dtype == np.uint8 and (image > 0).any()
-    # Half a count, and the rounding of a division.
+    # Half a count, plus rounding of a division.
     inside = (image.values > 1) & (image.values < 255)
     assert (np.abs(fifesim.to_radiance(image).values - radiance) <= 0.5 * gain * (1 + 1e-9))[inside].all()
 
 
-def test_image_carries_its_calibration(toa):
+def test_image_has_calibration_coordinates(toa):
     image = fifesim.sense(toa, "TM")
     for name in ("gain", "offset", "wavelength", "solar_irradiance"):
         assert image[name].dims == ("band",) and cf.attributes(name).items() <= image[name].attrs.items()
@@ -109,14 +109,14 @@ def test_image_carries_its_calibration(toa):
     assert image.attrs["_FillValue"] == 0 and image.attrs["_FillValue"].dtype == image.dtype
 
 
-def test_pixels_over_a_hole_are_no_data(toa):
+def test_pixels_over_missing_cells_are_no_data(toa):
     toa[0, 20:26, 20:26] = np.nan
     image = fifesim.sense(toa, PAPER)
     assert (image.sel(band="TM3") == 0).sum() == 1 and (image.sel(band="TM4") > 0).all()
     assert (fifesim.sense(toa, PAPER, min_valid=0.3) > 0).all()
 
 
-def test_radiance_and_reflectance_keep_their_word(toa):
+def test_radiance_and_reflectance_follow_the_raster_rules(toa):
     image = fifesim.sense(toa.where(toa["x"] > 705640), "TM")
     radiance = check_raster_function(fifesim.to_radiance, image, quantity="toa_radiance")
     reflectance = check_raster_function(fifesim.to_reflectance, image, quantity="toa_reflectance")
@@ -130,8 +130,8 @@ def test_radiance_and_reflectance_keep_their_word(toa):
     np.testing.assert_array_equal(fifesim.to_reflectance(radiance), reflectance)
 
 
-def test_radiance_is_sensed_as_it_is(toa):
-    """A raster in radiance gives the image that its reflectance gives, but for rounding at the halves."""
+def test_sensing_radiance_equals_sensing_reflectance(toa):
+    """Digital numbers may differ by 1 where the values lie halfway between counts."""
     sun = np.array([band.solar_irradiance for band in RED_NIR])[:, None, None]
     radiance = toa.copy(data=calibration.reflectance_to_radiance(toa.values, sun, SUN.mu_s, SUN.earth_sun_distance))
     radiance.attrs = {"units": "W m-2 sr-1 um-1"}
@@ -165,14 +165,14 @@ def test_bands_are_found_by_name_or_wavelength(site, toa):
         (lambda toa: toa, {"scaling": "product", "quantise": False}, "is one of digital numbers"),
     ],
 )
-def test_what_cannot_be_sensed_is_refused(toa, change, options, message):
+def test_invalid_sense_input_raises(toa, change, options, message):
     with pytest.raises(ValueError, match=message):
         fifesim.sense(change(toa), **({"instrument": "TM"} | options))
     with pytest.raises(TypeError, match="GeoBox"):
         fifesim.sense(toa, "TM", onto=30)
 
 
-def test_image_without_calibration_is_refused(toa):
+def test_image_without_calibration_raises(toa):
     image = fifesim.sense(toa, "TM")
     with pytest.raises(ValueError, match=r"no gain: open it with fifesim\.open_image"):
         fifesim.to_radiance(image.drop_vars("gain"))
@@ -184,7 +184,7 @@ def test_image_without_calibration_is_refused(toa):
         fifesim.to_radiance(image.assign_attrs(units="m"))
 
 
-def test_geometry_given_wins(toa):
+def test_geometry_argument_overrides_coordinates(toa):
     low = Geometry(60.0, 120.0)
     image = fifesim.sense(toa, "TM", geometry=low)
     assert directions.geometry_of(image) == low
@@ -199,7 +199,7 @@ def mixed(site):
     return scene(site, ("MSI11", "MSI4", "MSI8"))
 
 
-def test_each_band_lies_on_its_own_grid(mixed):
+def test_bands_of_different_pixel_sizes_form_a_tree(mixed):
     noise = {"noise": "thermal", "seed": 3, "noise_models": NoiseModel(thermal=2.0, shot=0.01)}
     tree = fifesim.sense(mixed, "MSI", **noise)
     assert [node.path for node in tree.leaves] == ["/10m", "/20m"]
@@ -213,13 +213,13 @@ def test_each_band_lies_on_its_own_grid(mixed):
     assert all(set(node.data_vars) == {"toa_radiance"} for node in native.leaves) and len(native.leaves) == 2
 
 
-def test_one_resolution_and_one_grid_for_all_stay_arrays(mixed, site):
+def test_one_resolution_or_a_given_grid_returns_an_array(mixed, site):
     assert isinstance(fifesim.sense(mixed.sel(band=["MSI4", "MSI8"]), "MSI"), xr.DataArray)
     for where in ({"interval": 20.0}, {"onto": grids.aligned_grid(site, 30.0)}):
         assert fifesim.sense(mixed, "MSI", **where)["band"].values.tolist() == ["MSI11", "MSI4", "MSI8"]
 
 
-def test_a_file_is_one_node(mixed, tmp_path):
+def test_geotiff_needs_one_node_of_the_tree(mixed, tmp_path):
     tree = fifesim.sense(mixed, "MSI")
     with pytest.raises(TypeError, match=r"got an xarray.DataTree of 10m, 20m: take one of its arrays, such as"):
         fifesim.to_geotiff(tree, tmp_path / "image.tif")
@@ -234,7 +234,7 @@ UTM = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 240.0, 180.0, 10.0)
 
 
 def bright(name):
-    """Reflectance with a gap in red and near infrared of an instrument."""
+    """Red and near-infrared reflectance for an instrument, with one missing cell."""
     near_infrared = 0.835 if "MSI" in name else 0.86
     found = scene(UTM, (1, 2), LOW_SUN, seed=5, wavelength=("band", [0.66, near_infrared])) * 1.8
     found[:, 4, 5] = np.nan
@@ -245,8 +245,8 @@ def bright(name):
     ("name", "gain", "mu_s"),
     [("OLI", 2e-5, LOW_SUN.mu_s), ("OLI2", 2e-5, LOW_SUN.mu_s), ("MSI", 1e-4, 1.0), ("MSI-B", 1e-4, 1.0)],
 )
-def test_product_numbers_are_those_of_the_agency(name, gain, mu_s, tmp_path):
-    """Read by the formula of the product's handbook they give the reflectance, to within half a count."""
+def test_product_numbers_follow_the_handbook_formula(name, gain, mu_s, tmp_path):
+    """Decoding with the formula of the product handbook gives the reflectance within half a count."""
     onto = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 240.0, 180.0, 30.0)
     image = bright(name).fifesim.sense(name, scaling="product", onto=onto)
     assert image.dtype == np.uint16
@@ -261,7 +261,7 @@ def test_product_numbers_are_those_of_the_agency(name, gain, mu_s, tmp_path):
     check_scaling("product", instrument(name))
 
 
-def test_the_detector_is_the_default():
+def test_detector_scaling_is_the_default():
     image = bright("OLI").fifesim.sense("OLI")
     assert int(image.max()) <= 4095
     xr.testing.assert_identical(image, bright("OLI").fifesim.sense("OLI", scaling="detector"))
@@ -269,7 +269,7 @@ def test_the_detector_is_the_default():
     np.testing.assert_allclose([gain[0] * 255 + offset[0], offset[0], bits], [204.3, -1.2, 8])
 
 
-def test_msi_wants_one_sun_and_oli_does_not():
+def test_msi_product_scaling_needs_one_solar_direction():
     sza = ("y", "x"), np.linspace(40, 41, UTM.shape.y * UTM.shape.x).reshape(UTM.shape)
     varying = bright("OLI").assign_coords(sza=sza)
     image = varying.fifesim.sense("OLI", scaling="product")
@@ -304,7 +304,7 @@ VERBS = {
 
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize("change", CHANGES)
-def test_values_that_are_no_digital_numbers_are_refused(image, change, verb):
+def test_values_that_are_not_digital_numbers_raise(image, change, verb):
     with xr.set_options(keep_attrs=True):
         changed = CHANGES[change](image).assign_attrs(units="1")
     with pytest.raises(ValueError, match=r"is not a whole number from 0 to (255|65535): calibrate with .*drop_vars"):
@@ -336,7 +336,7 @@ def test_digital_numbers_of_another_type_are_calibrated(image, dtype):
 
 # ------------------------------------------------------------------------------------------ noise
 
-# Figures of a test, of no real instrument.
+# Arbitrary noise, not of a real instrument.
 FIGURES = Noise(radiance=50.0, snr=60.0, shot=0.5, gain_spread=0.02, offset_spread=0.3)
 NOISY = replace(
     PAPER,
@@ -349,14 +349,14 @@ RADIANCE = {"TM3": 40.0, "TM4": 90.0}
 
 
 def uniform(shape=(900, 990), row=0, column=0, radiance=(40.0, 90.0)):
-    """Radiance by cells, each band of one value."""
+    """Radiance raster with one value per band."""
     grid = fifesim.fife_site(30 / 9, window=((row, row + shape[0]), (column, column + shape[1])))
     values = np.broadcast_to(np.array(radiance)[:, None, None], (2, *shape))
     array = products.labelled(values, grid, list(RADIANCE), {}).assign_attrs(units="W m-2 sr-1 um-1")
     return directions.with_geometry(array, Geometry(40.0, 120.0))
 
 
-def test_noise_is_the_same_in_any_chunks_windows_and_bands():
+def test_noise_does_not_depend_on_chunks_windows_or_bands():
     for quantity, quantise in (("dn", True), ("toa_radiance", False)):
         options = {"noise": ALL, "seed": 3, "quantise": quantise}
         check_raster_function(
@@ -386,12 +386,12 @@ SILENT = replace(PAPER, bands=tuple(replace(band, noise=None) for band in TM.ban
         (NOISY, "thermal", {"TM33": BARE}, "unknown band of TM 'TM33': did you mean TM3"),
     ],
 )
-def test_noise_that_is_not_described_is_refused(name, noise, models, said):
+def test_undefined_noise_raises(name, noise, models, said):
     with pytest.raises(ValueError, match=said):
         fifesim.sense(uniform((90, 99)), name, noise=noise, noise_models=models)
 
 
-def test_all_noise_is_every_kind_that_a_band_has_and_models_may_be_given():
+def test_all_noise_uses_every_defined_kind_and_models_override():
     def seen(name=NOISY, noise="all", bands=("TM3", "TM4"), **options):
         return fifesim.sense(uniform((270, 297)).sel(band=list(bands)), name, noise=noise, seed=3, **options)
 
@@ -407,8 +407,8 @@ def test_all_noise_is_every_kind_that_a_band_has_and_models_may_be_given():
 
 
 @pytest.mark.parametrize("chunk", [1, 2, 3])
-def test_bands_in_chunks_of_their_own_have_the_noise_of_the_whole(chunk):
-    """Each band by its number in the instrument and with its own model, wherever its chunk begins."""
+def test_noise_does_not_depend_on_band_chunks(chunk):
+    """Each band uses its number in the instrument and its noise model, wherever its chunk begins."""
     names = ["TM5", "TM1", "TM4", "TM3", "TM2"]
     models = {name: NoiseModel(0.2 + 0.1 * k, 0.01) for k, name in enumerate(names)}
     radiance = xr.DataArray(np.full((5, 9, 11), 50.0), dims=("band", "y", "x"))

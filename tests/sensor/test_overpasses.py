@@ -1,4 +1,4 @@
-"""Nominal overpasses against properties of the orbits, and the sampling of global area coverage."""
+"""Nominal overpasses compared with orbit properties, sampling of global area coverage, and phenology."""
 
 import numpy as np
 import pytest
@@ -18,14 +18,14 @@ def days(name, start, end, place=PLACE, **options):
     ("name", "cycle", "per_cycle"), [("TM", 16, 1), ("OLI", 16, 2), ("MSI", 10, 1), ("MODIS", 16, 18)]
 )
 def test_tracks_repeat_after_the_cycle(name, cycle, per_cycle):
-    """The published cycles, and at least one pass where swaths cover the Earth."""
+    """Published repeat cycles and number of passes per cycle."""
     first, later = days(name, "1987-06-01", "1987-06-17"), days(name, "1987-06-01", "1987-07-19")
     shifted = set((first.time.values + np.timedelta64(cycle, "D")).astype("M8[s]").tolist())
     assert shifted <= set(later.time.values.astype("M8[s]").tolist())
     assert per_cycle <= first.sizes["time"] <= 2 * per_cycle
 
 
-def test_landsat_crosses_the_equator_at_its_local_time_and_its_tracks_are_172_km_apart():
+def test_landsat_has_the_local_time_and_track_spacing_of_its_orbit():
     found = days("TM", "1987-06-01", "1987-07-19", (0.0, 20.0))
     hour = (found.time.dt.hour + found.time.dt.minute / 60 + 20 / 15) % 24
     assert abs(hour - 9.75).max() < 0.1
@@ -36,7 +36,7 @@ def test_landsat_crosses_the_equator_at_its_local_time_and_its_tracks_are_172_km
 
 
 def test_ground_track_has_the_heading_of_a_circular_orbit():
-    """0.1 degree: Track has the sidereal day, the plane of the orbit the solar day."""
+    """0.1 degrees: `Track` uses the sidereal day, the orbital plane the solar day."""
     orbit = Orbit(233 / 16, 9.75, False, 98.2, 705e3)
     seconds = np.linspace(0, DAY * 16 / 233, 20001)
     latitude, longitude = ground_track(orbit, seconds)
@@ -47,25 +47,25 @@ def test_ground_track_has_the_heading_of_a_circular_orbit():
     assert abs(heading - Track.from_inclination(39.0, 0.0, 98.2, 705e3).heading) < 0.1
 
 
-def test_view_is_that_of_a_scan_at_the_same_distance():
-    """Scan angle from the view zenith by the sine rule, and the direction at right angles to the track."""
+def test_view_agrees_with_the_scan_geometry():
+    """Scan angle from the view zenith by the sine rule; view azimuth perpendicular to the track."""
     orbit = Orbit(233 / 16, 10.5, False, 98.2, 705e3)
     _, vza, vaa, ascending = passes(orbit, 0.0, 16 * DAY, *PLACE, 55.0)
     scan = np.degrees(np.arcsin(np.sin(np.radians(vza)) * 6371.0 / (6371.0 + 705.0)))
     assert scan.max() <= 55.01 and vza.max() > 60
     heading = Track.from_inclination(39.06, 0.0, 98.2, 705e3).heading
     across = np.abs(((vaa[~ascending] - heading) % 180) - 90)
-    # Far to the side the great circle across the track turns by its convergence.
+    # Far from the track, the great circle across the track changes its azimuth.
     assert across[vza[~ascending] < 20].max() < 4
 
 
-def test_parts_of_a_period_have_the_dates_of_the_whole():
+def test_dates_do_not_depend_on_the_start_of_the_period():
     for name in ("TM", "AVHRR"):
         whole, part = days(name, "1987-05-01", "1987-07-19"), days(name, "1987-06-03", "1987-07-19")
         assert set(part.time.values.tolist()) <= set(whole.time.values.tolist())
 
 
-def test_impossible_overpasses_are_refused():
+def test_invalid_overpasses_raise():
     with pytest.raises(ValueError, match="the orbit of HRV is unknown, known are TM"):
         days("HRV", "1987-05-01", "1987-07-19")
     with pytest.raises(ValueError, match="end must be after start"):
@@ -78,8 +78,8 @@ def test_impossible_overpasses_are_refused():
         days("MODIS", "1987-12-01", "1987-12-20", (80.0, 10.0))
 
 
-def test_global_area_coverage_is_the_mean_of_four_of_five_samples_in_every_third_line():
-    """By loops; the longitude of a mean across the date line lies between its samples."""
+def test_gac_averages_four_of_five_samples_in_every_third_line():
+    """Compared with explicit loops; mean longitudes across the date line lie between the samples."""
     rng = np.random.default_rng(2)
     values = rng.random((2, 7, 2048))
     values[0, 3, 7] = np.nan
@@ -99,7 +99,7 @@ def test_global_area_coverage_is_the_mean_of_four_of_five_samples_in_every_third
         fifesim.to_gac(swath.fillna(0).astype("u2"))
 
 
-def test_growth_is_half_at_green_up_and_senescence():
+def test_phenology_is_half_at_green_up_and_senescence():
     dates = ["1987-05-05T00:00Z", "1987-10-07T00:00Z", "1987-07-20T00:00Z", "1987-01-02T00:00Z"]
     found = fifesim.phenology(dates, green_up=125, senescence=280, winter=0.2, width=8)
     np.testing.assert_allclose(found, [0.6, 0.6, 1.0, 0.2], atol=1e-3)

@@ -1,4 +1,4 @@
-"""Where the pixels of an instrument lie, and what they see."""
+"""Pixel grids of an instrument, offsets and line spread functions."""
 
 from dataclasses import replace
 
@@ -52,12 +52,12 @@ def sensed(array, tm=TM, **options):
         ({"offset": (0.0, np.nan)}, "finite"),
     ],
 )
-def test_a_place_that_is_none_is_refused(options, message):
+def test_invalid_interval_or_offset_raises(options, message):
     with pytest.raises(ValueError, match=message):
         sensed(scene(), **options)
 
 
-def test_own_interval_moves_the_coordinates():
+def test_native_interval_sets_the_coordinates():
     image = check_raster_function(lambda toa: sensed(toa, interval="native"), scene(), quantity="toa_radiance")
     np.testing.assert_allclose(np.diff(image["x"]), INTERVAL, rtol=0, atol=1e-6)
     np.testing.assert_allclose(np.diff(image["y"]), -INTERVAL, rtol=0, atol=1e-6)
@@ -65,13 +65,13 @@ def test_own_interval_moves_the_coordinates():
     np.testing.assert_allclose([image["x"][0], image["y"][0]], [corner.c + INTERVAL / 2, corner.f - INTERVAL / 2])
     onto = fifesim.grid_at("EPSG:26914", corner.c, corner.f, 21 * INTERVAL, 19 * INTERVAL, INTERVAL)
     xr.testing.assert_allclose(image, sensed(scene(), onto=onto), rtol=1e-9)
-    # The interval may differ down and across.
+    # The interval may differ between rows and columns.
     assert grids.cell_size(grids.geobox(sensed(scene(), interval=(60.0, 22.0)))) == (60.0, 22.0)
 
 
 @pytest.mark.parametrize("offset", [(0.0, 0.25), (0.5, 0.0), (-0.3, 1.2)])
-def test_offset_sees_the_ground_beside_and_keeps_the_coordinates(offset):
-    """A ramp shifts by slope times offset; a cell's steps are alike in every pixel of nine cells for whole cells."""
+def test_offset_shifts_the_image_but_not_the_coordinates(offset):
+    """A ramp shifts by slope times offset, exactly for an offset of whole cells."""
     y, x = np.meshgrid(np.arange(180) * 10 / 3, np.arange(198) * 10 / 3, indexing="ij")
     ramp = scene(values=np.stack([0.01 * y + x] * 2))
     nominal, moved = sensed(ramp), sensed(ramp, offset=offset)
@@ -79,14 +79,14 @@ def test_offset_sees_the_ground_beside_and_keeps_the_coordinates(offset):
     np.testing.assert_array_equal(moved["y"], nominal["y"])
     inside = np.s_[:, 2:-2, 2:-2]
     shift = 30 * (0.01 * offset[0] + offset[1])
-    # Within a cell the ramp is flat, which leaves a hundredth of a cell.
+    # The ramp is constant within a cell: 0.01 cells.
     np.testing.assert_allclose((moved - nominal).values[inside], shift, rtol=0, atol=0.06)
     exact = sensed(ramp, offset=(0.0, 10 / 30)) - nominal
     np.testing.assert_allclose(exact.values[inside], 10.0, rtol=1e-10)
 
 
-def test_drift_moves_each_column_by_its_own():
-    """Pixels taken at the instrument's interval but taken for those of the product drift by 0.315 m a pixel."""
+def test_offset_may_differ_by_column():
+    """Pixels at the native interval on the product grid drift by 0.315 m per pixel."""
     steps = (np.arange(20) + 0.5) * (INTERVAL - 30) / 30
     drifting = sensed(scene(), offset=(0.0, np.append(steps, [0.0, 0.0])), interval=30.0)
     onto = grids.geobox(sensed(scene(), interval=(30.0, INTERVAL)))
@@ -99,7 +99,7 @@ def test_drift_moves_each_column_by_its_own():
         shifts_of((30.0, 0.0), PIXELS)
 
 
-def test_rows_take_the_response_along_the_track():
+def test_rows_use_the_along_track_response():
     """A point is smeared by a wide boxcar southward and by a narrow one eastward."""
     along, across = (BoxcarResponse("boxcar", width=width / 705e3) for width in (90, 30))
     values = np.zeros((2, 180, 198))
@@ -108,7 +108,7 @@ def test_rows_take_the_response_along_the_track():
     assert (image[0] > 1e-9).sum(axis=0).max() == 3 and (image[0] > 1e-9).sum(axis=1).max() == 1
 
 
-def test_each_band_has_its_own_response():
+def test_bands_may_have_different_spatial_responses():
     other = replace(TM.bands[3], lsf=GaussianResponse("gaussian", fwhm=60 / 705e3))
     mixed = replace(TM, bands=(*TM.bands[:3], other, *TM.bands[4:]), sources=TM.sources)
     small = scene((90, 99))
@@ -120,7 +120,7 @@ def test_each_band_has_its_own_response():
     assert turned["band"].values.tolist() == ["TM4", "TM3"]
 
 
-def test_bands_of_different_pixels_go_apart_or_onto_one_grid():
+def test_bands_of_different_pixel_sizes_are_grouped_or_share_one_grid():
     coarse = replace(TM.bands[3], gsd=60.0)
     mixed = replace(TM, bands=(*TM.bands[:3], coarse, *TM.bands[4:]))
     assert bands_by_grid(mixed, mixed.select(["TM4", "TM3"])) == {"30m": [1], "60m": [0]}
@@ -133,7 +133,7 @@ def test_bands_of_different_pixels_go_apart_or_onto_one_grid():
     assert sensed(scene(), mixed, interval="native").sizes["band"] == 2
 
 
-def test_point_spread_wider_than_the_scene_is_named():
+def test_point_spread_wider_than_the_scene_raises():
     wide = replace(TM, lsf=CosineResponse("cosine", step=4.778e-5, count=90))
     said = r"point spread of TM TM3, TM4, 3031\.6 x 3031\.6 m, is wider than the scene of"
     with pytest.raises(ValueError, match=said):

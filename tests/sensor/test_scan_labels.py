@@ -1,4 +1,4 @@
-"""Scans on labelled rasters: view angles, light of the view, images by line and sample, and sweeps."""
+"""Scans on labelled rasters: view angles, view direction of the light, swath images, and sweeps."""
 
 from dataclasses import replace
 from functools import cache
@@ -28,7 +28,7 @@ WIDE = replace(TM, name="wide", altitude=833e3, scan=Scan("whiskbroom", max_angl
 SITE = fifesim.fife_site(30.0)
 
 
-def test_angles_are_those_of_each_cell():
+def test_view_angles_are_computed_for_each_cell():
     view = fifesim.scan_geometry(TM, SITE, nadir_offset=3e3, heading=193.0)
     rows, columns = np.meshgrid(*(np.arange(size) + 0.5 for size in SITE.shape), indexing="ij")
     track = fifesim.Track(view.attrs["track_latitude"], view.attrs["track_longitude"], view.attrs["track_heading"])
@@ -41,8 +41,8 @@ def test_angles_are_those_of_each_cell():
         assert cf.attributes(name).items() <= view[name].attrs.items()
 
 
-def test_the_track_may_cross_the_scene():
-    """It lies 3 km to the left of the middle, which flying south is the east: the sensor changes sides."""
+def test_track_may_cross_the_scene():
+    """The track lies 3 km left of the centre, i.e. in the east when flying south: vaa changes across the track."""
     view = fifesim.scan_geometry(TM, SITE, nadir_offset=3e3)
     middle = view.isel(y=250)
     assert middle["vza"].min() < 0.002
@@ -53,14 +53,14 @@ def test_the_track_may_cross_the_scene():
     assert float(west["vza"]) == pytest.approx(np.degrees(np.arctan(10.4 / 705)), abs=0.1)
 
 
-def test_lazy_angles_are_the_same_bits():
+def test_lazy_angles_are_bitwise_equal():
     whole = fifesim.scan_geometry(TM, SITE, nadir_offset=3e4)
     with no_compute():
         lazy = fifesim.scan_geometry(TM, SITE, nadir_offset=3e4, chunks={"y": 130, "x": 77})
     xr.testing.assert_identical(lazy.compute(), whole)
 
 
-def test_a_wide_swath_ends():
+def test_cells_outside_a_wide_swath_are_missing():
     grid = fifesim.grid_at("EPSG:5070", -1.6e6, 2.2e6, 3.2e6, 4e5, 10e3)
     view = fifesim.scan_geometry(WIDE, grid, fifesim.Track(39.5, -96.0, 190.0))
     seen = np.isfinite(view["vza"].values)
@@ -73,7 +73,7 @@ def test_a_wide_swath_ends():
     np.testing.assert_allclose(sine[seen], np.hypot(east, north)[seen], rtol=0, atol=1e-5)
 
 
-def test_a_scene_that_is_not_seen_is_named():
+def test_scene_outside_the_swath_raises():
     narrow = replace(WIDE, scan=Scan("whiskbroom", max_angle=7.5))
     with pytest.raises(ValueError, match=r"wide does not see the grid: it begins \d+ km from the track.*7\.5 degrees"):
         fifesim.scan_geometry(narrow, SITE, nadir_offset=2e5)
@@ -83,7 +83,7 @@ def test_a_scene_that_is_not_seen_is_named():
         fifesim.scan_geometry(TM, SITE, (39.0, -96.0))
 
 
-# ------------------------------------------------------------------------------------------ light
+# ------------------------------------------------------------------------------------------ view direction of the light
 
 
 AWAY = {"nadir_offset": -60e3, "heading": 193.6}
@@ -96,7 +96,7 @@ def light(site, geometry):
     return lai.fifesim.surface_reflectance("TM", bands=["TM3"], geometry=geometry, atmosphere=air).fifesim.to_toa()
 
 
-def test_light_at_nadir_is_not_seen_from_the_side(site):
+def test_nadir_light_in_an_off_nadir_scan_raises(site):
     toa = light(site, Geometry(30.0, 120.0))
     with pytest.raises(ValueError, match=r"another view, vza 0.0, than the scan, vza 5.4: up to 5.4 degrees"):
         toa.fifesim.sense_swath("TM", **AWAY)
@@ -105,8 +105,8 @@ def test_light_at_nadir_is_not_seen_from_the_side(site):
     assert float(toa.fifesim.sense_swath("TM")["vza"].max()) < 0.02
 
 
-def test_the_message_says_what_makes_it_right(site):
-    """Typed as it stands, with the sun, it gives light that the scan takes."""
+def test_error_message_contains_a_working_remedy(site):
+    """The code in the message, with a sun added, gives light that the scan accepts."""
     with pytest.raises(ValueError) as refused:
         light(site, Geometry(30.0, 120.0)).fifesim.sense_swath("TM", **AWAY)
     said = str(refused.value)
@@ -117,7 +117,7 @@ def test_the_message_says_what_makes_it_right(site):
     assert float(image["vza"].mean()) == pytest.approx(float(view["vza"].mean()), abs=1e-3)
 
 
-def test_lazy_angles_are_looked_at_when_it_computes(site):
+def test_lazy_angles_are_checked_on_compute(site):
     view = fifesim.scan_geometry("TM", site, **AWAY, chunks=20).assign(sza=30.0, saa=120.0)
     with no_compute():
         right = light(site, view).fifesim.sense_swath("TM", **AWAY)
@@ -128,8 +128,8 @@ def test_lazy_angles_are_looked_at_when_it_computes(site):
         wrong.compute()
 
 
-def test_no_data_are_seen_from_anywhere():
-    """Light of cells that the scan does not see has no view."""
+def test_missing_light_needs_no_matching_view():
+    """Cells outside the swath have no view angles."""
     means = xr.DataArray([[[np.nan, 1.0]]], dims=("band", "line", "sample"))
     vza = xr.DataArray(da.from_array([[np.nan, 3.0]]), dims=("line", "sample"))
     geometry = xr.Dataset({"sza": 30.0, "saa": 120.0, "vza": vza, "vaa": 0.0})
@@ -155,8 +155,8 @@ def scene(shape=(180, 198), plane=None):
     return directions.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
 
 
-def test_pixels_lie_where_they_say():
-    """A plane is seen at the centre of a symmetric footprint; its steps by cells leave a hundredth of one."""
+def test_pixels_lie_at_their_coordinates():
+    """The mean of a plane over a symmetric footprint is its value at the centre; cell size leaves 0.01 cells."""
     plane = scene(plane=lambda x, y: 0.02 * (x - 705600) - 0.03 * (y - 4333900))
     image = fifesim.sense_swath(plane, PAPER, quantise=False, **ASIDE)
     expected = 0.02 * (image["x"] - 705600) - 0.03 * (image["y"] - 4333900)
@@ -167,27 +167,27 @@ def test_pixels_lie_where_they_say():
     assert np.abs(difference[inside]).max() < np.hypot(0.02, 0.03) * 0.01 * 10 / 3
 
 
-def test_pixels_stand_at_the_instruments_interval_and_turn_with_the_track():
+def test_swath_has_the_native_interval_and_the_track_heading():
     image = fifesim.sense_swath(scene(), PAPER, quantise=False, **ASIDE)
     assert image.dims == ("band", "line", "sample")
     along = np.hypot(image["x"].diff("line"), image["y"].diff("line"))
     across = np.hypot(image["x"].diff("sample"), image["y"].diff("sample"))
     wider = growth(float(image["vza"].mean()) * 0.9, 705e3)
-    # The sphere and the map's scale cost a few thousandths.
+    # Spherical Earth and map scale: 0.4 %.
     swept = (image["sweep"].diff("line") == 0).values
     np.testing.assert_allclose(along[swept], 30.315 * float(wider[0]), rtol=4e-3)
-    # 16 lines together are 0.15 % higher than a sweep advances.
+    # 16 lines together are 0.15 % longer than the advance per sweep.
     assert (~swept).sum() == 1 and float(along[~swept].max()) < 30.315 - 16 * 30.315 * (float(wider[0]) - 1) + 0.1
     np.testing.assert_allclose(across, 30.315 * float(wider[1]), rtol=5e-3)
     heading = np.degrees(np.arctan2(image["x"].diff("line"), image["y"].diff("line"))) % 360
     convergence = projection.convergence(grids.geobox(scene()))
     np.testing.assert_allclose(heading, 193.6 - convergence, rtol=0, atol=0.4)
-    # Flying south, the right is the west.
+    # When flying south, right is west.
     assert (image["x"].diff("sample") < 0).all()
     assert (abs(image["vaa"] - 283.6) < 0.5).all()
 
 
-def test_constant_scene_stays_constant_and_its_labels_are_whole():
+def test_constant_scene_stays_constant_and_is_fully_labelled():
     image = fifesim.sense_swath(scene(plane=lambda x, y: 0 * x + 40.0), PAPER, quantise=False, **ASIDE)
     found = image.sel(band="TM3").values
     np.testing.assert_allclose(found[np.isfinite(found)], 40.0, rtol=1e-14)
@@ -198,7 +198,7 @@ def test_constant_scene_stays_constant_and_its_labels_are_whole():
 
 
 @pytest.mark.parametrize("chunks", [CHUNKS, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}])
-def test_a_scan_is_the_same_in_any_chunks(chunks, monkeypatch):
+def test_scan_does_not_depend_on_chunks(chunks, monkeypatch):
     monkeypatch.setattr("fifesim.sensor.scan_labels._SWATH_BLOCK", 7)
     whole = fifesim.sense_swath(scene(), PAPER, **ASIDE)
     with no_compute():
@@ -206,7 +206,7 @@ def test_a_scan_is_the_same_in_any_chunks(chunks, monkeypatch):
     xr.testing.assert_identical(lazy.compute(), whole)
 
 
-def test_digital_numbers_come_back_as_radiance_and_reflectance():
+def test_swath_numbers_convert_to_radiance_and_reflectance():
     image = fifesim.sense_swath(scene(), PAPER, **ASIDE)
     radiance = fifesim.sense_swath(scene(), PAPER, quantise=False, **ASIDE)
     assert image.dtype == np.uint8 and image.attrs["_FillValue"] == 0
@@ -216,7 +216,7 @@ def test_digital_numbers_come_back_as_radiance_and_reflectance():
     assert reflectance.dims == ("band", "line", "sample") and "latitude" in reflectance.coords
 
 
-def test_noise_goes_by_lines_of_the_scan():
+def test_fixed_pattern_noise_follows_scan_lines():
     noisy = replace(
         PAPER,
         detectors=16,
@@ -230,7 +230,7 @@ def test_noise_goes_by_lines_of_the_scan():
     assert float(image.mean("sample").std()) > 0.2
 
 
-def test_a_scene_that_is_not_scanned_is_named():
+def test_scene_that_cannot_be_scanned_raises():
     narrow = replace(PAPER, scan=Scan("whiskbroom", max_angle=7.7), sources=SCANS)
     with pytest.raises(ValueError, match="does not see the scene"):
         fifesim.sense_swath(scene(), narrow, nadir_offset=4e5)
@@ -238,8 +238,8 @@ def test_a_scene_that_is_not_scanned_is_named():
         fifesim.sense_swath(scene((6, 6)), PAPER)
 
 
-def test_lines_and_samples_are_all_those_whose_centres_lie_in_the_scene():
-    """Neither more nor less, from the first to the last; corners of the scene are the farthest along and across."""
+def test_swath_contains_all_pixels_centred_in_the_scene():
+    """The corners of the scene limit the lines and samples."""
     track = fifesim.Track(39.1, -96.9, 193.6)
     plane = scene()
     image = fifesim.sense_swath(plane, PAPER, track, quantise=False, view_tolerance=180)
@@ -254,7 +254,7 @@ def test_lines_and_samples_are_all_those_whose_centres_lie_in_the_scene():
 
 @cache
 def lit(reflectance=(0.05, 0.4)):
-    """A uniform ground seen as the scan sees it, in Track's own directions."""
+    """Uniform ground with the view angles of the scan."""
     grid = grids.geobox(scene((60, 66)))
     ground = xr.DataArray(np.broadcast_to(np.reshape(reflectance, (2, 1, 1)), (2, 60, 66)), dims=("band", "y", "x"))
     ground = grids.place(ground.assign_coords(band=["TM3", "TM4"]), grid)
@@ -264,8 +264,8 @@ def lit(reflectance=(0.05, 0.4)):
     return toa, away, fifesim.sense_swath(toa, "TM", **away)
 
 
-def test_a_scan_goes_back_to_the_ground_that_it_was_made_of():
-    """Through radiance, planetary reflectance and air, in the scan's own directions: what was put in comes out."""
+def test_swath_is_corrected_to_the_original_surface():
+    """Round trip through radiance, planetary reflectance and atmosphere with the view angles of the scan."""
     toa, away, _ = lit()
     image = fifesim.sense_swath(toa, "TM", quantise=False, **away)
     surface = image.fifesim.to_surface()
@@ -273,7 +273,7 @@ def test_a_scan_goes_back_to_the_ground_that_it_was_made_of():
     assert "latitude" in surface.coords and surface.encoding["grid_mapping"] == "spatial_ref"
     valid = surface.isel(band=0).notnull().values
     assert valid.sum() > 10
-    # The air's terms are interpolated over the angles to 1e-5, there and back at slightly different nodes.
+    # The atmospheric terms are interpolated over the angles to 1e-5, at slightly different angles each way.
     np.testing.assert_allclose(surface.values[:, valid].T, np.tile([0.05, 0.4], (valid.sum(), 1)), rtol=0, atol=2e-5)
     ndvi = image.fifesim.ndvi()
     planetary = image.fifesim.to_reflectance()
@@ -282,7 +282,7 @@ def test_a_scan_goes_back_to_the_ground_that_it_was_made_of():
     np.testing.assert_array_equal(ndvi, by_hand)
 
 
-def test_verbs_of_a_lazy_scan_are_lazy_and_the_same():
+def test_operations_on_a_lazy_scan_are_lazy_and_equal():
     *_, image = lit()
     fit = Regression(3.0, -0.5, 0.9, 100, 0.1, 0.5, 10.0)
     for verb in (fifesim.to_radiance, fifesim.to_surface, lambda array: fifesim.index(array, "EVI2"),
@@ -293,7 +293,7 @@ def test_verbs_of_a_lazy_scan_are_lazy_and_the_same():
         xr.testing.assert_identical(lazy.compute(), verb(image))
 
 
-def test_what_takes_maps_names_the_way_to_one(tmp_path):
+def test_map_functions_refer_to_grid_swath(tmp_path):
     toa, _, image = lit()
     ndvi = image.fifesim.ndvi()
     with pytest.raises(ValueError, match=r"\.fifesim\.grid_swath\(grid\)"):
@@ -305,7 +305,7 @@ def test_what_takes_maps_names_the_way_to_one(tmp_path):
     assert fifesim.open_image(tmp_path / "map.tif").dtype == np.uint8
 
 
-def test_sun_that_varies_over_the_scene_is_that_of_each_pixel():
+def test_varying_sun_is_sampled_at_each_pixel():
     toa, away, _ = lit()
     angles = np.linspace(20.0, 40.0, 66)
     varied = toa.assign_coords(sza=(("y", "x"), np.broadcast_to(angles, (60, 66)), cf.attributes("sza")))
@@ -315,7 +315,7 @@ def test_sun_that_varies_over_the_scene_is_that_of_each_pixel():
     np.testing.assert_allclose(image.fifesim.to_reflectance().mean(), toa.mean(), rtol=1e-4, atol=0)
 
 
-def test_a_scan_is_written_as_netcdf_and_read_again(tmp_path):
+def test_scan_round_trips_through_netcdf(tmp_path):
     *_, image = lit()
     image.to_netcdf(tmp_path / "scan.nc")
     with xr.open_dataarray(tmp_path / "scan.nc", decode_coords="all", mask_and_scale=False) as back:
@@ -327,7 +327,7 @@ def test_a_scan_is_written_as_netcdf_and_read_again(tmp_path):
         assert plain["dn"].attrs["grid_mapping"] == "spatial_ref"
 
 
-def test_what_lies_on_a_map_is_not_spread_over_a_scan():
+def test_map_options_raise_for_a_scan():
     toa, away, _ = lit()
     image = fifesim.sense_swath(toa, "TM", quantise=False, **away)
     height = toa.isel(band=0, drop=True).drop_vars(["vza", "vaa"]).drop_attrs() * 0 + 400
@@ -339,10 +339,10 @@ def test_what_lies_on_a_map_is_not_spread_over_a_scan():
 # ------------------------------------------------------------------------------------------ sweeps
 
 
-# Around the central meridian, where the rows of the map run across a track to the south.
+# Near the central meridian, where map rows are perpendicular to a southward track.
 CELL = 100.0
 GRID = fifesim.grid_at("EPSG:32614", 484000.0, 4346000.0, 32000.0, 26000.0, CELL)
-# Scan angles of 30 and 55 degrees.
+# Nadir offsets by scan angle, 0, 30 and 55 degrees. [m]
 OFFSETS = {"MODIS": {0: 0.0, 30: 415e3, 55: 1140e3}, "VIIRS": {0: 0.0, 30: 486e3, 55: 1404e3}}
 BANDS = {"MODIS": "MODIS1", "VIIRS": "I1"}
 
@@ -378,12 +378,11 @@ def scan_angle_of(image, name):
         ("VIIRS", 55, 769.0, 706.0),
     ],
 )
-def test_lines_and_samples_lie_as_far_apart_as_published(name, angle, along, across):
+def test_pixel_spacing_agrees_with_published_values(name, angle, along, across):
     """
-    MODIS after Ichoku and Kaufman (2005); VIIRS at nadir after its ATBD.
+    MODIS: Ichoku and Kaufman (2005). VIIRS: nadir sizes of the ATBD.
 
-    At 30 and 55 degrees the ATBD's sizes at nadir grow with the slant range: the sides of the triangle of Earth's
-    centre, ground and satellite, and one instead of three samples in the sum.
+    For 30 and 55 degrees the VIIRS sizes are scaled with slant range, incidence angle and aggregation (3 to 1 samples).
     """
     image = swept(name, angle)
     near = (abs(scan_angle_of(image, name) - angle) < 0.3).values
@@ -396,10 +395,10 @@ def test_lines_and_samples_lie_as_far_apart_as_published(name, angle, along, acr
 
 
 @pytest.mark.parametrize(("name", "height"), [("MODIS", 10_000.0), ("VIIRS", 11_871.0)])
-def test_sweeps_follow_each_other_by_their_height_at_nadir_and_overlap_at_the_edge(name, height):
+def test_sweeps_are_contiguous_at_nadir_and_overlap_at_the_edge(name, height):
     for angle in (0, 55):
         image = swept(name, angle)
-        # Flying south; the middle of each whole sweep.
+        # Centre of each complete sweep, along the southward track.
         middle = (-image["y"].isel(sample=0)).groupby("sweep").mean()
         whole = image["line"].groupby("sweep").count() == instrument(name).scan.lines
         aside = OFFSETS[name][angle] / 6371e3
@@ -408,7 +407,7 @@ def test_sweeps_follow_each_other_by_their_height_at_nadir_and_overlap_at_the_ed
         assert np.all(jump < 0) if angle else np.all(jump > 200)
 
 
-def test_deleted_pixels_are_missing_and_say_so():
+def test_deleted_pixels_are_missing_and_flagged():
     image = swept("VIIRS", 55)
     deleted = image["deleted"].values
     assert np.isnan(image.values[0][deleted]).all()
@@ -425,17 +424,17 @@ def test_deleted_pixels_are_missing_and_say_so():
 
 @pytest.mark.parametrize("name", ["MODIS", "VIIRS"])
 @pytest.mark.parametrize("angle", [0, 55])
-def test_pixels_of_all_sweeps_lie_where_they_say(name, angle):
+def test_pixels_of_all_sweeps_lie_at_their_coordinates(name, angle):
     image = swept(name, angle)
     inside = (abs(image["x"] - 500000) < 13000) & (abs(image["y"] - 4333000) < 11000)
     difference = (image[0] - plane(image["x"], image["y"])).where(inside)
     assert float(difference.notnull().mean()) > 0.3
-    # A hundredth of a pixel of about 1 km.
+    # 0.01 pixels of about 1 km.
     assert float(abs(difference).max()) < 0.02
 
 
-def test_footprints_are_as_wide_as_the_samples_that_are_summed():
-    """A strip one cell wide along the track: the largest mean is the cell over the width of the footprint."""
+def test_footprint_width_is_the_aggregated_sample_width():
+    """For a strip one cell wide, the largest mean is the ratio of cell width to footprint width."""
     widths = {}
     for angle in (31.2, 32.3):
         gamma = np.radians(angle_at_ground(angle) - angle)
@@ -456,7 +455,7 @@ def angle_at_ground(scan_angle):
 
 
 @pytest.mark.parametrize("chunks", [CHUNKS, ODD_CHUNKS])
-def test_zones_and_sweeps_are_the_same_in_any_chunks(chunks, monkeypatch):
+def test_zones_and_sweeps_do_not_depend_on_chunks(chunks, monkeypatch):
     monkeypatch.setattr("fifesim.sensor.scan_labels._SWATH_BLOCK", 11)
     view = {"nadir_offset": 525e3, "view_tolerance": 180, "min_valid": 0.0}
     rough = wide_scene("VIIRS", lambda x, y: np.random.default_rng(3).uniform(10, 90, x.shape))

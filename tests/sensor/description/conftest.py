@@ -1,4 +1,4 @@
-"""Instrument files with one thing changed."""
+"""Fixture of modified instrument files."""
 
 import pytest
 from paper_file import paper_text
@@ -8,7 +8,7 @@ from fifesim.sensor.description.instruments import read_instrument
 
 @pytest.fixture
 def changed(tmp_path):
-    """Reads the TM file after replacements in its text, each old and new."""
+    """Function that reads the TM file after text replacements, given as old, new, old, new, ..."""
 
     def read(*replacements):
         text = paper_text()

@@ -1,4 +1,4 @@
-"""An instrument: the paper's Table 1, sources, bands and gain states, and what it sees on the ground."""
+"""Instrument descriptions: Table 1 of the paper, sources, bands, gain states and ground sizes."""
 
 import dataclasses
 
@@ -15,7 +15,7 @@ from fifesim.sensor.description.instruments import instrument, instrument_names
 PRODUCT = "[product]\ngain = 2e-5\noffset = -0.1\nbits = 16\nsun_corrected = false\n\n[lsf]"
 
 
-def test_tm_is_table_1():
+def test_tm_agrees_with_table_1():
     """Footprint by hand: 9 x 4.778 urad x 705 km and 43 urad x 705 km."""
     tm, paper = instrument("TM"), instrument("TM", "paper")
     red, near_infrared = tm.select(["TM3", "TM4"])
@@ -27,7 +27,7 @@ def test_tm_is_table_1():
     np.testing.assert_allclose(paper.line_spread.width, 30.31641, rtol=1e-12)
     np.testing.assert_allclose(paper.line_spread.half_width, 15.158205, rtol=1e-12)
     np.testing.assert_allclose(paper.ground_interval, 30.315, rtol=1e-12)
-    # The cosine at half a cycle per interval, by hand.
+    # MTF of the cosine at 0.5 cycles per interval, by hand.
     np.testing.assert_allclose(paper.line_spread.mtf(0.5 / 30.315), 0.6928, atol=1e-3)
     assert repr(tm) == (
         "Instrument TM: Landsat-5 Thematic Mapper, 30 m pixels from 705 km, 8 bits\n"
@@ -37,7 +37,7 @@ def test_tm_is_table_1():
     assert said.startswith("InstrumentBand(name='TM3', srf=") and "None" not in said and len(said) < 240
 
 
-def test_bands_come_in_the_order_asked_for_and_once():
+def test_bands_are_selected_in_order_and_once():
     tm = instrument("TM")
     assert [band.name for band in tm.select(["TM4", "tm3"])] == ["TM4", "TM3"]
     assert [band.name for band in tm.select(["red", "nir", "B5"])] == ["TM3", "TM4", "TM5"]
@@ -54,7 +54,7 @@ def test_bands_come_in_the_order_asked_for_and_once():
         tm.altitude = 1.0
 
 
-def test_what_a_band_gives_stands_before_what_its_instrument_gives():
+def test_band_values_override_instrument_values():
     """By hand: 86 urad and 60 urad from 705 km are 60.63 m and 42.3 m."""
     tm = instrument("TM")
     green, red = tm.select(["TM2", "TM3"])
@@ -68,21 +68,21 @@ def test_what_a_band_gives_stands_before_what_its_instrument_gives():
     assert tuple(mixed.ground_fields(tm.bands[0])) == (None, None)
 
 
-def test_angles_of_a_file_reach_the_ground_on_their_axes(changed):
+def test_angles_along_and_across_give_ground_intervals(changed):
     mine = changed("interval = 43.0e-6", "interval = { along = 40.0e-6, across = 44.0e-6 }")
     along, across = mine.ground_intervals(mine.bands[0])
     assert (along, across) == pytest.approx((28.2, 31.02), rel=1e-12)
     assert mine.ground_interval == across
 
 
-def test_red_and_near_infrared_are_found_by_wavelength():
+def test_red_and_near_infrared_are_selected_by_wavelength():
     assert [band.name for band in instrument("OLI").red_and_near_infrared()] == ["OLI4", "OLI5"]
     blue = dataclasses.replace(instrument("TM"), bands=instrument("TM").select(["TM1", "TM3"]))
     with pytest.raises(ValueError, match=r"TM has no near infrared band, 0.75 to 1 um: say which .* meant: TM1, TM3"):
         blue.red_and_near_infrared()
 
 
-def test_gain_states_change_places():
+def test_with_gain_swaps_gain_states():
     (own,) = instrument("ETM+").select("ETM3")
     low = own.with_gain("low")
     assert own.with_gain("high") is own
@@ -101,13 +101,13 @@ def test_gain_states_change_places():
         dataclasses.replace(own, limits=(0.69, 0.63))
 
 
-def test_the_scale_of_a_product_is_read(changed):
+def test_product_scale_is_read(changed):
     product = changed("[lsf]", PRODUCT, "\n[sources]", '\n[sources]\nproduct = "Chander2009"').product
     assert (product.gain, product.offset, product.bits, product.sun_corrected) == (2e-5, -0.1, 16, False)
 
 
-def test_noise_by_its_ratio_and_by_its_radiance_is_the_same():
-    """Half of the variance is shot noise: at a fourth of the light, an eighth and a half of it are left."""
+def test_noise_from_snr_equals_noise_from_nedl():
+    """Half of the variance is shot noise: at 1/4 of the radiance, 1/8 + 1/2 of the variance remains."""
     by_ratio, by_radiance = Noise(radiance=80.0, snr=160.0, shot=0.5), Noise(radiance=80.0, nedl=0.5, shot=0.5)
     assert by_ratio.equivalent_radiance == by_radiance.equivalent_radiance == 0.5
     for noise in (by_ratio, by_radiance):
@@ -128,7 +128,7 @@ def test_noise_by_its_ratio_and_by_its_radiance_is_the_same():
         ({"high_radiance": 150.0, "high_snr": 2000.0}, "negative variance of shot"),
     ],
 )
-def test_second_point_of_the_noise_is_complete_and_higher(keys, message):
+def test_second_noise_point_must_be_complete_and_higher(keys, message):
     with pytest.raises(ValueError, match=message):
         Noise(radiance=22.0, snr=230.0, **keys)
 
@@ -146,7 +146,7 @@ def test_second_point_of_the_noise_is_complete_and_higher(keys, message):
         (Name, ("TM", "B 3", "röd"), ("", 5, "B\x1b[31m", "B\n", "B" * 201)),
     ],
 )
-def test_a_field_takes_its_own_kind_alone(field, right, wrong):
+def test_fields_accept_only_valid_values(field, right, wrong):
     adapter = TypeAdapter(field)
     assert [adapter.validate_python(value) for value in right] == list(right)
     for value in wrong:
@@ -154,8 +154,8 @@ def test_a_field_takes_its_own_kind_alone(field, right, wrong):
             adapter.validate_python(value)
 
 
-def test_names_of_no_band_have_none():
-    """Numbers behind another word, and what the instrument lacks; VIIRS counts two kinds of bands."""
+def test_unknown_band_names_give_none():
+    """Numbers after another word and missing bands have no match; VIIRS numbers two kinds of bands."""
     for name in ("nir1", "NIR_2", "re1", "tir1", "pan1", "vis06", "wvp2"):
         assert all(band_called(name, instrument(each)) is None for each in ("OLI", "MSI", "MODIS", "TM")), name
     for name in ("B6", "QA_PIXEL", "pan", "cirrus", "", "TM33"):
@@ -173,7 +173,7 @@ def test_names_of_no_band_have_none():
 
 
 @pytest.mark.parametrize("name", instrument_names())
-def test_false_colours_share_a_grid(name):
+def test_false_colour_bands_share_a_grid(name):
     own = instrument(name)
     *green, red, near_infrared = false_colour_bands(own)
     assert (red, near_infrared) == tuple(own.red_and_near_infrared())
@@ -199,14 +199,14 @@ def _numbers(**changes):
         ({"references": {}}, "Instrument: sources.altitude: must be one of"),
     ],
 )
-def test_an_instrument_made_in_python_refuses_in_own_words(changes, said):
+def test_invalid_instrument_raises_without_mentioning_pydantic(changes, said):
     with pytest.raises(ValueError) as caught:
         fifesim.Instrument(**_numbers(**changes))
     assert str(caught.value).startswith(said)
     assert "pydantic" not in str(caught.value) and len(str(caught.value)) <= 500
 
 
-def test_an_instrument_made_in_python_needs_its_arguments_and_is_made_of_right_ones():
+def test_instrument_made_in_python_checks_its_arguments():
     assert fifesim.Instrument(**_numbers(altitude=800e3)).altitude == 800e3
     numbers = _numbers()
     del numbers["gsd"]

@@ -1,4 +1,4 @@
-"""Instruments by name and from files: mistakes with key, value and remedy, units, short files and tables."""
+"""Instruments by name and from files: error messages, units, short files and tables."""
 
 import os
 import shutil
@@ -18,19 +18,19 @@ from fifesim.sensor.description.instruments import instrument, read_instrument
 TM_FILE = files.path("instruments/tm.toml")
 
 
-def test_names_are_found_in_any_case_and_instruments_pass_through():
+def test_names_ignore_case_and_instruments_are_returned_unchanged():
     tm = instrument("tm")
     assert tm is instrument("TM") is instrument(tm)
     with pytest.raises(ValueError, match=r"unknown instrument 'TN': did you mean TM\b.*\? There are .*TM"):
         instrument("TN")
-    # A suffix tells a file from a name.
+    # A suffix alone is not a file name.
     with pytest.raises(ValueError, match=r"unknown instrument '\.toml'"):
         instrument(".toml")
     with pytest.raises(FileNotFoundError, match=r"there is no instrument file .*nowhere\.toml"):
         instrument("nowhere.toml")
 
 
-def test_a_path_that_ends_in_toml_is_read_and_read_again_when_it_changed(tmp_path):
+def test_toml_path_is_read_again_after_a_change(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(TM_FILE.read_text(encoding="utf-8"), encoding="utf-8")
     assert instrument(str(path)) == instrument(path) == instrument("TM")
@@ -39,7 +39,7 @@ def test_a_path_that_ends_in_toml_is_read_and_read_again_when_it_changed(tmp_pat
     assert instrument(str(path)).bits == 11
 
 
-def test_a_file_of_ones_own_is_read(changed):
+def test_user_file_is_read(changed):
     mine = changed("altitude = 705000.0", "altitude = 3000", "swath = 185000.0", "")
     assert isinstance(mine, Instrument)
     np.testing.assert_allclose(mine.ground_interval, 0.129, rtol=1e-12)
@@ -54,12 +54,12 @@ SOURCE = ("\n[sources]", '\n[sources]\nproduct = "Chander2009"')
 
 
 def srf(text):
-    """Another response of the third band, between whose limits it must be."""
+    """Replacements that give the third band another response and limits it must cover."""
     return PYRSR, f"srf = {{ {text} }}\nlimits = [0.63, 0.69]", BITS, f'{BITS}\nlimits = "NASA2013"'
 
 
 MISTAKES = [
-    # Keys and kinds of values.
+    # Keys and value types.
     (("bits = 8 ", "bitz = 8 "), "bits is missing; unknown key bitz, did you mean 'bits'"),
     (("bits = 8 ", "bits = 8.5 "), "bits = 8.5: must be a whole number"),
     (("bits = 8 ", "bits = 32 "), "bits = 32: .*16"),
@@ -106,7 +106,7 @@ MISTAKES = [
         ('sensor = "TM", band = "7"', 'sensor = "TM", band = "9"'),
         "bands.6.srf: pyrsr has no .* Landsat-5 TM 9",
     ),
-    # Numbers in another unit than that of their key.
+    # Numbers in a wrong unit.
     (("altitude = 705000.0", "altitude = 705.0"), "altitude = 705: it is in metres.*multiply by 1000"),
     (("interval = 43.0e-6", "interval = 43.0e-3"), "interval = 0.043: angles are in radians"),
     (("interval = 43.0e-6", "interval = 0.0024637"), "interval = 0.0024637: it is in radians.*degrees, so multiply"),
@@ -130,12 +130,12 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("replacements", "message"), MISTAKES, ids=[message for _, message in MISTAKES])
-def test_mistakes_in_a_file_name_key_value_and_remedy(changed, replacements, message):
+def test_errors_in_a_file_name_key_value_and_remedy(changed, replacements, message):
     with pytest.raises(ValueError, match=f"mine.toml.*{message}"):
         changed(*replacements)
 
 
-def test_a_file_that_would_wait_or_break_is_refused(tmp_path):
+def test_pipe_or_deeply_nested_file_raises(tmp_path):
     os.mkfifo(tmp_path / "pipe.toml")
     (tmp_path / "deep.toml").write_text("x = " + "[" * 5000)
     for name, said in (("pipe.toml", "is a pipe: name a file"), ("deep.toml", "nests its tables too deeply")):
@@ -143,14 +143,14 @@ def test_a_file_that_would_wait_or_break_is_refused(tmp_path):
             instrument(tmp_path / name)
 
 
-def test_what_is_said_of_a_value_is_short_and_prints(changed):
+def test_error_message_is_short_and_printable(changed):
     with pytest.raises(ValueError, match=r"bits = '\\x1baaa.*must be a whole number") as caught:
         changed("bits = 8 ", f'bits = "\\u001b{"a" * 5000}" ')
     assert len(str(caught.value)) <= 400 and str(caught.value).isprintable()
 
 
-def test_tables_of_a_file_are_found_from_wherever_it_was_named(tmp_path, monkeypatch):
-    """A relative path means another file once Python is elsewhere."""
+def test_table_path_is_relative_to_the_instrument_file(tmp_path, monkeypatch):
+    """The working directory changes between reading the file and reading the table."""
     text = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
     (tmp_path / "mine.toml").write_text(text.replace("avhrr_response.csv", "own.csv"), encoding="utf-8")
     shutil.copy(files.path("avhrr_response.csv"), tmp_path / "own.csv")
@@ -161,8 +161,8 @@ def test_tables_of_a_file_are_found_from_wherever_it_was_named(tmp_path, monkeyp
     assert [band.response for band in mine.bands] == [band.response for band in instrument("AVHRR9").bands]
 
 
-def test_an_instrument_called_as_its_file_is_found_without_reading_the_others():
-    """To read all takes ten times as long; by an alias it is the same one."""
+def test_instrument_is_found_without_reading_all_files():
+    """Reading all files takes ten times as long; an alias returns the same object."""
     code = "import fifesim.sensor.description.instruments as i; tm = i.instrument('Tm'); count = i._listed.cache_info()"
     code += ".currsize; assert count == 1, count; assert i.instrument('Landsat 5') is tm"
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -171,8 +171,8 @@ def test_an_instrument_called_as_its_file_is_found_without_reading_the_others():
 # ------------------------------------------------------------------------------------------- units
 
 
-def test_every_radiance_in_milliwatts_is_found_out(changed):
-    """The tables of Markham and Barker (1986) are in mW cm-2 sr-1 um-1: a tenth of the numbers here."""
+def test_radiances_in_milliwatts_raise(changed):
+    """Markham and Barker (1986) use mW cm-2 sr-1 um-1, i.e. one tenth of the values here."""
     tenths = []
     for text in ("152.10", "296.81", "204.3", "206.2", "27.19", "14.38"):
         tenths += [f"full_scale_radiance = {text}", f"full_scale_radiance = {float(text) / 10}"]
@@ -188,8 +188,8 @@ def test_every_radiance_in_milliwatts_is_found_out(changed):
         ("70.0", "scan.max_angle = 70: .*misses the earth"),
     ],
 )
-def test_a_scan_without_a_swath_is_compared_with_its_samples_and_the_horizon(tmp_path, angle, message):
-    """2048 samples of 0.95 mrad are 55.7 degrees to either side; the horizon from 833 km is at 62.2."""
+def test_scan_angle_is_checked_against_samples_and_horizon(tmp_path, angle, message):
+    """2048 samples of 0.95 mrad reach 55.7 degrees to each side; the horizon from 833 km is at 62.2 degrees."""
     text = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
     path = tmp_path / "mine.toml"
     path.write_text(text.replace("max_angle = 55.4", f"max_angle = {angle}"), encoding="utf-8")
@@ -197,8 +197,8 @@ def test_a_scan_without_a_swath_is_compared_with_its_samples_and_the_horizon(tmp
         read_instrument(path)
 
 
-def test_sums_of_samples_are_counted_as_what_they_are_made_of(tmp_path):
-    """6400 equal samples as wide as the sums at nadir would reach 86 degrees; the zones of VIIRS reach 56."""
+def test_aggregated_samples_are_counted_as_elementary_samples(tmp_path):
+    """6400 samples as wide as at nadir would reach 86 degrees; the zones of VIIRS reach 56 degrees."""
     text = files.path("instruments/viirs.toml").read_text(encoding="utf-8")
     path = tmp_path / "mine.toml"
     path.write_text(text, encoding="utf-8")
@@ -218,8 +218,8 @@ def test_sums_of_samples_are_counted_as_what_they_are_made_of(tmp_path):
 
 
 @pytest.mark.parametrize(("angle", "fits"), [(30.0, True), (33.08, True), (36.0, False), (27.0, False)])
-def test_a_flat_row_of_detectors_has_equal_steps_of_the_tangent(tmp_path, angle, fits):
-    """1000 pixels of 0.1 m from 86.6 m: half of the row is 50 / 86.6, the tangent of 30 degrees, or 33.08 degrees."""
+def test_flat_detector_array_has_equal_tangent_steps(tmp_path, angle, fits):
+    """1000 pixels of 0.1 m from 86.6 m: half the array is 50 / 86.6, the tangent of 30 degrees, or 33.08 degrees."""
     bands = '[{ name = "red", center = 0.668, width = 0.010 }]'
     scan = f'{{ kind = "pushbroom", max_angle = {angle}, samples = 1000 }}'
     path = tmp_path / "camera.toml"
@@ -233,8 +233,8 @@ def test_a_flat_row_of_detectors_has_equal_steps_of_the_tangent(tmp_path, angle,
 
 
 @pytest.mark.parametrize("table", ["pipe.csv", "folder.csv", "/dev/zero", "a" * 5000, "loop.csv"])
-def test_a_table_that_is_no_file_is_refused_at_once(changed, tmp_path, table):
-    """A pipe would be waited for."""
+def test_table_that_is_not_a_regular_file_raises(changed, tmp_path, table):
+    """Reading a pipe would block."""
     os.mkfifo(tmp_path / "pipe.csv")
     (tmp_path / "folder.csv").mkdir()
     (tmp_path / "loop.csv").symlink_to("loop.csv")
@@ -268,7 +268,7 @@ def read(folder, text):
     return fifesim.read_instrument(path)
 
 
-def test_ten_lines_make_an_instrument(tmp_path):
+def test_minimal_file_defines_an_instrument(tmp_path):
     camera = read(tmp_path, CAMERA)
     red, nir = camera.bands
     assert len(CAMERA.split()) and len(CAMERA.strip().splitlines()) < 10
@@ -279,17 +279,17 @@ def test_ten_lines_make_an_instrument(tmp_path):
     assert (nir.full_scale_radiance, nir.min_radiance, red.min_radiance) == (300.0, 0.0, 0.0)
 
 
-def test_response_has_its_width_at_half_of_its_maximum(tmp_path):
+def test_response_has_the_given_width_at_half_maximum(tmp_path):
     red, nir = (band.response for band in read(tmp_path, CAMERA).bands)
     half = np.interp([0.663, 0.668, 0.673], red.wavelength, red.response)
     np.testing.assert_allclose(half, [0.5, 1.0, 0.5], rtol=0, atol=1e-9)
     assert np.interp([0.8201, 0.8599, 0.8199, 0.8601], nir.wavelength, nir.response).tolist() == [1, 1, 0, 0]
-    # A Gaussian's area is its width times sqrt(pi / ln 2) / 2, but for its cut ends.
+    # Area of a Gaussian: FWHM sqrt(pi / ln 2) / 2, apart from the truncated tails.
     area = np.trapezoid(red.response, red.wavelength)
     assert area == pytest.approx(0.010 * np.sqrt(np.pi / np.log(2)) / 2, rel=1e-3)
 
 
-def test_sun_and_range_are_those_of_the_reference_spectrum_and_say_so(tmp_path):
+def test_default_irradiance_and_range_come_from_the_reference_spectrum(tmp_path):
     camera = read(tmp_path, CAMERA)
     red, nir = camera.bands
     assert red.solar_irradiance == solar_irradiance(red.response)
@@ -301,7 +301,7 @@ def test_sun_and_range_are_those_of_the_reference_spectrum_and_say_so(tmp_path):
     assert camera.source("noise", red) == "as camera.toml says"
 
 
-def test_bands_may_stand_in_a_table_beside_the_file_which_is_read_again_when_it_changed(tmp_path):
+def test_band_table_is_read_again_after_a_change(tmp_path):
     (tmp_path / "bands.csv").write_text(TABLE)
     camera = read(tmp_path, 'name = "Camera"\naltitude = 120.0\ngsd = 0.1\nbits = 12\nbands = "bands.csv"\n')
     red, nir = camera.bands
@@ -313,7 +313,7 @@ def test_bands_may_stand_in_a_table_beside_the_file_which_is_read_again_when_it_
     assert red == read(tmp_path, CAMERA).bands[0]
 
 
-def test_noise_has_a_share_of_shot_noise_or_two_ratios(tmp_path):
+def test_noise_from_shot_share_or_two_ratios(tmp_path):
     red, _ = read(tmp_path, CAMERA.replace("snr_radiance = 100.0", "snr_radiance = 100.0, snr_shot = 0.75")).bands
     assert (red.noise.equivalent_radiance, red.noise.shot) == (0.5, 0.75)
     second = "snr_radiance = 100.0, high_snr = 350.0, high_snr_radiance = 250.0"
@@ -322,7 +322,7 @@ def test_noise_has_a_share_of_shot_noise_or_two_ratios(tmp_path):
     assert model.snr([100.0, 250.0]).tolist() == pytest.approx([200.0, 350.0], rel=1e-12)
 
 
-def test_blur_is_stated_by_the_transfer_at_the_nyquist_frequency(tmp_path):
+def test_blur_from_mtf_at_nyquist(tmp_path):
     def transfer(camera, number):
         spreads, steps = camera.line_spreads(camera.bands[number]), camera.ground_intervals(camera.bands[number])
         return [float(spread.mtf(0.5 / step)) for spread, step in zip(spreads, steps, strict=True)]
@@ -356,7 +356,7 @@ def test_blur_is_stated_by_the_transfer_at_the_nyquist_frequency(tmp_path):
         ("altitude = 120.0", "altitude = 0.12", "altitude = 0.12|interval = 0.8"),
     ],
 )
-def test_mistake_in_a_short_file_is_one_line(tmp_path, old, new, said):
+def test_error_in_a_short_file_is_one_line(tmp_path, old, new, said):
     assert old in CAMERA
     with pytest.raises(ValueError, match=said) as caught:
         read(tmp_path, CAMERA.replace(old, new))
@@ -373,7 +373,7 @@ def test_mistake_in_a_short_file_is_one_line(tmp_path, old, new, said):
         ("bands.csv", "name,center\nred,0.6\n", "lacks the columns width"),
     ],
 )
-def test_table_is_whole_and_lies_beside_its_file(tmp_path, name, table, said):
+def test_invalid_band_table_raises(tmp_path, name, table, said):
     folder = tmp_path / "own"
     folder.mkdir()
     (tmp_path / "bands.csv").write_text(table)

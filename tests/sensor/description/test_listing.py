@@ -1,4 +1,4 @@
-"""Instruments in words: the numbers that a reader needs, by hand."""
+"""Text summary of instruments, compared with values computed by hand."""
 
 import dataclasses
 
@@ -7,8 +7,8 @@ from fifesim.sensor.description.instruments import instrument, instrument_names
 from fifesim.sensor.description.listing import blur_in_words, instrument_in_words, list_instruments, noise_in_words
 
 
-def test_thematic_mapper_in_words():
-    """Table 1: 43 urad from 705 km; the cosine keeps 0.69 at half a cycle per interval; 205.5 / 255 a count."""
+def test_summary_of_thematic_mapper():
+    """Table 1: 43 urad from 705 km; the MTF of the cosine is 0.69 at Nyquist; 205.5 / 255 per count."""
     text = instrument_in_words(instrument("TM", "paper"))
     lines = text.splitlines()
     assert lines[0] == "TM  Landsat-5 Thematic Mapper"
@@ -16,14 +16,14 @@ def test_thematic_mapper_in_words():
     assert "  all bands: pixels of 30 m in the gridded product" in lines
     assert "    own interval 30.315 m at nadir" in lines
     assert "    line spread cosine, modulation transfer at the Nyquist frequency of the own interval 0.69" in lines
-    # The cosine passes more than a detector as wide as the field of view does.
+    # The cosine has a higher MTF than a detector as wide as the field of view.
     assert "    the detector alone has 0.64: images are sharper" in lines
     (red,) = [line.split() for line in lines if line.startswith("  TM3")]
     assert red[5:8] == ["-1.20", "204.30", "0.8059"]
 
 
-def test_transfer_at_the_nyquist_frequency_is_that_of_each_axis():
-    """A detector as wide as half, and as a fourth, of its interval: sinc(1/4) = 0.90 and sinc(1/8) = 0.97."""
+def test_summary_has_the_nyquist_mtf_of_each_axis():
+    """Detectors of 1/2 and 1/4 of the interval: sinc(1/4) = 0.90 and sinc(1/8) = 0.97."""
     oli = instrument("OLI", "detector")
     wide = dataclasses.replace(
         oli, interval=Angles(along=4 * 42.5e-6, across=8 * 42.5e-6), ifov=2 * 42.5e-6, bands=instrument("OLI").bands[:1]
@@ -33,36 +33,36 @@ def test_transfer_at_the_nyquist_frequency_is_that_of_each_axis():
     assert "of the own interval 0.90 along x 0.97 across" in text
 
 
-def test_bands_that_share_their_pixels_share_a_line():
+def test_bands_of_equal_pixel_size_share_a_line():
     text = instrument_in_words(instrument("MODIS"))
     assert "the detector alone has" not in text
     assert "  MODIS1, MODIS2: pixels of 250 m" in text
     assert "  MODIS3, MODIS4, MODIS5, MODIS6, MODIS7: pixels of 500 m" in text
 
 
-def test_list_has_a_line_for_each():
+def test_list_has_one_line_per_instrument():
     lines = list_instruments([instrument(name) for name in instrument_names()]).splitlines()
     assert [line.split()[0] for line in lines] == ["name", *instrument_names()]
 
 
-def test_the_scale_of_a_product_is_said():
+def test_summary_states_the_product_scale():
     said = "  Level-1 product: 0.0001 x DN -0.1 is reflectance, 16 bits"
     assert said in instrument_in_words(instrument("MSI")).splitlines()
     assert "is reflectance x cosine of the solar zenith angle, 16 bits" in instrument_in_words(instrument("OLI2"))
     assert "Level-1 product" not in instrument_in_words(instrument("TM"))
 
 
-def test_a_line_says_which_bands_lack_noise_or_blur_and_who_published_it():
+def test_noise_and_blur_lines_list_missing_bands_and_sources():
     dove = instrument("SuperDove")
     assert noise_in_words(instrument("OLI"), ["OLI4"]) == "none"
     assert noise_in_words(dove, ["PS6", "PS8"]).startswith("none; the noise of PS6, PS8 is unknown, a public list")
     assert noise_in_words(dove, ["PS6"], ["thermal", "shot"]) == "thermal, shot"
     assert blur_in_words(dove, ["PS6"]).endswith(f"so the image is too sharp, {dove.not_found['blur']}")
     assert "sharper" not in blur_in_words(instrument("MSI"), ["MSI4"])
-    # The cosine of Table 1 passes more than its detector, as wide as the field of view, does.
+    # The cosine of Table 1 has a higher MTF than a detector as wide as the field of view.
     said = "0.69; the detector alone has 0.64: the image of TM3 is sharper"
     assert blur_in_words(instrument("TM", "paper"), ["TM3"]).endswith(said)
     assert blur_in_words(instrument("TM"), ["TM3"]).startswith("modulation transfer at the Nyquist frequency 0.28")
-    # A file of one's own need not say it.
+    # User files need no such entry.
     own = dataclasses.replace(dove, not_found={})
     assert noise_in_words(own, ["PS6"]).endswith("the noise of PS6 is unknown")

@@ -1,4 +1,4 @@
-"""Each instrument of the package reproduces its published figures from its file."""
+"""Instrument files of the package compared with published values."""
 
 import pickle
 from pathlib import Path
@@ -41,7 +41,7 @@ def equivalent_width(response):
 
 
 def transfer(item, each):
-    """Modulation transfer at the Nyquist frequency by brute force: the cosine transform of the response itself."""
+    """Modulation transfer at the Nyquist frequency by a numerical cosine transform of the response."""
     found = []
     for spread, step in zip(item.line_spreads(each), item.ground_intervals(each), strict=True):
         edges = np.linspace(-spread.half_width, spread.half_width, 40001)
@@ -64,21 +64,21 @@ MEASURES = {
 
 
 @pytest.mark.parametrize("quantity", MEASURES)
-def test_figures_are_the_published_ones(quantity):
+def test_values_agree_with_published_figures(quantity):
     rows = FIGURES[FIGURES["quantity"] == quantity]
     assert len(rows) >= 7
     for row in rows.itertuples():
         found = MEASURES[quantity](instrument(row.instrument), band(row.instrument, row.band), row.at)
         known = row.value if np.isnan(row.across) else (row.value, row.across)
         rtol, atol = np.nan_to_num([row.rtol, row.atol])
-        # The cosine transform by sums is good to 1e-6.
+        # The numerical cosine transform is accurate to 1e-6.
         atol = max(atol, 1e-6) if quantity == "transfer" else atol
         np.testing.assert_allclose(
             found, known, rtol=rtol, atol=atol, err_msg=f"{row.instrument} {row.band} {row.source}"
         )
 
 
-def test_assumed_blur_says_so_and_detectors_alone_are_boxcars():
+def test_assumed_blur_is_marked_and_detector_responses_are_boxcars():
     for row in FIGURES[FIGURES["source"] == "assumed"].itertuples():
         blur = band_provenance(instrument(row.instrument), "blur", band(row.instrument, row.band))
         assert blur.origin == "assumed" and blur.uncertainty >= 0.06 and blur.source.startswith("Assumed"), row
@@ -88,7 +88,7 @@ def test_assumed_blur_says_so_and_detectors_alone_are_boxcars():
 
 
 @pytest.mark.parametrize("row", list(NAMES.fillna("").itertuples(index=False)), ids=lambda row: row.name)
-def test_names_of_instruments_and_bands_are_those_in_use(row):
+def test_common_names_of_instruments_and_bands_are_recognized(row):
     if row.instrument:
         assert band_called(row.name, instrument(row.instrument)).name == row.meaning
     else:
@@ -99,7 +99,7 @@ def test_names_of_instruments_and_bands_are_those_in_use(row):
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
-def test_file_passes_the_check_that_users_files_get(path):
+def test_file_passes_the_checks_for_user_files(path):
     item = read_instrument(path)
     assert item == instrument(item.name) and item.name in instrument_names()
     assert "left out" in " ".join(path.read_text(encoding="utf-8").replace("\n#", " ").split())
@@ -116,7 +116,7 @@ def test_every_number_has_a_source_and_every_reference_is_used(name):
         own = {item.source(number, each) for number in numbers}
         assert all(len(source) > 20 for source in own)
         used |= own
-        # The products of OLI reach down to a reflectance of -0.1, those of others less far; MSS begins above the dark.
+        # OLI products have reflectances down to -0.1, others less; the smallest radiance of MSS is above 0.
         above = 0.04 * each.full_scale_radiance if name.startswith("MSS") else 0.0
         assert -above <= -each.min_radiance < 0.09 * each.full_scale_radiance < 0.09 * each.solar_irradiance
         assert any(line.split()[:1] == [each.name] for line in text.splitlines())
@@ -124,7 +124,7 @@ def test_every_number_has_a_source_and_every_reference_is_used(name):
 
 
 @EACH
-def test_blur_noise_and_geolocation_have_an_origin_or_the_search_for_it(name):
+def test_blur_noise_and_geolocation_have_an_origin_or_a_search_note(name):
     item = instrument(name)
     for quantity in ("blur", "noise", "geolocation"):
         own = [row for row in item.provenance if row.quantity == quantity]
@@ -140,14 +140,14 @@ def test_blur_noise_and_geolocation_have_an_origin_or_the_search_for_it(name):
 
 
 @EACH
-def test_instrument_travels_to_workers_and_is_a_key(name):
+def test_instrument_is_picklable_and_hashable(name):
     item = instrument(name)
     again = pickle.loads(pickle.dumps(item))
     assert again == item and {item: 1}[again] == 1
 
 
-def test_bands_have_names_of_their_own_instrument():
-    """A raster of one instrument's bands is never taken for another's, MODIS1 (red) for MSI1 (aerosol) say."""
+def test_band_names_are_unique_to_an_instrument_family():
+    """Bands of different instruments are not confused, e.g. MODIS1 (red) and MSI1 (aerosol)."""
     family = {"L4TM": "TM", "OLI2": "OLI", "MSI-B": "MSI", "MSI-C": "MSI", "MODIS-Aqua": "MODIS"}
     owner = {}
     for name in instrument_names():
@@ -155,19 +155,16 @@ def test_bands_have_names_of_their_own_instrument():
         assert all(owner.setdefault(each.name, kind) == kind for each in instrument(name).bands), name
 
 
-# ------------------------------------------------------------------------------------------- spectral response
-
-
 # ------------------------------------------------------------------------------------------- solar irradiance
 
 
 @EACH
-def test_agencys_irradiance_agrees_with_the_integral_of_a_solar_spectrum(name):
+def test_stated_irradiance_agrees_with_the_solar_spectrum(name):
     """
-    The agencies use other spectra than ASTM G173: within 4.5 % up to 2.4 um, but for the coastal and cirrus bands of
-    OLI (5.1 and 4.5 %) and, in the short-wave infrared, MODIS 5 and 7 (5.9 %).
+    Agencies use other spectra than ASTM G173: 4.5 % up to 2.4 um.
 
-    Tables of many narrow bands name ASTM G173; two more digits of the responses move it by some 0.1 % near lines.
+    Exceptions: coastal and cirrus bands of OLI (5.1 and 4.5 %), MODIS 5 and 7 in the short-wave infrared (5.9 %).
+    Hyperspectral tables use ASTM G173; two more digits of the responses change the irradiance by 0.1 % near lines.
     """
     apart = {"OLI1": 0.055, "OLI9": 0.05, "MODIS5": 0.06, "MODIS7": 0.06}
     for each in instrument(name).bands:
@@ -180,14 +177,14 @@ def test_agencys_irradiance_agrees_with_the_integral_of_a_solar_spectrum(name):
 
 
 @pytest.mark.parametrize("name", ["OLI", "OLI2"])
-def test_oli_has_the_scale_of_reflectance_of_its_products(name):
-    """REFLECTANCE_MAXIMUM and REFLECTANCE_MINIMUM of Level 1: 1.2107 and -0.09998 in every band, overhead sun."""
+def test_oli_range_agrees_with_the_reflectance_scale_of_products(name):
+    """REFLECTANCE_MAXIMUM and REFLECTANCE_MINIMUM of Level 1: 1.2107 and -0.09998 in every band for overhead sun."""
     for each in instrument(name).bands:
         ends = radiance_to_reflectance([each.full_scale_radiance, each.min_radiance], each.solar_irradiance, 1.0)
         np.testing.assert_allclose(ends, [1.2107, -0.09998], rtol=5e-4)
 
 
-def test_avhrr_count_of_the_dark_is_no_albedo_and_full_scale_is_the_slope():
+def test_avhrr_calibration_agrees_with_patmos_x():
     """PATMOS-x: albedo [%] = slope (count - dark)."""
     known = {"AVHRR": [(0.107, 38.0), (0.121, 40.0)], "AVHRR10": [(0.111, 39.44), (0.137, 39.4)]}
     for name, channels in known.items():
@@ -201,8 +198,8 @@ def test_avhrr_count_of_the_dark_is_no_albedo_and_full_scale_is_the_slope():
 # ------------------------------------------------------------------------------------------- orbit and sampling
 
 
-def test_scan_covers_the_published_swath():
-    """2399 km in NOAA's guide is 2 h tan(55.4 degrees), within 1 %; stations that receive AVHRR say more than 2600."""
+def test_swath_width_agrees_with_published_value():
+    """AVHRR: 2399 km in the NOAA guide is 2 h tan(55.4 degrees) to 1 %; receiving stations state more than 2600 km."""
     for item in map(instrument, instrument_names()):
         width = swath_width(item.altitude, item.scan.max_angle)
         if item.name.startswith("AVHRR"):
@@ -215,8 +212,8 @@ def test_scan_covers_the_published_swath():
 # ------------------------------------------------------------------------------------------- blur, gain and noise
 
 
-def test_tm_blurs_as_its_twin_was_measured_in_flight():
-    """Schowengerdt et al. 1985: a Gaussian that passes half at 40.8 m keeps 2^-(40.8 / 30.315)^2 at the Nyquist."""
+def test_tm_blur_agrees_with_in_flight_measurement_of_landsat_4():
+    """Schowengerdt et al. 1985: a Gaussian with an EIFOV of 40.8 m has an MTF of 2^-(40.8 / 30.315)^2 at Nyquist."""
     lsf = instrument("L4TM").line_spread
     np.testing.assert_allclose(lsf.mtf(0.5 / 40.8), 0.5, rtol=1e-4)
     np.testing.assert_allclose(transfer(instrument("TM"), band("TM", "TM4")), 2.0 ** -((40.8 / 30.315) ** 2), rtol=1e-3)
@@ -224,14 +221,14 @@ def test_tm_blurs_as_its_twin_was_measured_in_flight():
     assert row.origin == "in-flight" and row.uncertainty == 0.12 and "San Mateo" in row.source
 
 
-def test_mss_of_landsat_5_passes_half_at_its_effective_field_of_view():
-    """Markham 1985, abstract: 70-75 m along and 79-82 m across the track."""
+def test_mss5_mtf_is_half_at_the_published_eifov():
+    """Markham 1985, abstract: 70-75 m along track and 79-82 m across track."""
     along, across = instrument("MSS5").line_spreads(band("MSS5", "MSS2"))
     np.testing.assert_allclose([along.mtf(0.5 / 72.5), across.mtf(0.5 / 80.5)], 0.5, rtol=1e-3)
 
 
-def test_gain_states_are_those_of_the_handbooks():
-    """ETM+: radiances of digital numbers 1 and 255 after 1 July 2000. HRV: each gain is 1.3 times the one before."""
+def test_gain_states_agree_with_handbooks():
+    """ETM+: radiance of digital numbers 1 and 255 after 1 July 2000. HRV: gains increase by a factor of 1.3."""
     item = instrument("ETM+")
     low = item.with_gain("low")
     for state, full, first in ((item, 157.4, -5.1), (low, 241.1, -5.1)):
@@ -248,7 +245,7 @@ def test_gain_states_are_those_of_the_handbooks():
     check_instrument_units(instrument("HRV").with_gain("m3"))
 
 
-def test_noise_states_its_origin_and_detectors():
+def test_noise_has_origin_and_detectors():
     origins = {("MSI", "MSI4"): "pre-launch", ("MSI-B", "MSI4"): "pre-launch", ("MSI-C", "MSI4"): "in-flight"}
     origins |= {("MSI", "MSI11"): "required", ("MODIS", "MODIS1"): "required", ("MODIS-Aqua", "MODIS1"): "in-flight"}
     for key, origin in origins.items():
@@ -260,7 +257,7 @@ def test_noise_states_its_origin_and_detectors():
         instrument("SuperDove").noise_model(band("SuperDove", "PS6"))
 
 
-def test_tm_has_one_digital_number_of_noise_with_its_rounding():
+def test_tm_noise_with_quantisation_is_one_digital_number():
     item = instrument("TM")
     for each in item.bands:
         step = (each.full_scale_radiance - each.min_radiance) / 255
@@ -271,7 +268,7 @@ def test_tm_has_one_digital_number_of_noise_with_its_rounding():
 @pytest.mark.parametrize(
     ("name", "numbers"), [("MSS", "4567"), ("MSS2", "4567"), ("MSS3", "4567"), ("MSS4", "1234"), ("MSS5", "1234")]
 )
-def test_mss_compresses_its_photomultipliers_and_takes_six_lines_at_once(name, numbers):
+def test_mss_has_three_compressed_bands_and_six_lines_per_sweep(name, numbers):
     item = instrument(name)
     assert [each.compression for each in item.bands] == ["square-root"] * 3 + [None]
     assert [each.compressed_count(item.bits) for each in item.bands] == [63, 63, 63, 0]

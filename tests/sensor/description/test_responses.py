@@ -1,4 +1,4 @@
-"""Spatial responses of instrument files have the stated transfer; spectral responses in a list, a table and pyrsr."""
+"""Spatial responses of instrument files, and spectral responses from a list, a table and pyrsr."""
 
 from dataclasses import replace
 
@@ -27,33 +27,34 @@ def nyquist(item):
 @pytest.mark.parametrize(
     ("lsf", "expected"),
     [
-        # Boxcar as wide as the interval; Gaussians: the transfer itself, exp(-(pi W / d)^2 / (16 ln 2)), 2^-(E / d)^2.
+        # Boxcar as wide as the interval; Gaussians: given MTF, exp(-(pi W / d)^2 / (16 ln 2)) and 2^-(E / d)^2.
         ('kind = "boxcar"\nwidth = 43.0e-6', 2 / np.pi),
         ('kind = "gaussian"\nmtf_at_nyquist = 0.3', 0.3),
         ('kind = "gaussian"\nfwhm = 43.0e-6', np.exp(-(np.pi**2) / (16 * np.log(2)))),
         ('kind = "gaussian"\neifov = 43.0e-6', 0.5),
-        # A triangle twice as wide as the interval.
+        # Triangle twice as wide as the interval.
         ('kind = "table"\nangles = [-43.0e-6, 0.0, 43.0e-6]\nvalues = [0.0, 2.0, 0.0]', (2 / np.pi) ** 2),
     ],
 )
-def test_each_kind_of_response_has_the_transfer_it_says(changed, lsf, expected):
+def test_each_kind_of_response_has_the_stated_mtf(changed, lsf, expected):
     np.testing.assert_allclose(nyquist(changed(LSF, lsf + "\n")), expected, rtol=1e-6)
 
 
 def test_system_response_is_the_product_of_its_parts(changed):
     """
-    At half a cycle per interval: detector and smear sinc(1/2) each, the electronics 1/sqrt(2) at their cutoff, the
-    aperture's diffraction at nu = wavelength / (2 interval aperture), that of a circle.
+    At Nyquist: detector and smear sinc(1/2) each, electronics 1/sqrt(2) at the cutoff.
+
+    Diffraction of a circular aperture at nu = wavelength / (2 interval aperture).
     """
     parts = 'kind = "system"\nsmear = 1.0\nelectronics = 0.5\naperture = 0.02\ntruncation = 3e-4\n'
     mine = changed(LSF, parts, *IFOV)
     nu = 1e-6 * mine.bands[0].wavelength / (2 * 43e-6 * 0.02)
     circle = 2 / np.pi * (np.arccos(nu) - nu * np.sqrt(1 - nu**2))
-    # What is cut off, 3e-4 of the response, is missing.
+    # 3e-4 of the response is truncated.
     np.testing.assert_allclose(nyquist(mine), (2 / np.pi) ** 2 / np.sqrt(2) * circle, atol=5e-4)
 
 
-def test_responses_may_differ_by_axis_and_by_band(changed):
+def test_responses_may_differ_by_axis_and_band(changed):
     axes = '[lsf.along]\nkind = "boxcar"\n[lsf.across]\nkind = "gaussian"\nmtf_at_nyquist = 0.4\n'
     mine = changed("[lsf] ", "#", LSF, axes, *IFOV)
     np.testing.assert_allclose(nyquist(mine), [2 / np.pi, 0.4], rtol=1e-9)
@@ -63,14 +64,14 @@ def test_responses_may_differ_by_axis_and_by_band(changed):
 
 
 def test_blur_and_smear_are_parts_of_the_system(changed):
-    """Optics W wide at half of their maximum pass exp(-(pi W f)^2 / (4 ln 2)), boxcars sinc(W f)."""
+    """The MTF of optics with FWHM W is exp(-(pi W f)^2 / (4 ln 2)), of boxcars sinc(W f)."""
     parts = 'kind = "system"\nblur = 0.4\nsmear = 0.5\ndetector = 0.9\n'
     mine = changed(LSF, parts, *IFOV)
     expected = np.exp(-((np.pi * 0.4 * 0.5) ** 2) / (4 * np.log(2))) * np.sinc(0.45) * np.sinc(0.25)
     np.testing.assert_allclose(nyquist(mine), expected, atol=2e-3)
 
 
-def test_responses_that_can_be_asked_for():
+def test_named_responses():
     tm, msi, dove = instrument("TM"), instrument("MSI"), instrument("SuperDove")
     paper = instrument("TM", "paper")
     assert paper.lsf == tm.paper_lsf and "Friedl" in paper.source("lsf") and "blur" not in paper.origin
@@ -83,15 +84,15 @@ def test_responses_that_can_be_asked_for():
             assert [spread.width for spread in sharp.line_spreads(band)] == list(widths)
             assert not knows_blur(sharp, band)
     assert not any(knows_blur(dove, band) for band in dove.bands) and all(knows_blur(msi, band) for band in msi.bands)
-    # A sharp band has the sources of what it keeps.
+    # A band with the detector response keeps only the applicable sources.
     own = replace(tm.bands[0], sources={"lsf": "Markham1985", "bits": "Chander2009"})
     sharp = with_response(replace(tm, bands=(own, *tm.bands[1:])), "detector").bands[0]
     assert sharp.sources == {"bits": "Chander2009", "ifov": tm.sources["interval"]}
 
 
 @pytest.mark.parametrize("name", ["TM", "OLI", "VIIRS", "MSI"])
-def test_ends_of_the_uncertainty_are_that_far_from_the_best_transfer(name):
-    """VIIRS by its elementary samples: the uncertainty is stated before aggregation."""
+def test_sharpest_and_softest_mtf_differ_by_the_uncertainty(name):
+    """For VIIRS the uncertainty is stated before aggregation, i.e. for elementary samples."""
     best, ends = instrument(name), [instrument(name, each) for each in ("sharpest", "softest")]
     for number, band in enumerate(best.bands):
         error = band_provenance(best, "blur", band).uncertainty
@@ -116,7 +117,7 @@ def test_ends_of_the_uncertainty_are_that_far_from_the_best_transfer(name):
         (instrument("TM", "paper"), "softest", "states no uncertainty of the blur of TM1"),
     ],
 )
-def test_responses_that_no_file_has(name, response, said):
+def test_unavailable_response_raises(name, response, said):
     with pytest.raises(ValueError, match=said):
         instrument(name, response)
 
@@ -127,10 +128,10 @@ def test_responses_that_no_file_has(name, response, said):
 PYRSR = '{ satellite = "Landsat-5", sensor = "TM", band = "3" }'
 
 
-def test_a_response_written_out_or_in_a_table_beside_the_file_is_read(changed, tmp_path):
+def test_response_is_read_from_a_list_or_a_table(changed, tmp_path):
     rows = "wavelength = [0.60, 0.63, 0.69, 0.72], response = [0.0, 1.0, 1.0, 0.0]"
     mine = changed(f"srf = {PYRSR}", f"srf = {{ {rows} }}")
-    # A trapezoid is centred on its middle.
+    # The centre of a symmetric trapezoid is its midpoint.
     np.testing.assert_allclose(mine.select("TM3")[0].wavelength, 0.66, rtol=1e-12)
     table = "satellite,band,wavelength,response\nX,1,0.60,0\nX,1,0.63,1\nX,1,0.69,1\nX,1,0.72,0\n"
     (tmp_path / "own.csv").write_text("# columns\n" + table, encoding="utf-8")
@@ -139,14 +140,14 @@ def test_a_response_written_out_or_in_a_table_beside_the_file_is_read(changed, t
 
 
 def test_response_of_pyrsr_is_in_micrometres_and_not_negative():
-    """It holds TM in nanometres or micrometres; noise below zero is none."""
+    """pyrsr has TM in nm or um; negative values are noise."""
     found = PyrsrResponse("Landsat-5", "TM", "3").read("TM3")
     theirs = RSR_reader("Landsat-5", "TM", LayerBandsAssignment=["3"])["3"]
     assert 0.5 < found.wavelength[0] < 0.66 < found.wavelength[-1] < 0.8 and min(found.response) >= 0
     np.testing.assert_allclose(found.response, np.maximum(theirs[:, 1], 0))
 
 
-def test_limits_lie_at_half_of_the_maximum():
+def test_limits_lie_at_half_maximum():
     found = ResponseList((0.5, 0.6, 0.7, 0.8, 0.9), (0.0, 1.0, 2.0, 1.0, 0.9)).read("a")
     assert found == Band("a", (0.5, 0.6, 0.7, 0.8, 0.9), (0.0, 1.0, 2.0, 1.0, 0.9))
     assert half_peak(found) == (0.6, 0.8)

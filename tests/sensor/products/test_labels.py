@@ -1,4 +1,4 @@
-"""Digital numbers of one's own as images, and the layers of products."""
+"""Calibration of user digital numbers, and layers of products."""
 
 import numpy as np
 import products
@@ -24,7 +24,7 @@ def dn():
     return grids.place(xr.DataArray(values, dims=("band", "y", "x"), coords={"band": ["TM3", "TM4"]}), GRID)
 
 
-def test_an_image_is_as_sense_makes_one(dn):
+def test_calibrated_image_has_the_form_of_a_sensed_image(dn):
     image = check_raster_function(lambda raster: fifesim.calibrate(raster, "TM", geometry=SUN), dn, quantity="dn")
     np.testing.assert_array_equal(image, dn)
     assert (image.dtype, image.attrs["instrument"], image.attrs["_FillValue"]) == (np.uint8, "TM", 0)
@@ -39,7 +39,7 @@ def test_an_image_is_as_sense_makes_one(dn):
     assert np.isnan(image.fifesim.to_surface()[:, 2, 3]).all()
 
 
-def test_the_sun_is_that_of_the_time_over_the_grid(dn):
+def test_sun_is_computed_from_time_and_grid(dn):
     image = fifesim.calibrate(dn, "TM", time="1987-06-06T16:35:00Z")
     expected = fifesim.sun_position("1987-06-06T16:35:00Z", 39.1277, -96.6265)
     np.testing.assert_allclose([image["sza"], image["saa"]], [expected.sza, expected.saa], rtol=0, atol=0.01)
@@ -50,7 +50,7 @@ def test_the_sun_is_that_of_the_time_over_the_grid(dn):
     np.testing.assert_array_equal(carried["sza"], image["sza"])
 
 
-def test_any_form_of_a_raster_gives_the_same(dn):
+def test_axis_order_and_coordinates_do_not_change_the_result(dn):
     expected = fifesim.calibrate(dn, "TM", geometry=SUN)
     xr.testing.assert_identical(fifesim.calibrate(dn.isel(y=slice(None, None, -1)), "TM", geometry=SUN), expected)
     one = fifesim.calibrate(dn.isel(band=1), "TM", geometry=SUN)
@@ -66,14 +66,14 @@ def test_any_form_of_a_raster_gives_the_same(dn):
 @pytest.mark.parametrize(
     ("gain", "offset"), [([0.5, 0.25], [1.0, -2.0]), ({"TM3": 0.5, "TM4": 0.25}, {"TM4": -2.0, "TM3": 1.0})]
 )
-def test_a_calibration_may_be_given(dn, gain, offset):
+def test_gain_and_offset_may_be_given(dn, gain, offset):
     image = fifesim.calibrate(dn, "TM", geometry=SUN, gain=gain, offset=offset)
     known = np.where(dn == 0, np.nan, dn)
     np.testing.assert_allclose(image.fifesim.to_radiance(), [0.5 * known[0] + 1, 0.25 * known[1] - 2], rtol=1e-14)
 
 
-def test_numbers_of_a_product_take_its_scale():
-    """Landsat 8's of 16 bits, where the instrument has 12."""
+def test_product_numbers_need_the_product_scale():
+    """Landsat 8 products have 16 bits, the instrument 12 bits."""
     values = np.array([[[11000, 0], [20000, 65535]]], np.uint16)
     place = fifesim.grid_at("EPSG:32610", 353700.0, 5374200.0, 60.0, 60.0, 30.0)
     dn = grids.place(xr.DataArray(values, dims=("band", "y", "x"), coords={"band": ["OLI4"]}), place)
@@ -85,7 +85,7 @@ def test_numbers_of_a_product_take_its_scale():
 
 
 @pytest.mark.parametrize("dtype", [np.int16, np.float32])
-def test_other_types_and_no_data_become_0(dn, dtype):
+def test_other_types_are_converted_and_no_data_becomes_0(dn, dtype):
     raster = dn.astype(dtype)
     raster[:, 0, 0] = -9999
     if dtype == np.float32:
@@ -97,7 +97,7 @@ def test_other_types_and_no_data_become_0(dn, dtype):
         fifesim.calibrate(raster, "TM", geometry=SUN)
 
 
-def test_lazy_numbers_are_checked_when_they_compute(dn):
+def test_lazy_numbers_are_checked_on_compute(dn):
     lazy = in_chunks(dn.astype(np.int16) - 20, {"y": 2, "x": 3})
     image = fifesim.calibrate(lazy, "TM", geometry=SUN)
     with pytest.raises(ValueError, match="digital number of -"):
@@ -123,12 +123,12 @@ SATURATED = "saturated must be 'largest', None, or a digital number from 1 to 25
     ]
     + [({"geometry": SUN, "saturated": each}, SATURATED) for each in (0, 256, -1, True, "255", "most")],
 )
-def test_what_is_missing_is_asked_for(dn, options, said):
+def test_missing_or_invalid_options_raise(dn, options, said):
     with pytest.raises(ValueError, match=said):
         fifesim.calibrate(dn, "TM", **options)
 
 
-def test_an_image_is_not_calibrated_twice(dn):
+def test_calibrating_twice_raises(dn):
     image = fifesim.calibrate(dn, "TM", geometry=SUN)
     with pytest.raises(ValueError, match=r"carries a calibration already: drop it with \.drop_vars"):
         image.fifesim.calibrate("TM")
@@ -136,8 +136,8 @@ def test_an_image_is_not_calibrated_twice(dn):
         fifesim.calibrate(dn.values, "TM")
 
 
-def test_saturated_numbers_are_no_data_as_in_a_product(dn):
-    """The largest number of TM, 255, whose radiance is a lower limit; in memory and lazily."""
+def test_saturated_numbers_become_no_data(dn):
+    """The radiance of 255, the largest number of TM, is a lower limit; in memory and lazily."""
     dn[:, 1, 1] = 255
     dn[:, 1, 2] = 254
     for raster in (dn, in_chunks(dn, {"y": 2, "x": 3})):
@@ -157,7 +157,7 @@ def test_saturated_numbers_are_no_data_as_in_a_product(dn):
     [
         ("MSS", ["MSS5", "MSS6"], np.uint8, {}, 63),
         ("MSS", ["MSS5", "MSS6"], np.uint8, {"gain": 0.5, "offset": 0.0}, 255),
-        # Eight bits in wider numbers, as arithmetic and rioxarray leave them.
+        # 8-bit numbers in a wider type, e.g. after arithmetic or from rioxarray.
         ("TM", ["TM3", "TM4"], np.float32, {"gain": 0.5, "offset": 0.0}, 255),
         ("OLI", ["OLI4", "OLI5"], np.uint16, {}, 4095),
         ("OLI", ["OLI4", "OLI5"], np.uint16, {"gain": 0.01, "offset": -51.0}, 65535),
@@ -181,7 +181,7 @@ def written(folder, name="a.tif", shape=(6, 9), dtype=np.uint16, **place):
 
 
 @pytest.mark.parametrize("chunks", [None, {"y": 4, "x": 5}, "auto"])
-def test_a_layer_is_as_it_is_stored(tmp_path, chunks):
+def test_layer_equals_the_file(tmp_path, chunks):
     values = written(tmp_path)
     layer = open_layer(tmp_path, "a.tif", chunks, "")
     assert (layer.chunks is None) == (chunks is None) and layer.dtype == np.uint16
@@ -189,7 +189,7 @@ def test_a_layer_is_as_it_is_stored(tmp_path, chunks):
     check_place(layer, "EPSG:32609")
 
 
-def test_what_is_no_layer_is_refused(tmp_path):
+def test_invalid_layer_raises(tmp_path):
     with pytest.raises(ValueError, match=r"a\.tif is missing in .*: fetch it"):
         open_layer(tmp_path, "a.tif", None, "fetch it")
     (tmp_path / "a.tif").write_text("<html>")
@@ -200,7 +200,7 @@ def test_what_is_no_layer_is_refused(tmp_path):
         open_layer(tmp_path, "b.tif", None, "")
 
 
-def test_layers_of_different_grids_do_not_stack(tmp_path):
+def test_layers_of_different_grids_raise(tmp_path):
     written(tmp_path)
     written(tmp_path, "b.tif", corner=(339315.0, 7392900.0))
     one, two = (open_layer(tmp_path, name, None, "") for name in ("a.tif", "b.tif"))

@@ -1,4 +1,4 @@
-"""Landsat products: metadata in the three forms of USGS, contradictions, the view of a roll, and images by hand."""
+"""Landsat products: metadata in the three USGS formats, inconsistencies, off-nadir views, and images."""
 
 import shutil
 
@@ -42,7 +42,7 @@ def image(**values):
 
 
 @FORMS
-def test_three_forms_say_the_same_and_other_collections_are_refused(tmp_path, form):
+def test_three_formats_are_equivalent_and_other_collections_raise(tmp_path, form):
     for kind in (products.TM, products.OLI):
         groups = products.landsat_groups(kind)
         assert read_groups(written(tmp_path, groups, form)) == groups
@@ -62,14 +62,14 @@ def test_three_forms_say_the_same_and_other_collections_are_refused(tmp_path, fo
         ("json", '{"LANDSAT_METADATA_FILE": {}, "LANDSAT_METADATA_FILE": {}}', "holds 2 objects"),
     ],
 )
-def test_files_that_are_no_metadata_are_refused(tmp_path, form, text, said):
+def test_invalid_metadata_files_raise(tmp_path, form, text, said):
     path = tmp_path / f"LT05_MTL.{form}"
     path.write_text(text)
     with pytest.raises(ValueError, match=said):
         read_groups(path)
 
 
-def test_the_file_is_found_in_its_folder_in_upper_or_lower_case(tmp_path):
+def test_metadata_file_is_found_in_upper_or_lower_case(tmp_path):
     expected = written(tmp_path, products.landsat_groups(products.TM))
     for form in ("json", "xml"):
         written(tmp_path, products.landsat_groups(products.TM), form)
@@ -83,7 +83,7 @@ def test_the_file_is_found_in_its_folder_in_upper_or_lower_case(tmp_path):
         assert landsat_metadata_file(tmp_path / name).stem.lower() == "lt05_a_mtl"
 
 
-def test_not_one_product_is_an_error(tmp_path):
+def test_folder_without_exactly_one_product_raises(tmp_path):
     with pytest.raises(ValueError, match=r"there is no file or folder .*none"):
         landsat_metadata_file(tmp_path / "none")
     with pytest.raises(ValueError, match=r"has no \*_MTL.txt, .json or .xml: give the folder"):
@@ -106,18 +106,18 @@ REPEATED = {
 
 
 @FORMS
-def test_repeated_keys_are_refused(tmp_path, form):
+def test_repeated_keys_raise(tmp_path, form):
     path = written(tmp_path, products.landsat_groups(products.TM), form)
     path.write_text(path.read_text().replace(*REPEATED[form]))
     with pytest.raises(ValueError, match=rf"MTL.*: the LEVEL1_RADIOMETRIC_RESCALING key {KEY} stands twice: .*fetch"):
         read_groups(path)
 
 
-# ------------------------------------------------------------------------------------------- numbers
+# ------------------------------------------------------------------------------------------- saturation flags
 
 
-def test_saturation_flags_are_the_bits_of_the_bands():
-    """Bit n - 1 for band n, and bit 9 for pixels without a value of TM; the panchromatic band has none."""
+def test_saturation_flags_are_band_bits():
+    """Bit n - 1 for band n, and bit 9 for dropped pixels of TM; the panchromatic band has no flag."""
     groups = products.landsat_groups(products.OLI)
     groups["PRODUCT_CONTENTS"] |= {"FILE_NAME_BAND_0": "B0.TIF", "FILE_NAME_BAND_99": "B99.TIF"}
     flags = {band.name: band.flag for band in landsat_scene(groups).bands}
@@ -126,8 +126,8 @@ def test_saturation_flags_are_the_bits_of_the_bands():
     assert (flags["TM3"], flags["TM7"]) == (0b1000000100, 0b1001000000)
 
 
-def test_mss_has_the_flags_of_its_numbers():
-    """Bit n - 1 for band n of MSS, and 9 for dropped; in another year the sun and its distance are much the same."""
+def test_mss_flags_follow_the_band_numbers():
+    """Bit n - 1 for band n, and bit 9 for dropped pixels; sun and distance change little in another year."""
     kind = dict(products.TM, thermal=[], bands=dict(zip("4567", products.TM["bands"].values(), strict=False)))
     groups = products.landsat_groups(kind)
     date = "1986" + groups["IMAGE_ATTRIBUTES"]["DATE_ACQUIRED"][4:]
@@ -137,7 +137,7 @@ def test_mss_has_the_flags_of_its_numbers():
     assert [band.flag for band in scene.bands] == [(1 << number - 1) | (1 << 9) for number in (4, 5, 6, 7)]
 
 
-# ------------------------------------------------------------------------------------------- contradictions
+# ------------------------------------------------------------------------------------------- inconsistent metadata
 
 
 def scale(**values):
@@ -173,13 +173,13 @@ def scale(**values):
         (image(EARTH_SUN_DISTANCE="1.4"), "EARTH_SUN_DISTANCE = 1.4 does not belong to the date"),
     ],
 )
-def test_what_is_wrong_is_said_in_a_line(groups, said):
+def test_invalid_metadata_raises_a_one_line_message(groups, said):
     with pytest.raises(ValueError, match=said) as error:
         landsat_scene(groups)
     assert len(str(error.value)) < 500 and "\n" not in str(error.value)
 
 
-def test_reflectance_is_bounded_where_the_metadata_state_no_range():
+def test_reflectance_range_is_bounded_without_stated_limits():
     groups = products.landsat_groups(products.TM)
     del groups["LEVEL1_MIN_MAX_REFLECTANCE"]
     landsat_scene(groups)
@@ -206,8 +206,8 @@ def corners(latitudes, longitudes):
         {"DATE_ACQUIRED": "2011-02-27", "EARTH_SUN_DISTANCE": "0.9905"},
     ],
 )
-def test_the_sun_is_that_of_time_and_corners(values):
-    """Corners near those of the scene, within a degree."""
+def test_sun_must_agree_with_time_and_corners(values):
+    """The corners are within 1 degree of the real scene."""
     groups = products.landsat_groups(products.TM)
     groups["PROJECTION_ATTRIBUTES"] = corners("66.64 66.61 64.71 64.69", "-132.63 -127.2 -132.3 -127.2")
     assert landsat_scene(groups).saa == 165.60131631
@@ -216,7 +216,7 @@ def test_the_sun_is_that_of_time_and_corners(values):
         landsat_scene(groups)
 
 
-def test_the_middle_of_corners_on_both_sides_of_the_antimeridian():
+def test_centre_of_corners_across_the_antimeridian():
     found = _centre({"PROJECTION_ATTRIBUTES": corners("52 52 50 50", "179 -178 179 -178")})
     assert found == (pytest.approx(51.0, abs=0.02), pytest.approx(-179.5))
 
@@ -224,8 +224,8 @@ def test_the_middle_of_corners_on_both_sides_of_the_antimeridian():
 # ------------------------------------------------------------------------------------------- view off nadir
 
 
-def test_the_view_of_a_roll_needs_its_row():
-    """Row 880 is of scenes beyond the poleward end of the orbit."""
+def test_off_nadir_view_needs_the_wrs_row():
+    """Row 880 has scenes beyond the poleward end of the orbit."""
     groups = products.landsat_groups(products.OLI)
     roll = {"NADIR_OFFNADIR": "OFFNADIR", "ROLL_ANGLE": "-11.696"}
     for row, view in ((None, None), ("036", view_of_roll(-11.696, 36)), ("880", None)):
@@ -239,19 +239,19 @@ def test_the_view_of_a_roll_needs_its_row():
 @pytest.mark.parametrize(
     ("roll", "row", "azimuth"),
     [
-        # On the way south, the right is in the west: the sensor stands east of the scene.
+        # Descending: right is west, so the sensor is east of the scene.
         (-10.0, 60, 90.0),
         (10.0, 60, 270.0),
-        # On the way north, the other way round.
+        # Ascending: the opposite.
         (-10.0, 184, 270.0),
         (10.0, 184, 90.0),
-        # At the turning points it flies west: its left is in the south.
+        # At the turning points the track heads west: left is south.
         (10.0, 122, 0.0),
         (10.0, 246, 0.0),
         (-10.0, 122, 180.0),
     ],
 )
-def test_the_sensor_stands_on_the_side_that_it_looks_away_from(roll, row, azimuth):
+def test_sensor_is_on_the_side_opposite_to_the_roll(roll, row, azimuth):
     vza, vaa = view_of_roll(roll, row)
     assert abs((vaa - azimuth + 180) % 360 - 180) < 13
     assert vza == pytest.approx(np.degrees(np.arcsin(np.sin(np.radians(10.0)) * (6371 + 705) / 6371)), abs=1e-6)
@@ -262,7 +262,7 @@ def centre_of(path, row):
     """
     Nominal centre of a scene on the Worldwide Reference System 2, geocentric [degree].
 
-    Path 1 crosses the equator southward at 64.60 W. 233 paths divide the equator, and are flown in 16 days.
+    Path 1 crosses the equator southward at 64.60 W. The equator has 233 paths, which take 16 days.
     """
     turn = 360 * (row - 60) / 248
     i, u = np.radians(98.2), np.radians(turn)
@@ -270,13 +270,13 @@ def centre_of(path, row):
     return -np.degrees(np.arcsin(np.sin(i) * np.sin(u))), longitude
 
 
-def test_a_real_scene_lies_where_its_roll_looks():
-    """Middle of the corners of LC08_L2SP_017036_20130419_20200913_02_T2, whose ROLL_ANGLE is -11.696."""
+def test_real_scene_agrees_with_its_roll_angle():
+    """Centre of the corners of LC08_L2SP_017036_20130419_20200913_02_T2, with a ROLL_ANGLE of -11.696 degrees."""
     latitude, longitude = centre_of(17, 36)
     track = Track.from_inclination(latitude, longitude, 98.2, 705e3)
-    # The middle of the corners, 34.61 N geodetic.
+    # Centre of the corners, 34.61 N geodetic.
     _, across = place_beside(track, 34.43, -82.89)
-    # The pass may lie 5 km from its path, which is 0.05 degrees. The other side of the track has the other sign.
+    # The pass may be 5 km from the nominal path, i.e. 0.05 degrees.
     assert float(across) == pytest.approx(float(view_from_scan(11.696, 705e3)[1]), abs=0.05)
     vza, vaa = view_of_roll(-11.696, 36)
     assert vza == pytest.approx(13.0, abs=0.1)
@@ -293,7 +293,7 @@ KINDS = {"TM": products.TM, "OLI": products.OLI}
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
-    """By instrument and level: a folder, and what lies in its files."""
+    """Product folder and the values of its files, by instrument and level."""
     found = {}
     for name, level in (("TM", 1), ("OLI", 1), ("OLI", 2)):
         folder = tmp_path_factory.mktemp(f"{name}{level}")
@@ -308,7 +308,7 @@ def copy(folders, tmp_path):
 
 
 def by_hand(name, files, sza=None):
-    """Reflectance of red and near infrared by the formula of the handbook, in double precision."""
+    """Red and near-infrared reflectance by the handbook formula, in double precision."""
     numbers = {"TM": ("3", "4"), "OLI": ("4", "5")}[name]
     kind = KINDS[name]
     sza = 90 - float(kind["image"]["SUN_ELEVATION"]) if sza is None else sza
@@ -323,12 +323,12 @@ def by_hand(name, files, sza=None):
 
 
 @pytest.mark.parametrize("name", ["TM", "OLI"])
-def test_a_scene_goes_through_to_a_file(folders, name, tmp_path):
+def test_scene_is_corrected_and_written_to_a_file(folders, name, tmp_path):
     """
-    Level 1, the surface and a GeoTIFF, each by hand.
+    Level 1, surface reflectance and GeoTIFF compared with hand-computed values.
 
-    Reflectance has 32 bits twice, at the top of the atmosphere and at the ground: 6e-8 of itself each, the first over
-    the transmittance, half or more. Below 1 that is 2e-7.
+    Reflectance is rounded to 32 bits twice (relative 6e-8), at the top of the atmosphere and at the ground. The first
+    error is divided by the transmittance, at least 0.5: 2e-7 in total for reflectances below 1.
     """
     folder, files = folders[name, 1]
     toa, bands = by_hand(name, files)
@@ -345,7 +345,7 @@ def test_a_scene_goes_through_to_a_file(folders, name, tmp_path):
     assert again["time"].values == np.datetime64(times[name])
 
 
-def test_labels_are_those_of_the_packages_own_images(folders):
+def test_scene_has_the_labels_of_a_fifesim_image(folders):
     folder, files = folders["TM", 1]
     with no_compute():
         scene = fifesim.open_landsat(folder)
@@ -355,7 +355,7 @@ def test_labels_are_those_of_the_packages_own_images(folders):
     tm = fifesim.instrument("TM")
     assert scene["band"].values.tolist() == [band.name for band in tm.bands]
     np.testing.assert_array_equal(scene["wavelength"], [band.wavelength for band in tm.bands])
-    # Of Landsat 5's band 3 by hand: pi 0.9936974^2 (264 + 1.17) / (0.549637 + 0.002436).
+    # Band 3 of Landsat 5 by hand: pi 0.9936974^2 (264 + 1.17) / (0.549637 + 0.002436).
     assert float(scene["solar_irradiance"][2]) == pytest.approx(1490.0, abs=0.1)
     assert [float(scene[name]) for name in ("vza", "vaa")] == [0.0, 0.0]
     assert float(scene["sza"]) == pytest.approx(69.50031513)
@@ -366,7 +366,7 @@ def test_labels_are_those_of_the_packages_own_images(folders):
 
 @pytest.mark.parametrize("chunks", [None, {"y": 5, "x": 7}])
 @pytest.mark.parametrize("angles", ["centre", "pixel"])
-def test_any_chunks_give_the_same(folders, chunks, angles):
+def test_scene_does_not_depend_on_chunks(folders, chunks, angles):
     folder, _ = folders["OLI", 1]
     expected = fifesim.open_landsat(folder, angles=angles).compute()
     found = fifesim.open_landsat(folder, angles=angles, chunks=chunks)
@@ -374,7 +374,7 @@ def test_any_chunks_give_the_same(folders, chunks, angles):
     assert found.compute().identical(expected)
 
 
-def test_angles_by_pixel_divide_by_the_sun_of_each(folders):
+def test_angles_by_pixel_use_the_solar_zenith_of_each_pixel(folders):
     folder, files = folders["OLI", 1]
     scene = fifesim.open_landsat(folder, angles="pixel")
     expected, bands = by_hand("OLI", files, np.where(files["SZA"] == 0, np.nan, files["SZA"] / 100.0))
@@ -382,12 +382,12 @@ def test_angles_by_pixel_divide_by_the_sun_of_each(folders):
     fill = files["quality"] == 1
     for name in ("sza", "saa", "vza"):
         np.testing.assert_array_equal(scene[name], np.where(fill, np.nan, files[name.upper()] / 100.0))
-    # West of the track the azimuth is stored below 0.
+    # West of the track the stored azimuth is negative.
     assert float(scene["vaa"][0, -1]) == 285.0
     assert scene["sza"].attrs["units"] == "degree"
 
 
-def test_the_panchromatic_band_is_opened_by_name(folders):
+def test_panchromatic_band_is_opened_by_name(folders):
     folder, _ = folders["OLI", 1]
     assert "OLI8" not in fifesim.open_landsat(folder)["band"].values
     pan = fifesim.open_landsat(folder, bands="OLI8")
@@ -398,14 +398,14 @@ def test_the_panchromatic_band_is_opened_by_name(folders):
     assert "OLI9" in fifesim.open_landsat(folder, bands=["OLI9"])["band"].values
 
 
-def test_without_quality_two_files_less_are_needed(copy, folders):
+def test_quality_false_needs_no_quality_files(copy, folders):
     for path in copy.glob("*_QA_*"):
         path.unlink()
     with pytest.raises(ValueError, match=r"QA_PIXEL\.TIF is missing in .*quality=False"):
         fifesim.open_landsat(copy)
     scene = fifesim.open_landsat(copy, quality=False)
     assert "quality" not in scene.coords
-    # The flagged pixel stays.
+    # The flagged pixel is kept.
     assert int(np.isnan(scene.sel(band="TM3")).sum()) == 2
 
 
@@ -418,12 +418,12 @@ def test_without_quality_two_files_less_are_needed(copy, folders):
         ({"instrument": "TM5"}, "unknown instrument 'TM5'"),
     ],
 )
-def test_what_is_not_there_is_refused(copy, options, said):
+def test_invalid_options_raise(copy, options, said):
     with pytest.raises(ValueError, match=said):
         fifesim.open_landsat(copy, **options)
 
 
-def test_a_missing_band_is_named_with_those_there_are(copy):
+def test_missing_band_error_lists_the_available_bands(copy):
     for number in (3, 5, 7):
         (copy / f"LT05_L1TP_058014_20110312_20200823_02_T1_B{number}.TIF").unlink()
     with pytest.raises(ValueError, match=r"B3\.TIF is missing in .*bands=\['TM1', 'TM2', 'TM4'\]"):
@@ -434,7 +434,7 @@ def test_a_missing_band_is_named_with_those_there_are(copy):
         fifesim.open_landsat(copy, angles="pixel", bands="TM1")
 
 
-def test_an_irradiance_that_is_not_said_is_the_instruments(tmp_path):
+def test_missing_irradiance_is_taken_from_the_instrument(tmp_path):
     groups = products.landsat_groups(products.OLI, level=2)
     del groups["LEVEL1_MIN_MAX_RADIANCE"]
     products.landsat(tmp_path, products.OLI, 2, groups=groups)
@@ -448,7 +448,7 @@ def altered(folder, group, **values):
     return products.landsat(folder, products.OLI, groups=groups)
 
 
-def test_an_off_nadir_view_is_known_by_its_roll_or_by_pixel(tmp_path):
+def test_off_nadir_view_needs_roll_and_row_or_angles_by_pixel(tmp_path):
     rolled = {"NADIR_OFFNADIR": "OFFNADIR", "ROLL_ANGLE": "-14.2"}
     altered(tmp_path / "without", "IMAGE_ATTRIBUTES", **rolled)
     with pytest.raises(ValueError, match=r"was acquired off nadir, .*use angles='pixel'"):
@@ -456,12 +456,12 @@ def test_an_off_nadir_view_is_known_by_its_roll_or_by_pixel(tmp_path):
     assert fifesim.open_landsat(tmp_path / "without", angles="pixel")["vza"].ndim == 2
     altered(tmp_path / "with", "IMAGE_ATTRIBUTES", WRS_ROW="036", **rolled)
     scene = fifesim.open_landsat(tmp_path / "with")
-    # Descending, to the right: the sensor stands in the east.
+    # Descending and looking right: the sensor is in the east.
     assert float(scene["vza"]) == pytest.approx(15.8, abs=0.1) and 90 < float(scene["vaa"]) < 110
 
 
-def test_a_product_whose_irradiance_is_impossible_is_refused(tmp_path):
-    """A product's own instrument has nearly the same; another one that is given may have any."""
+def test_impossible_irradiance_raises(tmp_path):
+    """The irradiance must agree with the instrument of the product; a given other instrument is not compared."""
     altered(tmp_path, "LEVEL1_MIN_MAX_RADIANCE", RADIANCE_MAXIMUM_BAND_4="622768.8")
     said = r"LC08_.*: the scale of OLI4 .*RADIANCE_MAXIMUM.* means a solar irradiance of"
     with pytest.raises(ValueError, match=said):

@@ -1,4 +1,4 @@
-"""Product metadata: files that are read safely, and checks against each other and against the sun."""
+"""Product metadata: safe reading, and consistency checks of values and solar position."""
 
 import os
 
@@ -41,14 +41,14 @@ def distance(more):
 
 
 def irradiance(factor):
-    """A band without irradiance and one that the instrument lacks are not compared."""
+    """Check a band; a band without irradiance and an unknown band are ignored."""
     others = ProductBand("TM4", "B4.TIF", 1e-3, 0.0, 255, None), ProductBand("TM9", "B9.TIF", 1e-3, 0.0, 255, 1.0)
     band = ProductBand("TM3", "B3.TIF", 1e-3, 0.0, 255, RED.solar_irradiance * factor)
     checks.check_irradiance("LT05", (band, *others), TM)
 
 
 CHECKS = [
-    # The rounding of metadata is below half of 0.1 %.
+    # Metadata are rounded to better than 0.05 %.
     (
         scale,
         [(2e-5, -0.1), (2.0009e-5, -0.1)],
@@ -71,7 +71,7 @@ CHECKS = [
 
 
 @pytest.mark.parametrize(("check", "good", "wrong", "said"), CHECKS)
-def test_numbers_agree_within_limits(check, good, wrong, said):
+def test_consistency_checks_have_their_limits(check, good, wrong, said):
     for numbers in good:
         check(*numbers)
     for numbers in wrong:
@@ -107,15 +107,15 @@ def test_entities_are_not_followed(tmp_path, text):
     assert SECRET not in str(error.value)
 
 
-def test_a_document_type_in_another_encoding_is_no_text(tmp_path):
-    """XML in UTF-16 shows its declarations to a parser, and not to a search for their letters."""
+def test_xml_in_utf16_raises(tmp_path):
+    """A parser sees declarations in UTF-16, but a search for ASCII text does not."""
     path = tmp_path / "a.xml"
     path.write_bytes('<?xml version="1.0" encoding="UTF-16"?><!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'.encode("utf-16"))
     with pytest.raises(ValueError, match=r"a\.xml is no text"):
         metadata.read_xml(path)
 
 
-def test_a_large_file_is_not_read(tmp_path, monkeypatch):
+def test_large_file_is_not_read(tmp_path, monkeypatch):
     path = tmp_path / "a.xml"
     path.write_text("<a>" + " " * 100 + "</a>")
     monkeypatch.setattr(metadata, "_LARGEST", 100)
@@ -124,13 +124,13 @@ def test_a_large_file_is_not_read(tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes here")
-def test_a_pipe_is_not_opened(tmp_path):
+def test_pipe_is_not_opened(tmp_path):
     os.mkfifo(tmp_path / "a.xml")
     with pytest.raises(ValueError, match="is a pipe"):
         metadata.read_xml(tmp_path / "a.xml")
 
 
-def test_what_is_no_xml_is_one_line(tmp_path):
+def test_invalid_xml_error_is_one_line(tmp_path):
     path = tmp_path / "a.xml"
     for text in ("<a>", "<a></b>", "", "a" * 1000, "<a>" * 100):
         path.write_text(text)
@@ -139,8 +139,8 @@ def test_what_is_no_xml_is_one_line(tmp_path):
         assert len(str(error.value)) < 450 and "\n" not in str(error.value)
 
 
-def test_times_are_utc_between_the_launch_and_today():
-    """numpy takes "today" for a time, and nanoseconds of the year 9999 wrap around to 1815."""
+def test_times_are_utc_between_launch_and_today():
+    """numpy accepts "today" as a time, and nanoseconds of the year 9999 overflow to 1815."""
     assert metadata.utc_time("2020-12-04T19:02:11.1944860Z", "t") == np.datetime64("2020-12-04T19:02:11.194486", "ns")
     assert metadata.utc_time("2020-12-04T19:02:11", "t").dtype == "datetime64[ns]"
     now = str(np.datetime64("now", "s"))
@@ -157,6 +157,6 @@ def test_times_are_utc_between_the_launch_and_today():
         metadata.utc_time("2017-03-06T23:59:59Z", "T", launch="2017-03-07")
 
 
-def test_errors_are_named_after_their_file():
+def test_errors_start_with_the_file_name():
     with pytest.raises(ValueError, match=r"^a\.xml: too large$"), metadata.naming("/b/a.xml"):
         raise ValueError("too large")

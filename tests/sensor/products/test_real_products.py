@@ -1,4 +1,4 @@
-"""Metadata of real products: each opens with the numbers that it states, or is refused with reason and remedy."""
+"""Metadata of real products: each opens with its stated values, or raises an error with reason and remedy."""
 
 import csv
 import re
@@ -16,7 +16,7 @@ from fifesim.sensor.products.landsat_labels import read_scene
 from fifesim.sensor.products.sentinel2_labels import sentinel2_product
 
 DATA = Path(__file__).parents[2] / "data" / "real_products"
-# The rasters lie anywhere: neither scale nor sun depends on their place.
+# Arbitrary location: neither scale nor sun depends on it.
 PLACE = {"crs": "EPSG:32633", "corner": (600000.0, 5000000.0)}
 NO_TILE = "S2A_MSIL1C_20240101T102431_N0510_R065_T30NWM_20240101T122107.SAFE"
 OTHER_TILE = "S2A_MSIL1C_20210908T042701_N0301_R133_T46RER_20210908T070248.SAFE"
@@ -25,7 +25,7 @@ OFF_NADIR = "LC08_L2SP_017036_20130419_20200913_02_T2"
 
 
 def expected_rows():
-    """Rows of expected.csv by product."""
+    """Rows of expected.csv, grouped by product."""
     found = {}
     with open(DATA / "expected.csv", newline="", encoding="utf-8") as file:
         for row in csv.DictReader(file):
@@ -41,7 +41,7 @@ SENTINEL2 = [product for product in OPENED if product.startswith("S2")]
 
 @pytest.fixture(scope="module")
 def metadata(tmp_path_factory):
-    """Folder of all metadata, landsat/PRODUCT and sentinel2/PRODUCT."""
+    """Folder with all metadata, landsat/PRODUCT and sentinel2/PRODUCT."""
     folder = tmp_path_factory.mktemp("metadata")
     with tarfile.open(DATA / "metadata.tar.xz") as archive:
         archive.extractall(folder, filter="data")
@@ -49,7 +49,7 @@ def metadata(tmp_path_factory):
 
 
 def landsat(metadata, folder, product):
-    """Folder of a Landsat product: each band has the number of expected.csv, no data, and saturation."""
+    """Landsat product folder: each band has the number of expected.csv, no data, and saturation."""
     shutil.copytree(metadata / "landsat" / product, folder, dirs_exist_ok=True)
     pixel = 60.0 if product.startswith("LM") else 30.0
     for row in EXPECTED[product]:
@@ -63,7 +63,7 @@ def landsat(metadata, folder, product):
 
 
 def sentinel2(metadata, folder, product, tile=None):
-    """Folder .SAFE of a Sentinel-2 product: each band has the number of expected.csv, no data, and saturation."""
+    """Sentinel-2 .SAFE folder: each band has the number of expected.csv, no data, and saturation."""
     path = folder / product
     given = metadata / "sentinel2" / product
     (file,) = given.glob("MTD_MSIL*.xml")
@@ -87,7 +87,7 @@ def sentinel2(metadata, folder, product, tile=None):
 
 
 def check_scene(scene, rows, view):
-    """Compare an opened scene with rows of expected.csv; tolerances have their reasons in the README of the data."""
+    """Compare a scene with rows of expected.csv; the README of the data explains the tolerances."""
     assert scene["band"].values.tolist() == [row["band"] for row in rows]
     first = rows[0]
     assert abs(scene["time"].values - np.datetime64(first["time"], "ns")) < np.timedelta64(1, "us")
@@ -99,7 +99,7 @@ def check_scene(scene, rows, view):
 
 
 def check_scale(scene, rows):
-    """Compare what does not depend on the tile: distance, reflectance and solar irradiance."""
+    """Compare the values that do not depend on the tile: distance, reflectance and solar irradiance."""
     assert float(scene["earth_sun_distance"]) == pytest.approx(float(rows[0]["earth_sun_distance"]), abs=1e-9)
     values = np.full((len(rows), 2, 2), np.nan)
     values[:, [0, 1], [0, 1]] = np.array([float(row["reflectance"]) for row in rows])[:, None]
@@ -111,20 +111,20 @@ def check_scale(scene, rows):
 
 
 def check_bands(bands, rows):
-    """Compare the scale of bands, which the metadata state."""
+    """Compare the scale of bands with the metadata."""
     for row in rows:
         band = bands[row["band"]]
         np.testing.assert_allclose([band.gain, band.offset], [float(row["scale"]), float(row["offset"])], rtol=1e-12)
-        # The number of saturation of Sentinel-2 is one above its largest valid number.
+        # The saturation number of Sentinel-2 is one above the largest valid number.
         assert band.largest == int(row["largest"]) + row["product"].startswith("S2")
 
 
 @pytest.mark.parametrize("product", LANDSAT)
-def test_landsat_products_open_with_their_numbers(metadata, tmp_path, product):
+def test_landsat_products_agree_with_expected_values(metadata, tmp_path, product):
     folder, rows = landsat(metadata, tmp_path, product), EXPECTED[product]
     view = (0.0, 0.0)
     if product == OFF_NADIR:
-        # Of the orbit of 705 km and a sphere of 6371 km; the azimuth is that of the track, and of its right angle.
+        # Orbit of 705 km and Earth radius of 6371 km; the azimuth is perpendicular to the track.
         vza = np.degrees(np.arcsin(np.sin(np.radians(11.696)) * (6371 + 705) / 6371))
         view = read_scene(folder)[0].view
         np.testing.assert_allclose(view, (vza, 102.2), rtol=0, atol=0.1)
@@ -135,7 +135,7 @@ def test_landsat_products_open_with_their_numbers(metadata, tmp_path, product):
 
 
 def mean_view(rows):
-    """Mean of the directions that are stated for some bands."""
+    """Mean view direction of the bands that state one."""
     stated = [(float(row["view_zenith"]), float(row["view_azimuth"])) for row in rows]
     zenith, azimuth = np.radians([pair for pair in stated if not np.isnan(pair[0])]).T
     x, y, z = (
@@ -147,7 +147,7 @@ def mean_view(rows):
 
 
 @pytest.mark.parametrize("product", SENTINEL2)
-def test_sentinel2_products_open_with_their_numbers(metadata, tmp_path, product):
+def test_sentinel2_products_agree_with_expected_values(metadata, tmp_path, product):
     path = sentinel2(metadata, tmp_path, product, OTHER_TILE if product == NO_TILE else None)
     rows = {row["band"]: row for row in EXPECTED[product]}
     (file,) = path.glob("MTD_MSIL*.xml")
@@ -169,8 +169,8 @@ def test_sentinel2_products_open_with_their_numbers(metadata, tmp_path, product)
 
 
 @pytest.mark.parametrize("product", [NAN_SUN, OTHER_TILE])
-def test_angles_by_pixel_are_those_of_the_grid(metadata, tmp_path, product):
-    """A pixel at the first node of the grid has its angles, within 10 m of 5 km."""
+def test_angles_by_pixel_agree_with_the_grid(metadata, tmp_path, product):
+    """A pixel within 10 m of the first node of the 5 km grid has the angles of the node."""
     path = sentinel2(metadata, tmp_path, product)
     root = ElementTree.parse(next(path.rglob("MTD_TL.xml"))).getroot()
     corner = float(root.findtext(".//Geoposition/ULX")), float(root.findtext(".//Geoposition/ULY"))
@@ -186,7 +186,7 @@ def test_angles_by_pixel_are_those_of_the_grid(metadata, tmp_path, product):
     assert np.isfinite(scene["vza"]).all() and 0 < float(scene["vza"].max()) < 15
 
 
-def test_a_product_without_its_tile_metadata_is_refused(metadata, tmp_path):
+def test_product_without_tile_metadata_raises(metadata, tmp_path):
     path = sentinel2(metadata, tmp_path, NO_TILE)
     with pytest.raises(ValueError, match=r"MTD_TL\.xml is missing in the product: is it unpacked whole"):
         fifesim.open_sentinel2(path, quality=False)
@@ -195,18 +195,18 @@ def test_a_product_without_its_tile_metadata_is_refused(metadata, tmp_path):
 REFUSED = {
     "LC08_L1TP_026200_20240502_20240513_02_T2": r"the sun is below the horizon, .*taken at night.*take one of the day",
     "LC80100202015018LGN00": "is of Collection 1 or older: take the scene's Collection-2 product",
-    # Named _MTL.TXT.
+    # Its file name ends in _MTL.TXT.
     "LE07_L1TP_160031_20110416_20161210_01_T1": "is of Collection 1 or older: take the scene's Collection-2 product",
 }
 
 
-def test_every_product_has_its_test():
+def test_every_product_is_tested():
     assert set(REFUSED) == set(EXPECTED) - set(OPENED) and len(EXPECTED) == 26
 
 
 @pytest.mark.parametrize("product", REFUSED)
 @pytest.mark.parametrize("angles", ["centre", "pixel"])
-def test_other_products_are_refused_with_reason_and_remedy(metadata, product, angles):
+def test_unsupported_products_raise_with_reason_and_remedy(metadata, product, angles):
     folder = metadata / "landsat" / product
     for path in (folder, *folder.iterdir()):
         with pytest.raises(ValueError, match=REFUSED[product]):

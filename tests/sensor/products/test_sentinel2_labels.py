@@ -1,4 +1,4 @@
-"""Sentinel-2 products: metadata of products and tiles, contradictions, and images by hand before and after 04.00."""
+"""Sentinel-2 products: metadata of products and tiles, inconsistencies, and images before and after 04.00."""
 
 import re
 
@@ -27,7 +27,7 @@ def tile(folder, text):
 # ------------------------------------------------------------------------------------------- files
 
 
-def test_the_file_is_found_in_its_folder(tmp_path):
+def test_metadata_file_is_found_in_its_folder(tmp_path):
     with pytest.raises(ValueError, match=r"has no MTD_MSIL1C.xml nor MTD_MSIL2A.xml: give the .SAFE folder"):
         sentinel2_metadata_file(tmp_path)
     path = written(tmp_path, "<a/>", "MTD_MSIL2A.xml")
@@ -41,7 +41,7 @@ def test_the_file_is_found_in_its_folder(tmp_path):
         sentinel2_metadata_file(written(tmp_path, "", "S2A.zip"))
 
 
-def test_other_layouts_are_named(tmp_path):
+def test_other_layouts_raise(tmp_path):
     for folder, names in {
         "tile": ["metadata.xml", "B01.jp2", "B8A.jp2", "tileInfo.json"],
         "sizes": ["R10m/B02.jp2", "R20m/B05.jp2"],
@@ -64,7 +64,7 @@ def test_other_layouts_are_named(tmp_path):
 # ------------------------------------------------------------------------------------------- product
 
 
-def test_bands_lie_at_their_sizes(tmp_path):
+def test_bands_are_listed_by_pixel_size(tmp_path):
     product = sentinel2_product(written(tmp_path, L1C))
     names = {size: [band.name for band in bands] for size, bands in product.bands.items()}
     assert names[10] == ["MSI2", "MSI3", "MSI4", "MSI8"]
@@ -73,7 +73,7 @@ def test_bands_lie_at_their_sizes(tmp_path):
     red, granule = product.bands[10][2], "GRANULE/L1C_T46RER_A032448_20210908T043714"
     assert red.file == f"{granule}/IMG_DATA/T46RER_20210908T042701_B04.jp2" and red.solar_irradiance == 1512.06
     assert product.tile == f"{granule}/MTD_TL.xml" and product.classes == {}
-    # U is the inverse square of the distance, beyond the mean distance in September.
+    # U is the inverse square of the distance, which is above the mean in September.
     assert product.earth_sun_distance**-2 == pytest.approx(float(products.U), rel=1e-14)
     assert 1.007 < product.earth_sun_distance < 1.009
     second = sentinel2_product(written(tmp_path, products.product_xml(2, "04.00")))
@@ -81,7 +81,7 @@ def test_bands_lie_at_their_sizes(tmp_path):
     assert second.classes[20].endswith("R20m/T29UNU_20221005T115411_SCL_20m.jp2")
 
 
-def test_offsets_are_by_band(tmp_path):
+def test_offsets_may_differ_by_band(tmp_path):
     bands = sentinel2_product(written(tmp_path, L1C.replace('band_id="3">-1000', 'band_id="3">-900'))).bands[10]
     assert [round(band.offset, 12) for band in bands] == [-0.1, -0.1, -0.09, -0.1]
 
@@ -112,7 +112,7 @@ def test_offsets_are_by_band(tmp_path):
         ('<!DOCTYPE a [<!ENTITY b "c">]><a/>', "declares a document type"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_in_a_product_is_said_in_a_line(tmp_path, text, said):
+def test_invalid_product_metadata_raises_a_one_line_message(tmp_path, text, said):
     with pytest.raises(ValueError, match=said) as error:
         sentinel2_product(written(tmp_path, text))
     assert len(str(error.value)) < 500 and "\n" not in str(error.value)
@@ -121,7 +121,7 @@ def test_what_is_wrong_in_a_product_is_said_in_a_line(tmp_path, text, said):
 # ------------------------------------------------------------------------------------------- tile
 
 
-def test_tile_has_time_sun_and_views(tmp_path):
+def test_tile_metadata_have_time_sun_and_views(tmp_path):
     found = sentinel2_tile(tile(tmp_path, TILE))
     assert found.time == np.datetime64("2022-10-05T11:56:49.581767")
     assert (found.sza, found.saa, found.views) == (57.820574357679, 172.840206897213, products.MEAN_VIEWS)
@@ -130,7 +130,7 @@ def test_tile_has_time_sun_and_views(tmp_path):
     assert found.view_grids["3"].shape == (2, 2, 23, 23) and np.isnan(found.view_grids["3"][:, :, :, 20:]).all()
 
 
-def test_a_mean_sun_of_nan_is_that_of_the_grid(tmp_path):
+def test_missing_mean_sun_is_computed_from_the_grid(tmp_path):
     text = TILE.replace("57.820574357679", "NaN").replace("172.840206897213", "NaN")
     zenith, azimuth = products.sun_grid()
     found = sentinel2_tile(tile(tmp_path, text))
@@ -153,7 +153,7 @@ def test_a_mean_sun_of_nan_is_that_of_the_grid(tmp_path):
         ("EPSG:32629", "EPSG:4326", "HORIZONTAL_CS_CODE must be a UTM zone such as EPSG:32629, got 'EPSG:4326'"),
     ],
 )
-def test_what_is_wrong_in_a_tile_is_refused(tmp_path, old, new, said):
+def test_invalid_tile_metadata_raises(tmp_path, old, new, said):
     assert old in TILE
     with pytest.raises(ValueError, match=f"MTD_TL.xml.*{said}"):
         sentinel2_tile(tile(tmp_path, TILE.replace(old, new)))
@@ -167,7 +167,7 @@ BASELINES = {"03.01": 0.0, "04.00": -1000.0}
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
-    """By level and baseline: a folder, and what lies in its files."""
+    """Product folder and the values of its files, by level and baseline."""
     root = tmp_path_factory.mktemp("sentinel2")
     return {(level, baseline): products.sentinel2(root, level, baseline) for level in (1, 2) for baseline in BASELINES}
 
@@ -178,8 +178,8 @@ def by_hand(files, names, size, offset):
 
 
 @pytest.mark.parametrize("baseline", BASELINES)
-def test_a_scene_goes_through_to_the_surface(folders, baseline):
-    """Level-1C and the surface by hand to what 32 bits hold, as with Landsat."""
+def test_scene_is_corrected_to_the_surface(folders, baseline):
+    """Surface reflectance from Level-1C compared with hand-computed values; 2e-7: two roundings to 32 bits."""
     path, files = folders[1, baseline]
     toa = by_hand(files, ["B4", "B8"], 10, BASELINES[baseline])
     air = fifesim.Atmosphere(visibility=40.0)
@@ -192,7 +192,7 @@ def test_a_scene_goes_through_to_the_surface(folders, baseline):
     np.testing.assert_allclose(surface, expected, rtol=0, atol=2e-7)
 
 
-def test_labels_are_those_of_the_packages_own_images(folders):
+def test_scene_has_the_labels_of_a_fifesim_image(folders):
     path, _ = folders[1, "04.00"]
     with no_compute():
         scene = fifesim.open_sentinel2(path / "MTD_MSIL1C.xml")
@@ -220,7 +220,7 @@ def test_level_2a_opens_at_each_size(folders, size):
 
 
 @pytest.mark.parametrize("chunks", ["auto", None, {"y": 5, "x": 7}])
-def test_pixels_of_10_m_have_the_class_of_those_of_20(folders, chunks):
+def test_quality_at_10_m_repeats_the_classes_at_20_m(folders, chunks):
     path, files = folders[2, "04.00"]
     scene = fifesim.open_sentinel2(path, 10, chunks=chunks)
     np.testing.assert_array_equal(scene["quality"], files["SCL", 20].repeat(2, axis=0).repeat(2, axis=1))
@@ -229,7 +229,7 @@ def test_pixels_of_10_m_have_the_class_of_those_of_20(folders, chunks):
 
 
 @pytest.mark.parametrize(("size", "times"), [(10, 6), (20, 3), (60, 1)])
-def test_level_1c_has_masks_of_clouds_since_04_00(folders, size, times):
+def test_level_1c_has_cloud_masks_since_04_00(folders, size, times):
     path, files = folders[1, "04.00"]
     opaque, cirrus, snow = files["masks"].astype(int)
     expected = (opaque + 2 * cirrus + 4 * snow).repeat(times, axis=0).repeat(times, axis=1)
@@ -241,7 +241,7 @@ def test_level_1c_has_masks_of_clouds_since_04_00(folders, size, times):
 
 @pytest.mark.parametrize("chunks", [None, {"y": 5, "x": 7}])
 @pytest.mark.parametrize("angles", ["centre", "pixel"])
-def test_any_chunks_give_the_same(folders, chunks, angles):
+def test_scene_does_not_depend_on_chunks(folders, chunks, angles):
     path, _ = folders[2, "03.01"]
     options = {"angles": angles, "bands": ["MSI4", "MSI8"]}
     expected = fifesim.open_sentinel2(path, 10, **options).compute()
@@ -250,8 +250,8 @@ def test_any_chunks_give_the_same(folders, chunks, angles):
     assert found.compute().identical(expected)
 
 
-def test_angles_by_pixel_lie_between_the_nodes(tmp_path):
-    """A tile of 5.4 km, which is more than an interval of the grid."""
+def test_angles_by_pixel_are_interpolated_between_nodes(tmp_path):
+    """The tile of 5.4 km is larger than one interval of the grid."""
     path, _ = products.sentinel2(tmp_path, 1, width=5400)
     with pytest.raises(ValueError, match=r"no grids of the view of these bands: .*angles='centre'"):
         fifesim.open_sentinel2(path, 60, bands=["MSI1"], angles="pixel")
@@ -267,7 +267,7 @@ def test_angles_by_pixel_lie_between_the_nodes(tmp_path):
     np.testing.assert_allclose(scene["vaa"], 281.4, rtol=0, atol=1e-9)
 
 
-def test_a_band_at_another_size_says_where_it_is(folders):
+def test_band_at_another_resolution_raises_with_its_resolution(folders):
     path, _ = folders[1, "04.00"]
     assert fifesim.open_sentinel2(path, 60)["band"].values.tolist() == ["MSI1", "MSI9"]
     assert fifesim.open_sentinel2(path, 60, bands="B10")["band"].values.tolist() == ["MSI10"]
@@ -283,12 +283,12 @@ def test_a_band_at_another_size_says_where_it_is(folders):
         ({"angles": "tile"}, "angles must be 'centre' or 'pixel', got 'tile'"),
     ],
 )
-def test_what_is_not_there_is_refused(folders, options, said):
+def test_invalid_options_raise(folders, options, said):
     with pytest.raises(ValueError, match=said):
         fifesim.open_sentinel2(folders[1, "04.00"][0], **options)
 
 
-def test_missing_files_are_named(tmp_path):
+def test_missing_file_raises_with_its_name(tmp_path):
     first, second = (products.sentinel2(tmp_path, level)[0] for level in (1, 2))
     for path, name, said in (
         (second, "*_SCL_20m.jp2", r"SCL_20m\.jp2 is missing in .*quality=False"),
@@ -303,7 +303,7 @@ def test_missing_files_are_named(tmp_path):
     assert "quality" not in fifesim.open_sentinel2(first, quality=False).coords
 
 
-def test_a_band_whose_view_is_not_known_is_refused(tmp_path):
+def test_band_without_mean_view_raises(tmp_path):
     path, _ = products.sentinel2(tmp_path, 1)
     (tile,) = path.rglob("MTD_TL.xml")
     text = tile.read_text(encoding="utf-8")
@@ -314,7 +314,7 @@ def test_a_band_whose_view_is_not_known_is_refused(tmp_path):
     assert float(both["vza"]) == pytest.approx(products.MEAN_VIEWS["2"][0], abs=1e-9)
 
 
-def test_another_spacecraft_takes_the_responses_that_are_given(tmp_path):
+def test_instrument_argument_is_used_for_another_spacecraft(tmp_path):
     path, _ = products.sentinel2(tmp_path, 1, "05.11", spacecraft="Sentinel-2C")
     said = "is of Sentinel-2C, whose responses fifesim does not have: give instrument='MSI-C'"
     with pytest.raises(ValueError, match=said):

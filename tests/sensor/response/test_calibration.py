@@ -1,4 +1,4 @@
-"""Digital numbers, radiance and planetary reflectance; scales and directions of products."""
+"""Digital numbers, radiance and planetary reflectance; scales and angles of products."""
 
 import numpy as np
 import pytest
@@ -16,8 +16,8 @@ from fifesim.sensor.response.calibration import (
 FULL, LOW = np.array([204.3, 206.2])[:, None], np.array([-1.2, -1.5])[:, None]
 
 
-def test_count_of_tm_is_the_range_over_255():
-    """Radiance per count that follows from Table 1 by hand: 205.5 / 255 and 207.7 / 255."""
+def test_tm_gain_is_the_range_divided_by_255():
+    """Radiance per count from Table 1, by hand: 205.5 / 255 and 207.7 / 255."""
     gain, offset = gain_offset([204.3, 206.2], [-1.2, -1.5], 8)
     np.testing.assert_allclose(gain, [0.805882, 0.814510], atol=5e-7)
     np.testing.assert_array_equal(offset, [-1.2, -1.5])
@@ -27,7 +27,7 @@ def test_count_of_tm_is_the_range_over_255():
 
 
 @pytest.mark.parametrize(("bits", "dtype"), [(2, np.uint8), (8, np.uint8), (9, np.uint16), (12, "u2"), (16, "u2")])
-def test_counts_return_to_themselves_and_radiance_within_half_a_count(bits, dtype):
+def test_counts_round_trip_and_radiance_is_within_half_a_count(bits, dtype):
     gain, offset = gain_offset(FULL, LOW, bits)
     counts = np.broadcast_to(np.arange(2**bits), (2, 2**bits)).astype(dtype)
     dn = radiance_to_dn(dn_to_radiance(counts, gain, offset), gain, offset, bits)
@@ -40,7 +40,7 @@ def test_counts_return_to_themselves_and_radiance_within_half_a_count(bits, dtyp
 
 @pytest.mark.parametrize("bits", [8, 10, 16])
 @pytest.mark.parametrize("compression", [0, 1])
-def test_out_of_range_is_clipped_and_missing_is_zero(bits, compression):
+def test_out_of_range_radiance_is_clipped_and_missing_is_zero(bits, compression):
     gain, offset = gain_offset(204.3, -1.2, bits)
     largest = 2**bits - 1
     radiance = [-np.inf, -1e9, -1.2, 204.3, 204.3 + 2 * gain, 1e9, np.inf, np.nan]
@@ -49,11 +49,11 @@ def test_out_of_range_is_clipped_and_missing_is_zero(bits, compression):
     np.testing.assert_array_equal(np.isnan(dn_to_radiance(dn, gain, offset, compression * largest)), dn == 0)
 
 
-def test_halves_go_to_the_even_count():
+def test_halves_round_to_even():
     assert radiance_to_dn([2.5, 3.5, 4.5], 1.0, 0.0, 8).tolist() == [2, 4, 4]
 
 
-def test_planetary_reflectance_of_a_worked_case():
+def test_planetary_reflectance_by_hand():
     """pi 50 1.0148^2 / (1536 cos 28.5 degrees) = 161.763 / 1349.86, by hand."""
     mu_s = np.cos(np.radians(28.5))
     np.testing.assert_allclose(radiance_to_reflectance(50.0, 1536.0, mu_s, 1.0148), 0.11984, atol=5e-6)
@@ -72,21 +72,21 @@ def test_planetary_reflectance_of_a_worked_case():
         (lambda: calibration.filled(np.full((3, 2, 2), np.nan)), ValueError, "no direction of the view: .*'centre'"),
     ],
 )
-def test_mistakes_are_named(call, error, said):
+def test_invalid_arguments_raise(call, error, said):
     with pytest.raises(error, match=said):
         call()
 
 
-# ------------------------------------------------------------------------------------------ a scale of square roots
+# ------------------------------------------------------------------------------------------ square-root scale
 
 
-def test_square_roots_by_hand():
+def test_square_root_scale_by_hand():
     """Range 0 to 63 in 6 bits: 63 sqrt(x / 63) for x = 1, 7, 28 and 63 is 7.94, 21, 42 and 63."""
     assert radiance_to_dn([1.0, 7.0, 28.0, 63.0], 1.0, 0.0, 6, 63).tolist() == [8, 21, 42, 63]
     np.testing.assert_allclose(dn_to_radiance([21, 42], 1.0, 0.0, 63), [7 + 0.25 / 63, 28 + 0.25 / 63], rtol=1e-14)
 
 
-def test_every_compressed_count_returns_to_itself_and_the_ends_are_the_linear_ones():
+def test_compressed_counts_round_trip_with_linear_end_points():
     gain, offset = gain_offset(FULL, LOW, 6)
     counts = np.broadcast_to(np.arange(1, 64), (2, 63)).astype(np.uint8)
     radiance = dn_to_radiance(counts, gain, offset, 63)
@@ -94,8 +94,8 @@ def test_every_compressed_count_returns_to_itself_and_the_ends_are_the_linear_on
     np.testing.assert_allclose(radiance[:, -1:], FULL, atol=0.005 * gain.max())
 
 
-def test_radiance_of_a_compressed_count_lies_in_the_middle_of_those_it_stands_for():
-    """Edges of count n, found by search: half of their sum is what it decodes to, and their distance the step."""
+def test_compressed_count_decodes_to_the_centre_of_its_interval():
+    """The edges of count n are found by search; their distance is the digital step."""
     fine = np.linspace(0.0, 63.0, 2_000_001)
     dn = radiance_to_dn(fine, 1.0, 0.0, 6, 63)
     for count in (2, 10, 31, 62):
@@ -106,7 +106,7 @@ def test_radiance_of_a_compressed_count_lies_in_the_middle_of_those_it_stands_fo
         np.testing.assert_allclose(step, seen[-1] - seen[0], atol=1e-4)
 
 
-def test_scale_is_by_band_and_a_linear_one_keeps_its_bits():
+def test_scale_is_per_band_and_linear_bands_are_unchanged():
     gain, offset = gain_offset(FULL[..., None], LOW[..., None], 6)
     radiance, scale = np.random.default_rng(3).uniform(-2, 210, (2, 30, 40)), np.array([63, 0])[:, None, None]
     mixed, linear = radiance_to_dn(radiance, gain, offset, 6, scale), radiance_to_dn(radiance, gain, offset, 6)
@@ -121,33 +121,33 @@ def test_scale_is_by_band_and_a_linear_one_keeps_its_bits():
 
 def test_both_scales_of_a_landsat_8_scene_agree():
     """
-    RADIANCE_MULT and RADIANCE_ADD of LC08_L1TP_047027_20201204_20210313_02_T1, bands 4 and 5, to the digits given.
+    RADIANCE_MULT and RADIANCE_ADD of LC08_L1TP_047027_20201204_20210313_02_T1, bands 4 and 5, to the stated digits.
 
-    The solar irradiances follow from its largest and smallest radiances and reflectances.
+    The solar irradiances follow from the largest and smallest radiances and reflectances.
     """
     spans = np.array([622.76880 + 51.42845, 381.10345 + 31.47165])
     sun = np.pi * 0.9854607**2 * spans / (1.210700 + 0.099980)
     gain, offset = product_gain_offset(2e-5, -0.1, sun, 1.0, 0.9854607)
     assert (np.abs(gain - [1.0288e-2, 6.2956e-3]) <= [5e-7, 5e-8]).all()
-    # Half of the sixth digit of the reflectances, over their span.
+    # Half of the sixth digit of the reflectances, divided by their span.
     np.testing.assert_allclose(offset, [-51.43874, -31.47794], rtol=1e-6)
     low = product_gain_offset(2e-5, -0.1, sun, 0.25, 0.9854607)
     np.testing.assert_allclose(low, np.array([gain, offset]) / 4, rtol=1e-15)
 
 
-def test_reflectance_is_a_line_over_the_cosine_of_the_sun():
-    """By hand: (2.1735e-3 * 57 - 0.004609) / 0.35 of Landsat 5's band 3. A sun that is down leaves NaN."""
+def test_product_reflectance_is_divided_by_the_solar_cosine():
+    """Band 3 of Landsat 5 by hand: (2.1735e-3 * 57 - 0.004609) / 0.35. NaN for a sun at or below the horizon."""
     mu_s = np.array([0.35, np.nan, 0.0, -0.1])
     found = calibration.product_reflectance(np.uint8(57), 2.1735e-3, -0.004609, 255, mu_s=mu_s)
     np.testing.assert_allclose(found, [0.340801428, np.nan, np.nan, np.nan], atol=1e-7)
     assert found.dtype == np.float32
-    # No data, the largest number, and a flag of this band are NaN.
+    # No data, the largest number and flagged pixels are NaN.
     dn, flags = np.array([0, 1, 254, 255, 57, 57], np.uint8), np.array([0, 0, 0, 0, 4, 8], np.uint16)
     kept = np.isfinite(calibration.product_reflectance(dn, 1e-3, 0.0, 255, np.uint16(4), flags))
     assert kept.tolist() == [False, True, True, False, False, True]
 
 
-def test_directions_come_back_from_their_vectors_and_have_means():
+def test_direction_vectors_round_trip_and_average():
     zenith, azimuth = np.meshgrid([0.5, 30.0, 75.0], [0.0, 95.0, 200.0, 359.0])
     found = calibration.direction_angles(3.0 * calibration.direction_vectors(zenith, azimuth))
     np.testing.assert_allclose(found, [zenith, azimuth], rtol=0, atol=1e-10)
@@ -159,8 +159,8 @@ def test_directions_come_back_from_their_vectors_and_have_means():
     assert calibration.hundredths(np.int16(-10), False) == -0.1
 
 
-def test_grids_of_directions_are_filled_and_interpolated():
-    """Zenith angles of one azimuth, small enough that a vector's interpolation is the angle's."""
+def test_direction_grids_are_filled_and_interpolated():
+    """For small zenith angles at one azimuth, interpolating vectors equals interpolating angles."""
     vectors = calibration.direction_vectors(np.array([[5.0, np.nan, np.nan, 9.0]]), np.full((1, 4), 100.0))
     np.testing.assert_allclose(calibration.direction_angles(calibration.filled(vectors))[0], [[5.0, 5.0, 9.0, 9.0]])
     nodes = calibration.direction_vectors(np.array([[1.0, 2.0, 4.0], [3.0, 4.0, 6.0]]), np.full((2, 3), 40.0))

@@ -1,4 +1,4 @@
-"""Scan geometry, sweeps of several lines, and turned footprints, beside published sizes, rays and dense sums."""
+"""Scan geometry, sweeps and rotated footprints compared with published sizes, ray tracing and dense sums."""
 
 import numpy as np
 import pytest
@@ -33,8 +33,8 @@ TRACK = Track(39.0, -97.0, 193.0)
     ("scan_angle", "vza", "along", "across"),
     [(0.0, 0.0, 1.17, 1.17), (20.0, 22.8, 1.25, 1.36), (40.0, 46.6, 1.60, 2.33), (55.4, 68.6, 2.47, 6.74)],
 )
-def test_avhrr_pixels_grow_as_they_are_known_to(scan_angle, vza, along, across):
-    """1.4 mrad from 833 km, to the last digit [km]."""
+def test_avhrr_pixel_growth_agrees_with_published_values(scan_angle, vza, along, across):
+    """1.4 mrad from 833 km, to the last digit. [km]"""
     assert float(view_from_scan(scan_angle, 833e3)[0]) == pytest.approx(vza, abs=0.05)
     assert [0.0014 * 833 * float(each) for each in growth(scan_angle, 833e3)] == pytest.approx(
         [along, across], abs=0.006
@@ -48,8 +48,8 @@ def unit(latitude, longitude):
 
 @pytest.mark.parametrize("place", [(39.2, -96.5), (38.0, -99.5), (41.0, -88.0), (30.0, -97.3)])
 @pytest.mark.parametrize("altitude", [705e3, 833e3])
-def test_directions_agree_with_vectors_in_space(place, altitude):
-    """The satellite abeam is the place on its orbit nearest to the point: found by search along the track."""
+def test_view_directions_agree_with_vector_geometry(place, altitude):
+    """The satellite is abeam at the point of its orbit nearest to the place, found by a search along the track."""
     steps = np.linspace(-2.5e6, 2.5e6, 500_001)
     below = np.stack(unit(*place_of(TRACK, steps, 0.0)), axis=-1)
     point = unit(*place)
@@ -62,7 +62,7 @@ def test_directions_agree_with_vectors_in_space(place, altitude):
     east = np.cross([0, 0, 1.0], point)
     east /= np.linalg.norm(east)
     components = [sight @ east / distance, sight @ np.cross(point, east) / distance]
-    # The search stands within 5 m of the nearest place.
+    # The search is accurate to 5 m.
     np.testing.assert_allclose(view_components(TRACK, *place, altitude), components, rtol=0, atol=1e-5)
     _, aside = place_beside(TRACK, *place)
     found_vza, found_scan = view_from_ground(abs(aside), altitude)
@@ -73,15 +73,15 @@ def test_directions_agree_with_vectors_in_space(place, altitude):
     assert float(across) == pytest.approx(distance / altitude / np.cos(np.radians(vza)), rel=1e-5)
 
 
-def test_what_lies_beyond_the_horizon_is_missing():
+def test_view_beyond_the_horizon_is_missing():
     assert np.isnan(view_from_scan(70.0, 833e3)[0])
     assert np.isnan(view_from_ground(30.0, 833e3)).all()
     horizon = np.degrees(np.arcsin(EARTH_RADIUS / (EARTH_RADIUS + 705e3)))
     assert np.isnan(swath_width(705e3, horizon + 0.01)) and np.isfinite(swath_width(705e3, horizon - 0.01))
 
 
-def test_a_polar_orbit_over_a_turning_earth_drifts_westward():
-    """Equator: ground velocity is that in space, less 465 m/s eastward at the speed of the subsatellite point."""
+def test_ground_track_heading_includes_earth_rotation():
+    """At the equator, ground velocity is the velocity of the subsatellite point minus 465 m/s eastward."""
     altitude, inclination = 705e3, 98.2
     speed = EARTH_RADIUS * np.sqrt(3.986004418e14 / (EARTH_RADIUS + altitude) ** 3)
     east = speed * np.cos(np.radians(inclination)) - 2 * np.pi * EARTH_RADIUS / 86164.1
@@ -92,7 +92,7 @@ def test_a_polar_orbit_over_a_turning_earth_drifts_westward():
     assert (down.heading + track.heading) % 360 == pytest.approx(180.0)
 
 
-def test_tracks_that_cannot_be_are_refused():
+def test_invalid_tracks_raise():
     with pytest.raises(ValueError, match="latitude"):
         Track(90.0, 0.0, 0.0)
     with pytest.raises(ValueError, match="finite"):
@@ -111,7 +111,7 @@ def pattern_of(name, band):
 
 
 def pixel_size(name, band, scan_angle):
-    """Along and across the track, between the edges of the sample and between two lines in the middle. [m]"""
+    """Pixel size along track (between the two middle lines) and across track (between sample edges). [m]"""
     pattern, altitude = pattern_of(name, band)
     sample = np.floor(pattern.position(scan_angle))
     edges = pattern.scan_angle(np.array([sample, sample + 1]))
@@ -122,7 +122,7 @@ def pixel_size(name, band, scan_angle):
 
 
 def modis_by_ichoku_and_kaufman(scan_angle, size=1000.0):
-    """Size of a pixel along and across the track, IEEE TGRS 43 (2005), doi:10.1109/TGRS.2005.857328. [m]"""
+    """Pixel size along and across track, IEEE TGRS 43 (2005), doi:10.1109/TGRS.2005.857328. [m]"""
     radius, orbit, step = 6378.137e3, 6378.137e3 + 705e3, size / 705e3
     theta, ratio = np.radians(scan_angle), 6378.137 / (6378.137 + 705)
     root = np.sqrt(ratio**2 - np.sin(theta) ** 2)
@@ -131,7 +131,7 @@ def modis_by_ichoku_and_kaufman(scan_angle, size=1000.0):
 
 @pytest.mark.parametrize(("band", "size"), [("MODIS1", 250.0), ("MODIS3", 500.0)])
 @pytest.mark.parametrize("scan_angle", [0.01, 30.0, -30.0, 54.9])
-def test_pixels_of_modis_are_as_published(band, size, scan_angle):
+def test_modis_pixel_sizes_agree_with_published_values(band, size, scan_angle):
     np.testing.assert_allclose(
         pixel_size("MODIS", band, scan_angle), modis_by_ichoku_and_kaufman(scan_angle, size), rtol=0.01
     )
@@ -141,13 +141,13 @@ def test_pixels_of_modis_are_as_published(band, size, scan_angle):
     ("band", "scan_angle", "published"),
     [("I1", 0.01, (371, 388)), ("I1", 56.06, (800, 789)), ("M5", 0.01, (742, 776)), ("M5", -56.06, (1600, 1580))],
 )
-def test_pixels_of_viirs_are_as_published(band, scan_angle, published):
-    """Horizontal sampling intervals in Table 2.2-1 of the VIIRS geolocation ATBD (2014)."""
+def test_viirs_pixel_sizes_agree_with_published_values(band, scan_angle, published):
+    """Horizontal sampling intervals of Table 2.2-1, VIIRS geolocation ATBD (2014)."""
     np.testing.assert_allclose(pixel_size("VIIRS", band, scan_angle), published, rtol=0.02)
 
 
-def test_places_of_detectors_agree_with_rays_in_space():
-    """The point where a ray from the orbit meets the sphere, by bisection, in the frame of a turned track."""
+def test_detector_positions_agree_with_ray_tracing():
+    """Intersection of a ray from the orbit with the sphere, by bisection in the frame of the track."""
     track, altitude, distance = Track(39.0, -97.0, 193.0), 824e3, 4e5
     point, along, right = track.axes()
     turn = distance / EARTH_RADIUS
@@ -169,8 +169,8 @@ def test_places_of_detectors_agree_with_rays_in_space():
 
 
 @pytest.mark.parametrize("band", ["I1", "M5"])
-def test_samples_and_angles_of_zones_are_inverse(band):
-    """Zones of the SDR User's Guide 1.2: 31.72, 44.86 and 56.28 degrees; samples of OCSSW's viirs_pxcvt.c."""
+def test_sample_positions_and_scan_angles_are_inverse(band):
+    """Zones from the SDR User's Guide 1.2: 31.72, 44.86 and 56.28 degrees; samples from viirs_pxcvt.c of OCSSW."""
     pattern, _ = pattern_of("VIIRS", band)
     half = {"I1": (1184, 1920, 3200), "M5": (592, 960, 1600)}[band]
     np.testing.assert_allclose(pattern.scan_angle(np.array(half)), (31.72, 44.86, 56.28), rtol=0, atol=0.015)
@@ -190,8 +190,8 @@ def test_samples_and_angles_of_zones_are_inverse(band):
         ("M5", 16, 3200, [((0, 15), 1008, 2192), ((1, 14), 640, 2560)]),
     ],
 )
-def test_lines_deleted_on_board_are_those_of_granules(band, lines, samples, zones):
-    """Rows of a scan and the columns that are left in them, as granules have them (CoastWatch, VIIRSBowtieFilter)."""
+def test_deleted_pixels_agree_with_granules(band, lines, samples, zones):
+    """Rows of a scan and their remaining columns in granules (CoastWatch, VIIRSBowtieFilter)."""
     expected = np.zeros((lines, samples), bool)
     for rows, first, last in zones:
         expected[list(rows), :first] = expected[list(rows), last:] = True
@@ -200,7 +200,7 @@ def test_lines_deleted_on_board_are_those_of_granules(band, lines, samples, zone
     np.testing.assert_array_equal(pattern.is_deleted(line, sample), expected)
 
 
-def test_a_pushbroom_and_a_single_detector_sweep_one_line():
+def test_pushbroom_and_single_detector_sweep_one_line():
     for name in ("OLI", "MSI", "AVHRR"):
         item = instrument(name)
         pattern = item.scan_pattern(item.bands[0])
@@ -208,8 +208,8 @@ def test_a_pushbroom_and_a_single_detector_sweep_one_line():
     assert not ScanPattern(1e-3, 1e-3).is_deleted(np.arange(3)[:, None], np.arange(2)).any()
 
 
-def test_sums_of_samples_add_their_variances():
-    """The variance of a sum is the variance of one sample plus the variance of the places, (n^2 - 1) d^2 / 12."""
+def test_variance_of_aggregated_samples():
+    """The variance is the variance of one sample plus the variance of the positions, (n^2 - 1) d^2 / 12."""
     x = np.linspace(-1500, 1500, 60_001)
     for count in (1, 2, 3):
         spread = AggregatedSpread(GaussianSpread(150.0), count, 128.0)
@@ -223,8 +223,8 @@ def test_sums_of_samples_add_their_variances():
 
 
 @pytest.mark.parametrize(("name", "sample"), [("I1", 0.35), ("M5", 0.25)])
-def test_blur_of_viirs_is_that_of_one_sample_before_aggregation(name, sample):
-    """Half a cycle per sum of n samples: the sample passes m^(1 / n^2), the sum 1 / (n sin(pi / 2 n))."""
+def test_viirs_mtf_is_sample_mtf_times_aggregation(name, sample):
+    """At 0.5 cycles per n samples, a sample passes m^(1 / n^2) and the sum of samples 1 / (n sin(pi / 2 n))."""
     item = instrument("VIIRS")
     (band,) = item.select(name)
     step = item.ground_intervals(band).across / 3
@@ -237,7 +237,7 @@ def test_blur_of_viirs_is_that_of_one_sample_before_aggregation(name, sample):
     assert float(spread.along.mtf(0.5 / item.ground_intervals(band).along)) == pytest.approx(0.42, rel=1e-9)
 
 
-# ------------------------------------------------------------------------------------------ turned footprints
+# ------------------------------------------------------------------------------------------ rotated footprints
 
 
 N = 60
@@ -245,7 +245,7 @@ CELL = 10 / 3
 
 
 def turned(angle, cell=CELL, growth=(1.0, 1.0)):
-    """Steps of a row and a column in a frame that is turned by an angle and grown."""
+    """Steps of a row and a column in a rotated frame, divided by the growth."""
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     return cell * np.array([[c, s], [-s, c]]) / np.array(growth)[:, None]
 
@@ -257,8 +257,8 @@ def weights(angle, along, across, row=30.3, column=28.7, growth=(1.0, 1.0), cell
 
 
 @pytest.mark.parametrize("quarter", [0, 90, 180])
-def test_a_footprint_along_the_grid_is_separable(quarter):
-    """Exactly so, but for the steps of the tables, 1/4096 of the support."""
+def test_footprint_aligned_with_the_grid_is_separable(quarter):
+    """1e-6: steps of the tables, 1/4096 of the support."""
     along, across = CosineSpread(30.32), GaussianSpread(24.0)
     order = (along, across) if quarter % 180 == 0 else (across, along)
     rows, columns = (
@@ -281,8 +281,8 @@ def test_a_footprint_along_the_grid_is_separable(quarter):
     ("along", "across", "growth"),
     [(Boxcar(30.0), CosineSpread(30.32), (1.0, 1.0)), (CosineSpread(30.32), GaussianSpread(20.0), (1.25, 1.36))],
 )
-def test_a_turned_footprint_agrees_with_dense_sums(angle, along, across, growth):
-    """Each cell cut in 24 x 24 points, and densities from differences of the cumulative response."""
+def test_rotated_footprint_agrees_with_dense_sums(angle, along, across, growth):
+    """24 x 24 points per cell, with densities from differences of the cumulative response."""
     fine = 24
     places = (np.arange(N * fine) + 0.5) / fine
     down, right = np.meshgrid(places - 30.3, places - 28.7, indexing="ij")
@@ -294,7 +294,7 @@ def test_a_turned_footprint_agrees_with_dense_sums(angle, along, across, growth)
         dense *= spread.cumulative(x + step / 2) - spread.cumulative(x - step / 2)
     expected = dense.reshape(N, fine, N, fine).sum(axis=(1, 3)) / dense.sum()
     found = weights(angle, along, across, growth=growth)
-    # Pieces that the jump of a response cuts are upright instead of turned.
+    # Sub-cells at a jump of the response are aligned with the grid instead of rotated.
     np.testing.assert_allclose(found, expected, rtol=0, atol=0.04 * expected.max())
     assert np.abs(found - expected).sum() < 0.015
 
@@ -317,7 +317,7 @@ def test_means_are_over_valid_cells():
     assert apply_operator(operator, scene, 0.9)[0, 0] == pytest.approx(weight @ scene[0], rel=1e-12)
 
 
-def test_the_window_holds_the_footprint():
+def test_window_contains_the_footprint():
     pixels = Footprints(np.array([30.3]), np.array([28.7]), turned(33.0)[None], CosineSpread(30.32), Boxcar(30.0))
     rows, columns = pixels.window((N, N))
     whole = footprint_operator(pixels, slice(0, N), slice(0, N)).toarray().reshape(N, N)

@@ -1,4 +1,4 @@
-"""Line spread functions against their definition, and transfer functions of the parts of a system."""
+"""Line spread functions compared with their definition, and transfer functions of system components."""
 
 from itertools import pairwise
 
@@ -20,7 +20,7 @@ from fifesim.sensor.response.spatial import (
     TableSpread,
 )
 
-# A measured table: not symmetric, with a dark lobe.
+# Like a measured table: asymmetric, with negative lobes.
 POSITIONS = (-31.0, -19.0, -12.5, -3.0, 4.0, 11.0, 17.0, 26.0, 38.0)
 VALUES = (0.0, -0.02, 0.31, 0.93, 1.0, 0.7, 0.2, -0.03, 0.0)
 
@@ -29,14 +29,14 @@ SPREADS = {
     "boxcar": (Boxcar(30.0), lambda x: np.where(np.abs(x) <= 15.0, 1.0, 0.0)),
     "gaussian": (GaussianSpread(33.0), lambda x: 2.0 ** (-((2 * x / 33.0) ** 2))),
     "table": (TableSpread(POSITIONS, VALUES), lambda x: np.interp(x, POSITIONS, VALUES, left=0.0, right=0.0)),
-    # A boxcar of 30 m seen through a boxcar of 12 m.
+    # Boxcar of 30 m convolved with a boxcar of 12 m.
     "trapezoid": (
         SystemSpread((Boxcar(30.0), Boxcar(12.0)), truncation=1e-9),
         lambda x: np.clip((21.0 - np.abs(x)) / 12.0, 0.0, 1.0),
     ),
 }
 EACH = pytest.mark.parametrize(("spread", "density"), SPREADS.values(), ids=SPREADS.keys())
-# Kinks of a product are rounded by its table, whose step is 1/128 of its width.
+# The table of a system response has steps of 1/128 of its width, which rounds kinks.
 TOLERANCE = {"trapezoid": 2e-5}
 FINE = 0.02
 
@@ -46,7 +46,7 @@ def tolerance(spread):
 
 
 def mean_of(density, low, high, reach=250.0):
-    """Integral of a normalized density, by quadrature between its kinks."""
+    """Integral of the normalized density, by quadrature between kinks."""
     kinks = sorted({*POSITIONS, -21.0, -9.0, 9.0, 21.0, -15.0, 15.0, -15.16, 15.16, 0.0, low, high, -reach, reach})
 
     def integral(a, b):
@@ -64,7 +64,7 @@ def columns_of(spread, n_cells, cell, pixel=30.315, origin=300.7, n_pixels=6):
 
 
 def image_of(line, spread, cell, **pixels):
-    """A scene of one row, and the centres of its pixels."""
+    """Image of a scene with one row, and the centres of the pixels."""
     row = axis_operator(
         Boxcar(1.0), cell_origin=0.0, cell_size=1.0, n_cells=1, pixel_origin=0.0, pixel_size=1.0, n_pixels=1
     )
@@ -74,8 +74,8 @@ def image_of(line, spread, cell, **pixels):
 
 
 @EACH
-def test_point_returns_the_point_spread(spread, density):
-    """A bright cell of 1 m at many distances from the pixel's centre."""
+def test_point_source_gives_the_line_spread(spread, density):
+    """A bright cell of 1 m at several distances from the pixel centre."""
     for distance in (-24.3, -15.0, -7.7, 0.0, 3.1, 14.9, 22.0):
         line = np.zeros(601)
         line[300] = 1.0
@@ -86,8 +86,8 @@ def test_point_returns_the_point_spread(spread, density):
 
 @EACH
 @pytest.mark.parametrize("period", [47.0, 60.63, 200.0])
-def test_sinusoid_returns_the_modulation_transfer(spread, density, period):
-    """Cells of 2 cm take (pi cell / period)^2 / 3 = 6e-7 from the amplitude."""
+def test_sinusoid_gives_the_modulation_transfer(spread, density, period):
+    """Cells of 2 cm reduce the amplitude by (pi cell / period)^2 / 3 = 6e-7."""
     x = (np.arange(32000) + 0.5) * FINE
     image = {}
     for name, wave in (("even", np.cos), ("odd", np.sin)):
@@ -99,26 +99,26 @@ def test_sinusoid_returns_the_modulation_transfer(spread, density, period):
         np.testing.assert_allclose(image["even"], spread.mtf(1 / period) * np.cos(phase), rtol=0, atol=1e-6)
 
 
-# ------------------------------------------------------------------------------------------ parts of a system
+# ------------------------------------------------------------------------------------------ system components
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.8, 1.0, 1.7])
-def test_aperture_passes_what_it_overlaps_of_itself(nu):
-    """Area that two disks share, moved apart by nu of their diameter; nothing from there on, on either side."""
+def test_diffraction_mtf_is_the_autocorrelation_of_the_aperture(nu):
+    """Overlap of two disks displaced by nu diameters; zero beyond nu = 1, for both signs."""
     overlap = 4 / np.pi * quad(lambda t: np.sqrt(1 - t * t), min(nu, 1), 1)[0]
     for sign in (-1, 1):
         assert float(Diffraction(0.2).mtf(sign * nu * 0.2)) == pytest.approx(overlap, abs=1e-12)
 
 
 @pytest.mark.parametrize("poles", [1, 2, 5])
-def test_electronics_have_the_poles_of_butterworth(poles):
+def test_electronics_mtf_is_a_butterworth_filter(poles):
     frequency = np.array([0.0, 0.01, 0.05, 0.3])
     response = freqs(*butter(poles, 2 * np.pi * 0.05, analog=True), 2 * np.pi * frequency)[1]
     np.testing.assert_allclose(LowPass(0.05, poles).mtf(frequency), np.abs(response), rtol=1e-10)
 
 
 def test_diffraction_agrees_with_the_line_spread_of_the_airy_disk():
-    """Struve's: the line spread of a disk falls off as x^-2, so its tail beyond X is 2 / (pi^3 fc X)."""
+    """The line spread of an Airy disk (Struve) decreases as x^-2: the tail beyond X is 2 / (pi^3 fc X)."""
     cutoff = 0.5
     spread = SystemSpread((Diffraction(cutoff), GaussianSpread(3.0)), truncation=2e-3)
     asymptotic = 4 / (np.pi**3 * cutoff * spread.half_width)
@@ -126,7 +126,7 @@ def test_diffraction_agrees_with_the_line_spread_of_the_airy_disk():
     assert spread.truncated_share <= 2e-3
 
 
-def test_electronics_of_one_pole_spread_as_a_bessel_function():
+def test_one_pole_line_spread_is_a_bessel_function():
     """The transform of [1 + (f / fc)^2]^(-1/2) is 2 fc K0(2 pi fc |x|), here averaged over a detector of 4 m."""
     cutoff = 0.01
     spread = SystemSpread((LowPass(cutoff), Boxcar(4.0)), truncation=1e-7)
@@ -139,8 +139,8 @@ def test_electronics_of_one_pole_spread_as_a_bessel_function():
         assert float(spread.cumulative(x) - spread.cumulative(-x)) == pytest.approx(expected, abs=1e-5)
 
 
-def test_product_passes_what_its_parts_pass():
-    """As they come from detector, smear, optics and electronics of a scanner; the cut takes what it says."""
+def test_system_mtf_is_the_product_of_its_parts():
+    """Optics, detector, smear and electronics of a scanner; the truncated share is at most `truncation`."""
     frequency = np.linspace(0, 1 / 30, 40)
     for truncation in (1e-3, 1e-4):
         spread = SystemSpread((GaussianSpread(12.0), Boxcar(30.0), Boxcar(9.0), LowPass(0.05, 2)), truncation)
@@ -149,7 +149,7 @@ def test_product_passes_what_its_parts_pass():
 
 
 def sampled_contrast(spread, frequency, recorded, cell=10.0, pixel=30.0):
-    """Contrast of a wave that is recorded at the centres of cells and then averaged by a line spread function."""
+    """Contrast of a recorded wave, sampled at cell centres and averaged with a line spread function."""
     cells = 400
     operator = columns_of(spread, cells, cell, pixel, cells * cell / 2 - pixel / 2, n_pixels=1)
     places = (np.arange(cells) + 0.5) * cell - cells * cell / 2
@@ -160,20 +160,20 @@ def sampled_contrast(spread, frequency, recorded, cell=10.0, pixel=30.0):
 
 @pytest.mark.parametrize("frequency", [0.0, 0.004, 1 / 60, 0.03])
 @pytest.mark.parametrize("target", [GaussianSpread(36.0), SystemSpread((Boxcar(30.0), GaussianSpread(12.0)))])
-def test_an_image_of_an_image_has_the_contrast_of_the_second_instrument(frequency, target):
-    """An image in cells of 10 m, averaged by the difference, has the contrast of the target times `left`."""
+def test_resensed_image_has_the_contrast_of_the_target_instrument(frequency, target):
+    """An image with 10 m cells, averaged with the difference, has the contrast of the target times `left`."""
     recorded = GaussianSpread(14.0)
     difference = Difference(target, Mixture((1.0,), ((recorded, Boxcar(10.0)),)), 0.2)
     found = sampled_contrast(SystemSpread((difference,)), frequency, recorded)
     expected = float(difference.left(frequency) * target.mtf(frequency))
-    # A thousandth of the response is cut off, and waves of the cells' own period come in.
+    # 0.1 % of the response is truncated, and cell sampling causes aliasing.
     assert found == pytest.approx(expected, abs=6e-3)
     assert float(difference.left(frequency)) > 0.85
     blurred_twice = sampled_contrast(target, frequency, recorded)
     assert frequency == 0 or abs(blurred_twice - expected) > abs(found - expected)
 
 
-def test_contrast_that_was_not_recorded_is_not_made_up():
+def test_unrecorded_contrast_is_not_amplified():
     recorded = Boxcar(30.0)
     difference = Difference(Boxcar(1.0), recorded, 0.2)
     frequency = np.linspace(0, 0.2, 4001)
@@ -183,8 +183,8 @@ def test_contrast_that_was_not_recorded_is_not_made_up():
     assert np.all(difference.left(frequency) <= 1)
 
 
-def test_a_mixture_is_the_transfer_of_the_sum_of_bands():
-    """Waves of two bands, each by its parts, weighted and added."""
+def test_mixture_mtf_is_the_weighted_sum_of_bands():
+    """The MTF of each band is the product of its parts."""
     mixture = Mixture((1.3, -0.3), ((GaussianSpread(20.0), Boxcar(10.0)), (Boxcar(20.0),)))
     frequency = np.array([0.0, 0.01, 0.04])
     expected = 1.3 * GaussianSpread(20.0).mtf(frequency) * np.sinc(10 * frequency) - 0.3 * np.sinc(20 * frequency)
@@ -202,6 +202,6 @@ def test_a_mixture_is_the_transfer_of_the_sum_of_bands():
         (lambda: SystemSpread((Boxcar(30.0), LowPass(0.1)), truncation=0.2), "it is a share of the response"),
     ],
 )
-def test_a_response_that_is_none_is_refused(make, message):
+def test_invalid_response_raises(make, message):
     with pytest.raises(ValueError, match=message):
         make()

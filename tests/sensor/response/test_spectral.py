@@ -1,4 +1,4 @@
-"""Weights of samples in bands, and the best linear estimate of bands, beside quadrature and least squares."""
+"""Band weights and best linear estimates of bands compared with quadrature and least squares."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ BANDS = [band.response for name in ("OLI", "MSI", "TM") for band in instrument(n
 
 @pytest.fixture(scope="module")
 def spectrum():
-    """A leaf, in steps of 5 to 11 nm that never repeat where responses or the sun have nodes."""
+    """Leaf spectrum in steps of 5 to 11 nm that do not coincide with nodes of the responses or the sun."""
     wavelength, reflectance, _ = leaf_spectrum(Leaf())
     uneven = 0.4 + np.cumsum([0.0, *np.linspace(0.005, 0.0111, 260)])
     uneven = uneven[uneven < 2.5]
@@ -22,7 +22,7 @@ def spectrum():
 
 
 def by_quadrature(band, wavelength, values, sun):
-    """Gauss's rule with five nodes between all places where anything bends, on the interpolated spectrum itself."""
+    """Five-point Gauss quadrature of the interpolated spectrum between all nodes of response, sun and spectrum."""
     x, w = np.polynomial.legendre.leggauss(5)
     low, high = band.limits
     bends = np.concatenate([band.wavelength, wavelength, solar_spectrum()[0], [low, high]])
@@ -34,7 +34,7 @@ def by_quadrature(band, wavelength, values, sun):
 
 
 @pytest.mark.parametrize("sun", [True, False])
-def test_mean_is_the_integral_of_the_straight_spectrum(spectrum, sun):
+def test_band_mean_is_the_integral_of_the_interpolated_spectrum(spectrum, sun):
     wavelength, values = spectrum
     for band in BANDS:
         found = band_weights(band, wavelength, covered_steps(wavelength), sun=sun)
@@ -42,7 +42,7 @@ def test_mean_is_the_integral_of_the_straight_spectrum(spectrum, sun):
         assert found.weights @ values == pytest.approx(by_quadrature(band, wavelength, values, sun), rel=1e-9)
 
 
-def test_flat_spectrum_stays_flat_and_a_band_elsewhere_has_no_weights(spectrum):
+def test_weights_sum_to_one_and_are_zero_outside_the_spectrum(spectrum):
     wavelength, _ = spectrum
     sums = [band_weights(band, wavelength, covered_steps(wavelength)).weights.sum() for band in BANDS]
     np.testing.assert_allclose(sums, 1, rtol=0, atol=1e-12)
@@ -50,19 +50,19 @@ def test_flat_spectrum_stays_flat_and_a_band_elsewhere_has_no_weights(spectrum):
     assert (found.coverage, found.weights.tolist()) == (0.0, [0.0, 0.0])
 
 
-def test_half_a_band_is_half_covered():
+def test_coverage_of_a_partly_sampled_band():
     found = band_weights(TRIANGLE, [0.3, 0.6], [True], sun=False)
     assert found.coverage == pytest.approx(0.5, abs=1e-12)
     assert found.weights.sum() == pytest.approx(1, abs=1e-12)
     np.testing.assert_allclose(found.missing, [(0.6, 0.7)])
 
 
-def test_a_gap_has_no_weight_and_is_named():
+def test_gap_has_no_weight_and_is_reported():
     wavelength = np.round(np.arange(0.45, 0.755, 0.01), 3)
     wavelength = wavelength[(wavelength <= 0.58) | (wavelength >= 0.63)]
     covered = covered_steps(wavelength)
     found = band_weights(TRIANGLE, wavelength, covered, sun=False)
-    # The response's integral from 0.58 to 0.63 um, over 0.1.
+    # Integral of the response from 0.58 to 0.63 um, divided by 0.1.
     assert found.coverage == pytest.approx(1 - (0.02 * 0.9 + 0.03 * 0.85) / 0.1, abs=1e-12)
     np.testing.assert_allclose(found.missing, [(0.58, 0.63)])
     values = np.where(wavelength < 0.6, 0.1, 0.5)
@@ -81,12 +81,12 @@ def test_a_gap_has_no_weight_and_is_named():
         ([0.50, 0.51, 0.53], [0.009, 0.011, 0.009], [True, True]),
     ],
 )
-def test_steps_that_are_gaps(wavelength, fwhm, covered):
+def test_covered_steps_detects_gaps(wavelength, fwhm, covered):
     assert covered_steps(wavelength, fwhm).tolist() == covered
 
 
 def test_means_agree_with_spectral_python():
-    """SPy takes a band for a Gaussian cut off at half its maximum, and a spectrum for steps of one sample each."""
+    """SPy uses a Gaussian response truncated at half maximum, and a spectrum that is constant around each sample."""
     spectral = pytest.importorskip("spectral")
     wavelength, values, _ = leaf_spectrum(Leaf())
     for center, width in ((0.56, 0.06), (0.70, 0.04), (0.842, 0.115), (1.61, 0.09), (2.19, 0.18)):
@@ -100,15 +100,15 @@ def test_means_agree_with_spectral_python():
 # ------------------------------------------------------------------------------------------ other bands
 
 
-def test_error_is_that_of_fits_without_each_leaf():
-    """Few leaves of few library, so that each has much influence, fitted again without each of them."""
+def test_error_equals_explicit_leave_one_out():
+    """The library is small, so that each leaf has much influence; the fit is repeated without each leaf."""
     random = np.random.Generator(np.random.Philox(5))
     source, target = random.uniform(0.05, 0.5, (7, 3, 2)), random.uniform(0.05, 0.5, (7, 3, 2))
     uncertainty, grey = 0.02, np.sqrt(21 * GREY_SHARE) * GREY
     found = best_linear(source, target, uncertainty)
 
     def fitted(leaves):
-        # Rows of least squares: library, the grey surfaces, and the uncertainty of each band.
+        # Rows of the least-squares system: library, grey surfaces, uncertainty of each band.
         left = np.vstack([source[leaves].reshape(-1, 2), [[grey] * 2], np.sqrt(21) * uncertainty * np.eye(2)])
         right = np.vstack([target[leaves].reshape(-1, 2), [[grey] * 2], np.zeros((2, 2))])
         return np.linalg.lstsq(left, right, rcond=None)[0].T
@@ -120,7 +120,7 @@ def test_error_is_that_of_fits_without_each_leaf():
     np.testing.assert_allclose(found.error**2, expected, rtol=1e-10)
 
 
-def test_line_is_that_of_a_fit():
+def test_line_between_equals_polyfit():
     random = np.random.Generator(np.random.Philox(6))
     source = random.uniform(0, 0.5, 300)
     target = 0.9 * source + 0.01 + 0.02 * random.standard_normal(300)
