@@ -266,7 +266,7 @@ def minnaert_exponent(reflectance, cos_i):
 
 def c_factor(at_view, at_target):
     r"""
-    Factor that brings a reflectance from its own directions to others.
+    Factor that converts a reflectance from its view direction to a target direction.
 
     .. math:: c = R(\Omega_\mathrm{target}) / R(\Omega_\mathrm{view})
 

@@ -16,7 +16,7 @@ from fifesim.grids import grid as grids
 from fifesim.grids.grid import with_crs_of
 from fifesim.grids.inputs import MASKS_TOO
 
-# The kernel of each index, and the bands that it takes. Names are those of the spyndex catalogue.
+# Kernel of each index, and its bands. Names are from the spyndex catalogue.
 INDICES = {
     "NDVI": (indices.normalized_difference, (NEAR_INFRARED, RED)),
     "EVI": (indices.enhanced, (NEAR_INFRARED, RED, BLUE)),

@@ -21,11 +21,11 @@ class Regression:
     Attributes
     ----------
     slope, intercept : float
-        Of the line.
+        Slope and intercept of the line.
     r2 : float
         Fraction of the variance of y explained by the line. [1]
     n : int
-        Pairs used.
+        Number of pairs.
     residual_deviation : float
         Standard deviation of y about the line, with n - 2 degrees of freedom.
     x_mean, x_sum_of_squares : float

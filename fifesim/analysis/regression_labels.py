@@ -17,11 +17,12 @@ from fifesim.grids import grid as grids
 from fifesim.grids.grid import with_crs_of
 from fifesim.grids.reductions import computed, extremes, sums_by_row
 
-# Numbers by which files mark missing data and which no quantity here takes, and a bound that all of them keep.
+# Fill values of files, which are no valid values of any quantity here, and a bound for valid values.
 _FILLS = (-999.0, -9999.0, -99999.0, -32768.0, 65535.0)
 _LARGEST = 1e15
 
-# Pixels that count as one size: those of scanners drift against a grid by some percent, and may be oblong.
+# Largest ratio of pixel sizes that count as equal: scanner pixels drift against a grid by some percent, and may be
+# oblong.
 _SAME_PIXEL = 2.0
 
 
@@ -322,7 +323,7 @@ def invert(
         found[name] = chunks.pointwise(_limit, ndvi, fit=fit, allowed=allowed, end=end, level=level)
     for name, values in found.items():
         found[name] = cf.label(swaths.placed_as(values, ndvi), quantity, source=ndvi, history=line).rename(name)
-        # A standard name says that the values are the quantity, which the ends of an interval are not.
+        # The ends of an interval are not the quantity itself, so they have no standard name.
         if name in _LIMITS:
             found[name].attrs.pop("standard_name", None)
             found[name].attrs["long_name"] += f", {name} end of the {100 * level:g} % prediction interval"

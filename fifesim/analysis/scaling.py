@@ -134,15 +134,15 @@ LAG_SUMS = 6
 
 def lag_sums(cells, margin, reach, origin=0.0):
     """Sums by lag over pairs of cells, the first in the block and the second possibly in the margin, by FFT."""
-    # Rows of the result: 1, first value, second value, product, squares of both. Sums of blocks add up to those of the
-    # raster.
+    # Rows of the result: 1, first value, second value, product, squares of both. Sums over blocks add up to the sums
+    # over the raster.
     values = np.asarray(cells, float) - origin
     valid = np.isfinite(values)
     values = np.where(valid, values, 0.0)
     inside = tuple(slice(before, size - after) for (before, after), size in zip(margin, values.shape, strict=True))
     first = np.zeros(valid.shape, bool)
     first[inside] = valid[inside]
-    # Twice the reach apart nothing wraps round.
+    # A padding of twice the reach prevents wrap-around.
     shape = tuple(fft.next_fast_len(size + each, real=True) for size, each in zip(values.shape, reach, strict=True))
     factors = 1.0, values, values**2
     one, one_z, one_zz = (fft.rfft2(first * factor, shape) for factor in factors)
@@ -150,7 +150,7 @@ def lag_sums(cells, margin, reach, origin=0.0):
     pairs = (one, two), (one_z, two), (one, two_z), (one_z, two_z), (one_zz, two), (one, two_zz)
     rows, columns = np.arange(reach[0] + 1), np.arange(-reach[1], reach[1] + 1)
     sums = np.stack([fft.irfft2(np.conj(a) * b, shape)[np.ix_(rows, columns)] for a, b in pairs])
-    # Counts are whole.
+    # Counts are whole numbers.
     sums[0] = np.rint(sums[0])
     return sums
 
@@ -187,7 +187,7 @@ def semivariance(sums):
     count, _, _, product, first_square, second_square = sums
     with np.errstate(divide="ignore", invalid="ignore"):
         squares = (first_square + second_square - 2.0 * product) / (2.0 * count)
-    # Rounding of the transform may leave a difference of nothing below zero.
+    # Rounding of the transform may make a difference of zero negative.
     return np.where(count > 0, np.maximum(squares, 0.0), np.nan)
 
 
@@ -241,7 +241,7 @@ def footprint_variance(covariance, down, across):
     [Jupp1988]_; [Chiles2012]_, Section 2.4
     """
     half = len(down) // 2
-    # The footprint's own products are even: each lag down stands for the one up, too.
+    # Products of the footprint are even, so each downward lag also stands for the upward lag.
     rows = down[half:] * np.where(np.arange(half + 1) == 0, 1.0, 2.0)
     used = np.outer(rows, across)
     return float(np.sum(np.where(used != 0, used * covariance, 0.0)))
@@ -262,7 +262,7 @@ def silverman_bandwidth(deviation, interquartile_range, n):
     deviation, interquartile_range : float
         Standard deviation and interquartile range of the samples.
     n : float
-        How many.
+        Number of samples.
 
     Returns
     -------
@@ -375,7 +375,7 @@ def shapley(values, causes):
     shares = []
     for cause in range(causes):
         added = np.diff(values, axis=cause).squeeze(axis=cause)
-        # Number of other causes at work in each set.
+        # Number of other causes in each set.
         others = np.indices((2,) * (causes - 1)).sum(axis=0)
         weights = np.array([factorial(n) * factorial(causes - n - 1) / factorial(causes) for n in range(causes)])
         shares.append(np.tensordot(weights[others], added, axes=causes - 1))

@@ -36,7 +36,7 @@ def aggregate_blocks(array, pixel=30.0, *, min_valid=0.98, lsf=None):
 # Bins of the histogram that stands for the values of a raster: 1/2000 of their range is far less than a bandwidth.
 _BINS = 2000
 
-# Quantities whose density is reflected at zero, by name and standard name: they cannot be less, and are often near.
+# Quantities whose density is reflected at zero, by name and standard name: not negative, and often near zero.
 _AT_LEAST_ZERO = {"lai", "fpar"} | {cf.QUANTITIES[name].standard_name for name in ("lai", "fpar")}
 
 # Blocks of values that are counted together. [cell]
@@ -320,7 +320,7 @@ def density(
     array = sound_cells(array)
     low, high = extremes(array)
     if reflect is None:
-        # A difference of two leaf areas keeps their name.
+        # The difference of two LAI rasters keeps the name, but may be negative.
         reflect = low >= 0 and bool({array.name, array.attrs.get("standard_name")} & _AT_LEAST_ZERO)
     if not high > low:
         raise ValueError(f"a density needs values that vary, got {low:g} to {high:g}")

@@ -20,7 +20,7 @@ from fifesim.grids.reductions import computed, sums_by_row
 _BINS = 10
 _LANDSCAPE = "landscape"
 
-# Sums of a group before those of levels: count, error, squared error, CRPS.
+# Sums of a group that precede the sums of levels: count, error, squared error, CRPS.
 _FIXED = 4
 
 By = Annotated[
@@ -194,7 +194,7 @@ def inversion_error(estimate: RasterOrDataset, truth: xr.DataArray, *, pair: Pai
                 f"an estimate has one variable with low and high, as invert gives it, got {list(estimate.data_vars)}: "
                 "give a single map as a DataArray"
             )
-        # The level has no part in the coverage.
+        # The coverage does not depend on the level.
         estimate = estimate if "level" in estimate.coords else estimate.assign_coords(level=0.5)
     found = score(estimate, truth, pair=pair)
     error = {name: found[name].item() for name in ("bias", "rmse", "n")}

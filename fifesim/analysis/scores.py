@@ -18,7 +18,7 @@ def normal_crps(mean, sd, truth):
     Parameters
     ----------
     mean, sd : array
-        Of the estimate. Without spread the score is the absolute error.
+        Mean and standard deviation of the estimate. Without spread, the score is the absolute error.
     truth : array
 
     Returns

@@ -28,7 +28,7 @@ from fifesim.scenario.scenario import Scenario
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.provenance import origin_text
 
-# As a page reads them: bytes, pairs of bytes with all low ones first, and numbers of four or eight bytes.
+# Storage in a page: bytes, pairs of bytes with all low bytes first, and numbers of four or eight bytes.
 _KINDS = {np.dtype("u1"): "u1", np.dtype("u2"): "u2", np.dtype("f4"): "f4", np.dtype("f8"): "f8"}
 _ALIGNED = 8
 # Number of quantization steps; 0 is no data.
@@ -311,7 +311,7 @@ def explore(scenario: Scenario | None = None, path: FilePath = "explore.html", *
     sweep = sweep_of(scenario)
     html = explorer_page(sweep, outcomes_of(sweep, lambda settings: steps(settings, "simulating")))
     path.parent.mkdir(parents=True, exist_ok=True)
-    # The file appears under its name when it is whole.
+    # The file appears under its final name only when it is complete.
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
         whole = Path(folder) / path.name
         whole.write_text(html, encoding="utf-8")

@@ -165,7 +165,7 @@ def _instruments(sweep):
         try:
             size = sweep.at(replace(first, instrument=name)).sensor.size
         except ValueError:
-            # Leaves that are known in the bands of another, or pixels below a cell.
+            # Leaf optics for the bands of another instrument, or pixels smaller than a cell.
             if name == own:
                 raise
             continue

@@ -13,7 +13,7 @@ from fifesim.models.weather import in_range
 
 STEFAN_BOLTZMANN = 5.67e-8  # [W m-2 K-4]
 PRIESTLEY_TAYLOR = 1.26  # [1]
-HEAT_CAPACITY = 1013.0  # of air at constant pressure [J kg-1 K-1], as MOD16 has it
+HEAT_CAPACITY = 1013.0  # of air at constant pressure [J kg-1 K-1], value of MOD16
 WATER_PER_AIR = 0.622  # ratio of the molecular masses of water and dry air [1]
 
 

@@ -100,7 +100,7 @@ class Retrieval:
 
     @property
     def diagnostics(self) -> tuple[str, ...]:
-        """Names of further layers of the estimates, a tuple of str: those of optimal estimation."""
+        """Names of further layers of the estimates, a tuple of str; only optimal estimation has any."""
         return methods.diagnostics_of(self.tables)
 
     def estimate(self, reflectance: np.ndarray, angles: np.ndarray) -> Estimated:

@@ -212,7 +212,7 @@ def optimal_estimation(
         at = active[better]
         state[at], modelled[at], slope[at], cost[at] = tried[better], values[better], slopes[better], found[better]
         damping[active] = np.where(better, damping[active] * _LESS_DAMPING, damping[active] * _MORE_DAMPING)
-        # Where no step lowers the cost any more, rounding is reached.
+        # If no step lowers the cost, the solution is exact to rounding.
         converged[active] = (length < tolerance) & (better | (damping[active] > 1))
         active = active[~converged[active] & (damping[active] < _LARGEST_DAMPING)]
     inverse = np.swapaxes(slope, 1, 2) @ weight @ slope + sharpness

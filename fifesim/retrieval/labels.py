@@ -52,12 +52,12 @@ def retrieve(image: xr.DataArray, retrieval: RetrievalLike, intervals: Sequence[
     ----------
     image : xarray.DataArray, dims (band, y, x)
         Reflectance, at the level for which the retrieval was trained, with the coordinates ``sza``, ``saa``, ``vza``
-        and ``vaa``, as images of `sense`, `open_landsat` and `open_sentinel2` have them. [1]
+        and ``vaa``, as in images of `sense`, `open_landsat` and `open_sentinel2`. [1]
     retrieval : Retrieval or "sl2p"
         From `train` or `read_retrieval`; or the networks of ESA's Level-2 prototype processor for surface reflectance
         of Sentinel-2, which have no intervals.
     intervals : sequence of float, optional
-        Levels of the central intervals, some of those of the training; by default all. [1]
+        Levels of the central intervals, a subset of the training levels; by default all. [1]
 
     Returns
     -------
@@ -239,7 +239,7 @@ def _layer(found, at, image, name, history, what=""):
     """One layer of the result."""
     values = cf.label(swaths.placed_as(found.isel(band=at), image), name, source=image, history=history)
     if what:
-        # A standard name says that the values are the quantity itself.
+        # Only values of the quantity itself have a standard name.
         values.attrs.pop("standard_name", None)
         values.attrs["long_name"] = f"{values.attrs['long_name']}, {what}"
     return values

@@ -86,7 +86,7 @@ def by_line(tables, reflectance, angles, levels):
     return Estimates(np.stack(middle, 1), np.stack(spread, 1), np.moveaxis(np.array(quantiles), 2, 0))
 
 
-# Least number of pixels of a chip by which the error within it is known, and largest number of members.
+# Minimum number of pixels of a chip to estimate the error within it, and maximum number of members.
 _FEWEST_PIXELS = 9
 _MEMBERS = 20_000
 
@@ -175,14 +175,14 @@ def by_quantiles(tables, reflectance, angles, levels):
 
 def fit_optimal_estimation(pixels, study, states, level, bands, quantities):
     """Tables of reflectance and quantities, and the prior and the covariance of the error."""
-    # The truth of the pixels are the unknowns.
+    # The unknowns are the truth of the pixels.
     axes, angles = axes_of(pixels.truth, states, pixels.angles), pixels.angles.mean(0)
     light, values = simulated_tables(study, level, bands, quantities, axes, angles)
     found = {f"axis_{name}": np.array(ends) for name, ends in axes.items()}
     modelled = np.empty_like(pixels.reflectance)
     for part in _parts(len(modelled)):
         modelled[part] = interpolated(light, _axes(found), pixels.truth[part], _given(found, pixels.angles[part]))[0]
-    # Noise, blur, registration, variation within pixels and properties that are no unknowns.
+    # Noise, blur, registration, variation within pixels and properties that are not unknowns.
     rest = pixels.reflectance - modelled
     light[(0,) * len(axes)] += rest.mean(0)
     error, prior = (np.atleast_2d(np.cov(each.T)) for each in (rest, pixels.truth))

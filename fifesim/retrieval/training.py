@@ -1,4 +1,4 @@
-"""Training of a retrieval from a study or a dataset of chips: of the chain, of uniform ground, or corrected."""
+"""Training of a retrieval from a study or a dataset of chips: pixels of the chain, of uniform ground, or corrected."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def train(
     ------
     ValueError
         If the dataset lacks bands, quantities, its study or one of the parts train, validation and test, or has no
-        valid pixel; or if optimal estimation or uniform pixels are wanted for a landscape of several classes.
+        valid pixel; or if optimal estimation or uniform pixels are requested for a landscape of several classes.
 
     See Also
     --------
@@ -247,7 +247,7 @@ def _score(retrieval, pixels):
     return xr.concat(scores, xr.DataArray(list(retrieval.quantities), dims="quantity", name="quantity"))
 
 
-# Training pixels that are used, more do not improve a network of this size, and pixels of the other parts.
+# Number of training pixels (more do not improve a network of this size), and of pixels of the other parts.
 _PIXELS, _UNSEEN = 100_000, 20_000
 
 

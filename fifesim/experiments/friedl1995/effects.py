@@ -44,9 +44,9 @@ def readings_for(case):
 
 def sizes(case, seeds, each=iter):
     """Agreement with the paper by scene size, as a table."""
-    # The larger the scene, the farther are the last native pixels from their blocks.
+    # In larger scenes, the last native pixels drift farther from their blocks.
     rows = []
-    # A size that is too small for a regression is left out.
+    # Sizes that are too small for a regression are omitted.
     all_cells = (round(size / friedl1995.CELLS * case.cells) for size in SIZES)
     for cells in each(tuple(number for number in all_cells if number >= case.fewest_cells)):
         found = friedl1995_table.realise_scenes(replace(case, cells=cells), seeds).isel(reading=0)
@@ -103,13 +103,13 @@ def changes(case):
     if case.own_densities:
         for name, after, keys in (
             ("mean LAI", "each + 0.1", {"shift": 0.1}),
-            ("standard deviation of LAI", "each less a tenth", {"factor": 0.9}),
+            ("standard deviation of LAI", "each times 0.9", {"factor": 0.9}),
             ("bounds of LAI", "3 standard deviations from the mean", {"bound": 0.25}),
         ):
-            found.append(Change(name, "the table's", after, replace(case, densities=shifted_densities(**keys))))
+            found.append(Change(name, "default", after, replace(case, densities=shifted_densities(**keys))))
     bits = case.instrument.bits
     if bits < 16:
-        found.append(Change("radiometric bits", f"{bits}", "16, next to no quantisation", replace(case, bits=16)))
+        found.append(Change("radiometric bits", f"{bits}", "16, almost no quantisation", replace(case, bits=16)))
     return found
 
 
@@ -153,8 +153,8 @@ def _background_changes(case):
 FITTED = "fitted to Table 2"
 
 # Tolerances: description, and limits for LAI and for FPAR. They were set after trials with nearly the present inputs
-# and reading, before the nine scenes were first run, in view of how samples of 200 pixels scatter; `limits` states how
-# many of their standard deviations each is.
+# and reading, but before the nine scenes were first run. `limits` states them in standard deviations of samples of 200
+# pixels.
 _WANTED = {
     "r2_largest": ("R² of {}, largest difference of nine rows", 0.12, 0.12),
     "r2_largest_long": ("R² of {}, largest difference at arp 0.24", 0.08, 0.08),

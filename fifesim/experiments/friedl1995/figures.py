@@ -14,7 +14,7 @@ from fifesim.base.arguments import Kind
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import ALIGNED, NATIVE, VARIABLES
 
-# Okabe and Ito's colours, which the colour-blind tell apart; dashes and markers tell them apart in grey.
+# Colours of Okabe and Ito, suitable for colour-blind readers; dashes and markers differ in grey too.
 _COLORS = ("#0072B2", "#D55E00", "#009E73")
 _DASHES = ("-", "--", ":")
 _BLACK, _GREY = "#222222", "#767676"
@@ -114,7 +114,7 @@ def table2_figure(tables):
 
 
 def sample(found, reading, arp):
-    """Sample of 200 pixels of one of the scenes shown, by name, shape (n,)."""
+    """Sample of 200 pixels of a scene of the figures, by name, shape (n,)."""
     scene = found.sel(reading=reading, arp=arp)
     chosen = scene["sampled"].values.astype(bool)
     return {name[6:]: scene[name].values[chosen] for name in scene.data_vars if str(name).startswith("pixel_")}
@@ -184,7 +184,7 @@ def _figure6(found, reading):
     first = found["arp"].values[0]
     for axis, variable in zip(figure.subplots(1, 3), (*VARIABLES, "ndvi"), strict=True):
         cells = found[f"cell_{variable}"].isel(arp=-1).values.ravel()
-        # Leaf area and FPAR are not negative, and dense near zero.
+        # LAI and FPAR are not negative and have high densities near zero.
         options = {"reflect": variable != "ndvi"}
         at = np.linspace(cells.min(), cells.max(), 500)
         counts, edges = np.histogram(cells, bins=400)
@@ -197,7 +197,7 @@ def _figure6(found, reading):
             axis.plot(at, of_pixels, dash, color=color, label=f"pixels, arp {arp:g}")
             if variable == "ndvi":
                 smooth = scaling.sample_density(values["analogue_ndvi"], at)
-                axis.plot(at, smooth, color=_GREY, linewidth=0.9, label="before digitising" if arp == first else None)
+                axis.plot(at, smooth, color=_GREY, linewidth=0.9, label="before quantisation" if arp == first else None)
         unit = " [m² m⁻²]⁻¹" if variable == "lai" else ""
         _finish(axis, xlabel=_LABELS[variable], ylabel=f"density {unit}", ylim=(0, None))
     _legend_below(figure, figure.axes[-1])

@@ -55,7 +55,7 @@ def shown_scenes(case, readings, seed, each=iter):
 def densities(case):
     """Densities of leaf area of the three treatments, dims (distribution, leaf_area), NaN outside of the support."""
     known = {name: lai_distribution(case.densities[name]) for name in treatments()}
-    # Quantiles beyond have a ten-thousandth of the cells.
+    # Only 1e-4 of the cells have larger values.
     high = max(float(each.ppf(1 - 1e-4)) for each in known.values())
     at = np.linspace(0.0, high * 1.02, _POINTS)
     values = [np.where((at >= each.support()[0]) & (at <= each.support()[1]), each.pdf(at), np.nan)
@@ -201,7 +201,7 @@ def reproduce_case(case, realisations, seed, each=lambda label: iter):
     out = found.merge(scenes).merge(_paper()).assign(density=densities(case))
     out = out.assign_coords(text=("reading", [reading.in_words(case.interval, case.pixel) for reading in pair]))
     return out.assign_attrs(
-        title="Friedl et al. (1995), repeated", sensor=case.instrument.name, dem=case.dem, cells=case.cells,
+        title="Friedl et al. (1995), reproduced", sensor=case.instrument.name, dem=case.dem, cells=case.cells,
         seed=str(seed), drift=case.drift, pixel=case.pixel, cell=friedl1995.CELL,
         references="Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5",
     )  # fmt: skip
@@ -235,7 +235,7 @@ def write_scenarios(case, folder, seed, scenes=False, each=iter):
                 found, own, f"{treatment}, arp {arp:g}, seen by {case.instrument.name}"
             )
     if items:
-        stac.write_collection(folder, "friedl1995", "The nine scenes of Friedl et al. (1995), repeated.", items)
+        stac.write_collection(folder, "friedl1995", "The nine scenes of Friedl et al. (1995), reproduced.", items)
 
 
 def scenario_text(case, own, treatment, arp, seed):

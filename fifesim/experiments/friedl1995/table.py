@@ -142,7 +142,7 @@ def agreement(table):
 
 
 def text_table(found):
-    """Mean noise and range kept of the burned, grazed scenes, compared with the published values."""
+    """Mean noise and relative range of the burned, grazed scenes, compared with the published values."""
     paper = friedl1995.paper_text().set_index(["quantity", "variable", "arp"])["value"]
     shown = found.sel(distribution=treatments()[0])
     rows = []

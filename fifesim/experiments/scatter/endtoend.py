@@ -90,7 +90,7 @@ def error_chart(table, target):
     labels = {"bias": f"bias [% of the mean {_word(target)}]", "variance": "variance [% of the total variance]"}
     for axis, (kind, label) in zip(axes, labels.items(), strict=True):
         share, error = (rows[name].to_numpy(float) for name in (kind, f"{kind}_error"))
-        draw_bars(axis, np.arange(len(rows)), share, error, 0.6, "cannot be switched off", color=_COLOURS[kind])
+        draw_bars(axis, np.arange(len(rows)), share, error, 0.6, "cannot be made ideal", color=_COLOURS[kind])
         finish_bars(axis, rows["stage"], label)
     return figure
 

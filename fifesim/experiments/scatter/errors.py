@@ -93,7 +93,7 @@ def _arguments(function, name):
 
 
 def fixed_stages(retrieval):
-    """Stages that cannot be switched off, with the reason."""
+    """Stages that cannot be ideal, with the reasons."""
     if not isinstance(retrieval, Retrieval):
         return {}
     found = {"NDVI scaling": "the retrieval takes reflectance, not NDVI"}

@@ -21,7 +21,7 @@ from fifesim.sensor.description.provenance import DASH, origins_in_words
 
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
 
-# Okabe and Ito's colours, which the colour-blind tell apart; hatches tell them apart in grey.
+# Colours of Okabe and Ito, suitable for colour-blind readers; hatches differ in grey too.
 _STYLES = {"lai": ("#0072B2", ""), "fpar": ("#E69F00", "////")}
 
 # The three mechanisms discussed in the paper, and further ones.
@@ -65,7 +65,7 @@ def draw_bars(axis, at, share, error, height, missing, **style):
             axis.barh(y, longest, height, color="none", edgecolor="#999999", hatch="xxxx", linewidth=0)
         # A stage without any effect is already ideal.
         text = missing if np.isnan(value) else "0" if value == 0 else fixed(value, 1)
-        # Beyond the end of bar and whisker.
+        # Place the text beyond the end of bar and whisker.
         end = longest if np.isnan(value) else max(value + spread, 0)
         axis.annotate(text, (end, y), (5, 0), textcoords="offset points", va="center", fontsize=7)
 

@@ -84,12 +84,12 @@ def budget(
         function of arrays of LAI, or of LAI and FPAR. FPAR is the light that green leaves absorb.
     retrieval : "line" or Retrieval, optional
         The regression line of the true leaf area on NDVI, fitted for each set of stages; or a retrieval from
-        `fifesim.train`, which estimates LAI from reflectance. Stages that it needs cannot be switched off: their shares
+        `fifesim.train`, which estimates LAI from reflectance. Stages that it needs cannot be made ideal: their shares
         are NaN, and the coordinate ``reason`` states why.
     weather : Weather, optional
         Numbers for the models; by default `fife_weather`, which is assumed.
     realisations : int, optional
-        Number of realisations. Each has its own seeds and, if possible, its own window of the grid. For a LAI map, the
+        Number of realisations, with different seeds and, if possible, different windows of the grid. For a LAI map, the
         number of windows is the maximum.
     cells : int, optional
         Cells along the edge of a window; the whole grid if it is smaller.
@@ -161,7 +161,7 @@ def budget(
 
 
 def _labelled(found, target, retrieval):
-    """Bias and variance of the realisations with their units, and the reason of stages that cannot be switched off."""
+    """Bias and variance of the realisations with their units, and the reasons for stages that cannot be ideal."""
     made = xr.concat(found, "realisation")
     squared = f"({target.units})2" if target.units else ""
     for name, values in made.data_vars.items():
@@ -275,7 +275,7 @@ def standard_error(values):
 
 
 def unexplained(truth, ndvi):
-    """Unexplained share of the variance of a truth on its line on NDVI, 1 - R2, shape (...). [1]"""
+    """Share of the variance of a truth not explained by a line on NDVI, 1 - R2, shape (...). [1]"""
     truth = truth - truth.mean(axis=-1, keepdims=True)
     ndvi = ndvi - ndvi.mean(axis=-1, keepdims=True)
     of_truth, of_ndvi = (truth**2).sum(axis=-1), (ndvi**2).sum(axis=-1)

@@ -1,4 +1,4 @@
-"""Images of a scene with any of its stages at their ideal, from the ground to the sensor."""
+"""Images of a scene with any set of stages ideal, from the ground to the sensor."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -62,7 +62,7 @@ def _places(cells, blocks):
     return last, inside[0][:, None] & inside[1]
 
 
-# In this order along the axes of what `stages.pixels` gives.
+# In the order of the axes of `stages.pixels`.
 IDEAL_PROPERTIES = {
     "soil": "uniform brightness and moisture",
     "dead leaves": "uniform fraction of dead leaves",
@@ -158,7 +158,7 @@ def _estimated(scene, reflectance, hazy):
     return median[:, scene.retrieval.quantities.index("lai")].reshape(reflectance.shape[1:])
 
 
-# In this order along the axes of what `pixels` gives.
+# In the order of the axes of `pixels`.
 STAGES = {
     "non-linearity": "reflectance and FPAR are linear in LAI, along the tangent at the mean LAI of the pixel",
     "NDVI scaling": "mean of the NDVI of the cells instead of the NDVI of their mean reflectance",
@@ -256,7 +256,7 @@ def _in_order(images, switches, lit):
 
 @dataclass(frozen=True, eq=False)
 class _Ground:
-    """Properties of the cells, and the mean leaf area [m2 m-2] of the pixel that each cell lies in."""
+    """Properties of the cells, and the mean leaf area [m2 m-2] of the pixel that contains each cell."""
 
     land: xr.Dataset
     middle: np.ndarray
@@ -311,7 +311,7 @@ class _Scene:
         return [cast[name].values for name in COLUMNS], cloud_tables(own.air, tuple(responses), own.setup.geometry)
 
     def is_stand(self, ground):
-        """Whether only leaf area varies, so that plain arrays do."""
+        """Whether only leaf area varies, so that plain arrays suffice."""
         plain = self.setup.slopes == "kt" and not varying_parts(self.driver.setup)
         return plain and set(ground.land.data_vars) == {"lai"}
 

@@ -16,7 +16,7 @@ from fifesim.output.progress import steps
 from fifesim.scenario.distributions import points
 from fifesim.scenario.studies import Study
 
-# Stream of random numbers of the points, after those of chips and landscapes.
+# Stream of random numbers of the points; chips and landscapes use lower numbers.
 _STREAM = 40
 
 

@@ -95,11 +95,11 @@ def _white_noise():
         words = [philox(*_halves(k, i, seed)) for i in range(row, row + 40) for k in range(group, group + 500)]
         one, other = np.reshape(words, (-1, 2)).T
         uniform = (one + 0.5) / 2**32
-        # Within an eighth of a turn by 30 bits, and quarters of it by two.
+        # 30 bits give the angle within an eighth of a turn, and two bits the quarter.
         angle = np.pi / 2 * (other // 4 - 2.0**29) / 2**30
         expected = np.sqrt(-2 * np.log(uniform)) * np.exp(1j * (angle - np.pi / 2 * (other % 4)))
         normals = found.reshape(-1, 2) @ [1, 1j]
-        # A radius below 0.01 is the root of what rounding leaves of u.
+        # Radii below 0.01 are dominated by the rounding error of u.
         clear = np.abs(expected) > 0.01
         worst[0] = np.maximum(worst[0], largest(np.abs(normals - expected)[clear], 0))
         usual = clear & (np.abs(expected) < 2)

@@ -119,7 +119,7 @@ def _once():
         air = Atmosphere(visibility=10.0, altitude=0.0, engine=engine)
         found = once_on_nodes(*(np.array([angle]) for angle in angles), scattered_once(air, (band,)))
         mu_s, mu_v = np.cos(np.radians(angles[:2]))
-        # The closed forms know of no molecules above the aerosol.
+        # The closed forms neglect molecules above the aerosol.
         above = 0.0 if engine == "5S" else float(air.rayleigh_optical_depth(at)[0])
         depth, (_, albedo, _) = float(air.aerosol_optical_depth(at)[0]), aerosol_optics(air.aerosol, at)
         reached, _ = quad(_both_ways, above, above + depth, args=(mu_s, mu_v))
@@ -135,7 +135,7 @@ def _both_ways(depth, mu_s, mu_v):
 CHECKS = (_wigner_functions, _expansions, _polarized, _once)
 
 
-_PATH_WEIGHTS = 0.3, 0.6  # of molecules and aerosol; a tenth is the target's own
+_PATH_WEIGHTS = 0.3, 0.6  # of molecules and aerosol; a tenth is from the target itself
 
 
 def _functions():

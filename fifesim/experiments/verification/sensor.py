@@ -256,7 +256,7 @@ def _bands():
 
 
 def _ndvi_bands():
-    """Check that red and near infrared are the bands that the agencies name so."""
+    """Check that red and near infrared are the bands with these names at the agencies."""
     expected = {"TM": ("TM3", "TM4"), "OLI": ("OLI4", "OLI5"), "MSI": ("MSI4", "MSI8"), "MODIS": ("MODIS1", "MODIS2")}
     wrong = nearest_band([0.5, 0.72], RED) is not None
     for name, pair in expected.items():

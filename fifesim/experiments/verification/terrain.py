@@ -19,7 +19,7 @@ _NEIGHBOURS = [(down, across) for down in (-1, 0, 1) for across in (-1, 0, 1) if
 
 
 def _upsampling():
-    """Check spline upsampling, which loses 2e-4 of waves of six cells, and less of longer ones."""
+    """Check spline upsampling, which loses 2e-4 of waves of six cells, and less of longer waves."""
     rows, columns = np.mgrid[:100, :90]
     y, x = 40 + np.arange(90) / 9, 38 + np.arange(80) / 9
     worst = 0.0

@@ -103,18 +103,18 @@ def test_drift_causes_most_of_the_scatter_of_figure_9(found, caption):
     assert share[1, 1] == pytest.approx(1 - left["aligned"] / left["native"], rel=1e-9)
     assert (share > 0.5).all()
     told = caption(9, "native")
-    low, high = map(int, re.search(r"Most of the scatter about it, (\d+) to (\d+) %", told).groups())
+    low, high = map(int, re.search(r"Most of the scatter about the line, (\d+) to (\d+) %", told).groups())
     assert (low, high) == (round(100 * share.min()), round(100 * share.max()))
     assert "11.0 m" in told and "assumed drift" in told
     assert "Most of" not in caption(9, "aligned")
     for reading in ("native", "aligned"):
-        assert all(f"pixels read as {reading}" in caption(number, reading) for number in (5, 6, 7, 9))
+        assert all(f"{reading} pixels" in caption(number, reading) for number in (5, 6, 7, 9))
 
 
 def test_caption_of_figure_6_counts_the_peaks_due_to_quantisation(caption):
     """In this sample, 8-bit NDVI has more peaks than NDVI before quantisation."""
     text = caption(6, "native")
-    digital, analogue = re.search(r"its curve has (.*?); before digitising \(grey\) (.*?)\.", text).groups()
+    digital, analogue = re.search(r"its density has (.*?); before quantisation \(grey\), it has (.*?)\.", text).groups()
     assert digital != "one peak" and analogue == "one peak"
     one = np.random.default_rng(1).normal(0, 1, 4000)
     assert (figures.peaks(one), figures.peaks(np.concatenate([one, one + 8]))) == (1, 2)

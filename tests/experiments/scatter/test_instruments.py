@@ -92,6 +92,6 @@ def test_command_makes_the_budget_of_an_instrument(tmp_path, monkeypatch):
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "only the detector of MSS5, MSS7 is known" in page
     assert "<td>blur –; noise –; geolocation –</td>" in page
-    assert "leaves out what is unknown of the instrument: registration, noise" in page
+    assert "excludes unknown properties of the instrument: registration, noise" in page
     both = CliRunner().invoke(app, ["budget", "x.toml", "--sensor", "HRV"])
     assert both.exit_code == 2
