@@ -1,4 +1,4 @@
-"""A page in headless Chromium, driven through its DevTools protocol."""
+"""Page in headless Chromium, controlled through the DevTools protocol."""
 
 import asyncio
 import base64
@@ -14,12 +14,12 @@ from tornado.websocket import websocket_connect
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
-# Of windows and answers. [s]
+# Timeout for windows and answers. [s]
 _PATIENCE = 60.0
 
 
 class Page:
-    """A page that is open; errors that it made are in ``errors``."""
+    """Open page; its errors are collected in ``errors``."""
 
     def __init__(self, socket):
         self._socket, self._numbers, self.errors, self.addresses = socket, itertools.count(1), [], []
@@ -94,15 +94,15 @@ class Page:
 @asynccontextmanager
 async def opened(path, folder):
     """
-    A file in a browser of its own, which ends with the context.
+    Open a file in a new browser, which is closed at the end of the context.
 
     Parameters
     ----------
     path : pathlib.Path
     folder : pathlib.Path
-        Empty, for what the browser keeps.
+        Empty folder for the browser profile.
     """
-    # As root, in a container, Chromium has no sandbox.
+    # Chromium needs --no-sandbox for root in a container.
     flags = ["--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0", "--no-first-run"]
     command = [CHROMIUM, *flags, f"--user-data-dir={folder}", "about:blank"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:

@@ -1,4 +1,4 @@
-"""What tests of rasters share."""
+"""Shared fixtures for tests of rasters."""
 
 import os
 
@@ -9,8 +9,8 @@ from lazy import CHUNKS, ODD_CHUNKS, in_chunks
 
 import fifesim
 
-# The same examples in each run. With FIFESIM_DRAWS, the scheduled job draws as many new ones, and prints how to
-# reproduce a failure.
+# Examples are the same in each run. With FIFESIM_DRAWS, the scheduled job draws that many new examples, and prints how
+# to reproduce a failure.
 _COMMON = {"deadline": None, "database": None, "print_blob": True, "suppress_health_check": [HealthCheck.too_slow]}
 settings.register_profile("fixed", derandomize=True, **_COMMON)
 settings.register_profile("random", derandomize=False, **_COMMON)
@@ -19,7 +19,7 @@ settings.load_profile("random" if "FIFESIM_DRAWS" in os.environ else "fixed")
 
 @pytest.fixture(params=[None, CHUNKS, ODD_CHUNKS], ids=["numpy", "chunked", "odd-chunks"])
 def array_type(request):
-    """A function that puts a raster into numpy, into chunks, or into odd chunks."""
+    """Function that returns a raster in memory, in chunks, or in odd chunks."""
     return lambda raster: raster if request.param is None else in_chunks(raster, request.param)
 
 
@@ -31,7 +31,7 @@ def site():
 
 @pytest.fixture(scope="session")
 def lai_values(site):
-    """LAI of the streaming scene on these cells, made once; tests take copies."""
+    """LAI of the streaming scene on `site`, computed once; tests use copies."""
     return fifesim.lai_scene(site, "burned-grazed", arp=0.15, seed=7)
 
 
@@ -58,11 +58,11 @@ def contract_of(site, **chunks):
 
 @pytest.fixture(scope="session")
 def contract():
-    """A function that runs the lines that users write, in order."""
+    """Function that runs the basic chain, from LAI to NDVI."""
     return contract_of
 
 
 @pytest.fixture(scope="session")
 def whole(site):
-    """What they give in memory."""
+    """Results of the basic chain in memory."""
     return contract_of(site)

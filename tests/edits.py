@@ -1,11 +1,11 @@
-"""Copies of a raster file as other programs write them."""
+"""Copies of a raster file as written by other programs."""
 
 import numpy as np
 import rasterio
 
 
 class Copy:
-    """Values and metadata of a file, which an edit changes before they are written again."""
+    """Values and metadata of a file, to be edited and written again."""
 
     def __init__(self, path):
         with rasterio.open(path) as source:
@@ -17,19 +17,19 @@ class Copy:
             self.imagery = [source.tags(number, ns="IMAGERY") for number in source.indexes]
 
     def select(self, bands):
-        """Keep some bands, in another order, as ``gdal_translate -b`` does."""
+        """Select and reorder bands, as ``gdal_translate -b`` does."""
         self.values = self.values[bands]
         for name in ("descriptions", "units", "scales", "offsets", "imagery"):
             setattr(self, name, [getattr(self, name)[band] for band in bands])
 
     def crop(self, rows, columns):
-        """Keep a window, as ``gdal_translate -srcwin`` does, which drops units."""
+        """Crop to a window and drop units, as ``gdal_translate -srcwin`` does."""
         self.values = self.values[:, rows, columns]
         self.transform = self.transform @ rasterio.Affine.translation(columns.start, rows.start)
         self.units = [None] * len(self.units)
 
     def convert(self, dtype):
-        """Change the type, as ``gdal_translate -ot`` does: rounded, clipped, and NaN as 0."""
+        """Convert the data type as ``gdal_translate -ot`` does: round, clip, and set NaN to 0."""
         if np.dtype(dtype).kind == "f":
             self.values = self.values.astype(dtype)
             return

@@ -1,4 +1,4 @@
-"""Elevation models of known surfaces, as files and as labelled rasters."""
+"""Elevation models of analytic surfaces, as files and labelled rasters."""
 
 import numpy as np
 import rasterio
@@ -9,16 +9,16 @@ from oracles_terrain import hills
 import fifesim
 from fifesim.grids import grid as grids
 
-# The corner of the largest square of the Kings Creek model, where real terrain would be.
+# North-west corner of the largest square inside the Kings Creek DEM. [m]
 WEST, NORTH = 708120.0, 4331070.0
 CRS = "EPSG:26914"
 
-# Of `surface`. [m]
+# Amplitude of `surface`. [m]
 AMPLITUDE = 38.0
 
 
 def surface(x, y):
-    """Band-limited hills: waves of 160 to 900 m, six cells of 30 m and more along each axis. [m]"""
+    """Band-limited hills: waves of 160 to 900 m, at least six cells of 30 m along each axis. [m]"""
     u, v = x - WEST, y - NORTH
     waves = [(160, 30, 2.0), (240, 110, 4.0), (500, 200, 12.0), (900, 75, 20.0)]
     angles = [(2 * np.pi / length, np.radians(angle), size) for length, angle, size in waves]
@@ -26,12 +26,12 @@ def surface(x, y):
 
 
 def tilted(x, y):
-    """A plane. [m]"""
+    """Elevation of a plane. [m]"""
     return 400 + 0.1 * (x - WEST) - 0.05 * (y - NORTH)
 
 
 def model(function=surface, cell=30.0, margin=600.0, size=900.0, affine=None, shape=None):
-    """A lattice of point values of a function that reaches past the grid, and its transform."""
+    """Point values of a function on a lattice larger than the grid, and the affine transform of the lattice."""
     affine = affine or Affine(cell, 0, WEST - margin, 0, -cell, NORTH + margin)
     shape = shape or (int((size + 2 * margin) / cell),) * 2
     columns, rows = np.meshgrid(np.arange(shape[1]) + 0.5, np.arange(shape[0]) + 0.5)

@@ -1,4 +1,4 @@
-"""What every raster function owes, whatever it computes."""
+"""Rules for all raster functions: laziness, chunks, labels and georeferencing."""
 
 from contextlib import contextmanager
 
@@ -10,14 +10,14 @@ from affine import Affine
 from fifesim.grids import cf
 from fifesim.grids import grid as grids
 
-# Fewer cells than a pixel has, more than one chunk, and no common factor with pixels of 9 cells.
+# Several chunks, one axis smaller than a pixel, and no common factor with pixels of 9 cells.
 ODD_CHUNKS = {"y": 7, "x": 11}
 CHUNKS = {"y": 27, "x": 36}
 
 
 @contextmanager
 def no_compute():
-    """Fail where something is computed."""
+    """Fail if a dask graph is computed."""
 
     def refuse(graph, keys, **options):
         raise AssertionError("computed before it was asked to")
@@ -28,9 +28,9 @@ def no_compute():
 
 def in_chunks(array, chunks):
     """
-    The array in chunks along those of its dimensions that they name.
+    Chunk an array along its dimensions that `chunks` names.
 
-    Its coordinates stay in memory: wavelengths must be read to find a band. `DataArray.chunk` makes them lazy, too.
+    Coordinates stay in memory, unlike in `DataArray.chunk`, since wavelengths are needed to find a band.
     """
     along = {name: size for name, size in chunks.items() if name in array.dims}
     return array.copy(data=array.variable.chunk(along).data)
@@ -38,10 +38,10 @@ def in_chunks(array, chunks):
 
 def check_raster_function(function, *rasters, quantity):
     """
-    Result of a raster function, once it has been seen to keep its word.
+    Check the rules for raster functions and return the result.
 
-    Inputs stay as they are; chunks give the same bits and nothing early; labels are those of the quantity, and
-    coordinates, CRS and transform say the same.
+    Inputs are not modified. Chunked input gives bitwise equal results, computed lazily. Name and attributes are those
+    of the quantity. Coordinates, CRS and transform are consistent.
     """
     before = [raster.copy(deep=True) for raster in rasters]
     result = function(*rasters)
@@ -60,7 +60,7 @@ def check_raster_function(function, *rasters, quantity):
 
 
 def check_place(raster, crs):
-    """Dimensions, CRS, transform and coordinates of a raster agree with each other."""
+    """Check that dimensions, CRS, transform and coordinates of a raster are consistent."""
     assert raster.dims[-2:] == ("y", "x")
     assert raster.rio.crs == crs
     assert raster.encoding["grid_mapping"] == "spatial_ref"

@@ -1,20 +1,20 @@
-"""Impossible scenarios, studies and inputs of experiments, from tables of JSON lines in `data`."""
+"""Invalid scenarios, studies and inputs of experiments, from JSON Lines files in `data`."""
 
 import json
 from pathlib import Path
 
 
 def lines(name):
-    """Rows of a table of JSON lines."""
+    """Rows of a JSON Lines file."""
     text = (Path(__file__).parent / "data" / f"{name}.jsonl").read_text(encoding="utf-8")
     return [json.loads(line) for line in text.splitlines()[1:]]
 
 
 def mistakes(*stages, name="scenario_mistakes"):
-    """Stage, values and a part of the message of each mistake of some stages."""
+    """Stage, values and part of the error message of each mistake in the given stages."""
     return [each for each in lines(name) if each[0] in stages]
 
 
 def check_message(message, start):
-    """Check that a message begins as it should, prints and is short."""
+    """Check that a message has the given start, is printable and is short."""
     assert message.startswith(start) and message.splitlines()[0].isprintable() and len(message) <= 500

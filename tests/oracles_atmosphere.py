@@ -1,4 +1,4 @@
-"""Slow references for scattering: the Eddington equations integrated numerically, and ground that is not Lambertian."""
+"""Slow references for scattering: numerical Eddington equations, and non-Lambertian ground."""
 
 from typing import NamedTuple
 
@@ -30,7 +30,7 @@ SIEWERT = np.array(
 
 
 def eddington_intensities(tau, albedo, asymmetry, mu_s):
-    """Mean J and net upward H diffuse intensity as functions of depth, sun of flux pi, black surface. [1]"""
+    """Mean (J) and net upward (H) diffuse intensity as functions of depth, for solar flux pi and black surface. [1]"""
 
     def slopes(depth, state):
         mean, net = state
@@ -45,7 +45,7 @@ def eddington_intensities(tau, albedo, asymmetry, mu_s):
 
 
 def sobolev_reflectance(tau, albedo, asymmetry, phase, mu_s, mu_v):
-    """Source function of the Eddington field, with single scattering exact, integrated along the view. [1]"""
+    """Integral along the view of the Eddington source function, with exact single scattering. [1]"""
     field = eddington_intensities(tau, albedo, asymmetry, mu_s)
 
     def emitted(depth):
@@ -57,13 +57,13 @@ def sobolev_reflectance(tau, albedo, asymmetry, phase, mu_s, mu_v):
 
 
 def eddington_flux(tau, albedo, asymmetry, mu_s):
-    """Plane albedo and total transmittance of the flux. [1]"""
+    """Plane albedo and total transmittance from the Eddington fluxes. [1]"""
     field = eddington_intensities(tau, albedo, asymmetry, mu_s)
     return 4 * field(0)[1] / mu_s, np.exp(-tau / mu_s) - 4 * field(tau)[1] / mu_s
 
 
 class Ground(NamedTuple):
-    """Reflectance factors of a ground that is not Lambertian. [1]"""
+    """Reflectance factors of a non-Lambertian ground. [1]"""
 
     directional: object  # function of sza, vza and raa [degree]
     of_skylight: object  # function of vza: isotropic light toward the sensor
@@ -140,7 +140,7 @@ def coupled_reflectance(air, ground, sza, vza, raa):
 
 
 def _panels(edges, nodes):
-    """Gauss points and weights of intervals."""
+    """Gauss points and weights on consecutive intervals."""
     points, weights = leggauss(nodes)
     edges = np.asarray(edges, float)
     half = np.diff(edges)[:, None] / 2
@@ -152,7 +152,7 @@ def _folded(azimuth):
 
 
 def mixed_stokes(atmosphere, wavelength, sza, vza, raa, *, at_ground=False, ground=0.0):
-    """I, Q and U at the top of an atmosphere, or of its sky at the ground, without gases, shape (3, V, R, n)."""
+    """I, Q and U at the top of the atmosphere or of the sky at the ground, without gases, shape (3, V, R, n)."""
     cosine = scattering_angle_cosine(sza, np.asarray(vza, float)[:, None], np.asarray(raa, float))
     cosine = -cosine if at_ground else cosine
     vertical = aerosols.vertical(atmosphere.aerosol)

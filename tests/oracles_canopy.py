@@ -1,4 +1,4 @@
-"""Slow reference for the canopy: leaves one by one, a matrix exponential, and quadrature for the hot spot."""
+"""Slow references for the canopy: sums over leaves, a matrix exponential, and quadrature for the hot spot."""
 
 from itertools import pairwise
 
@@ -8,13 +8,13 @@ from scipy.linalg import expm
 
 
 def leaf_cosines(inclination, zenith, azimuth):
-    """Cosine of the angle between a direction and the normals of leaves at their own azimuths. [1]"""
+    """Cosine of the angle between a direction and the normals of leaves at given azimuths relative to it. [1]"""
     inclination, zenith = np.radians(inclination), np.radians(zenith)
     return np.cos(inclination) * np.cos(zenith) + np.sin(inclination) * np.sin(zenith) * np.cos(azimuth)
 
 
 def turned_leaves(inclination, sza, vza, raa, count=200_000):
-    """Projections and area scattering of leaves of one inclination, averaged over azimuth by the midpoint rule."""
+    """Projections and area scattering coefficients of leaves of one inclination, averaged over azimuth."""
     azimuth = (np.arange(count) + 0.5) * 2 * np.pi / count
     sun = leaf_cosines(inclination, sza, azimuth)
     view = leaf_cosines(inclination, vza, azimuth - np.radians(raa))
@@ -24,7 +24,7 @@ def turned_leaves(inclination, sza, vza, raa, count=200_000):
 
 
 def four_streams(lai, rho, tau, sza, vza, raa, inclination):
-    """Layer of leaves of one inclination: the four-stream equations by a matrix exponential, no hot spot."""
+    """Four-stream solution for leaves of one inclination by a matrix exponential, without hot spot."""
     mu_s, mu_v = np.cos(np.radians([sza, vza]))
     sun, view, reflected, transmitted = turned_leaves(inclination, sza, vza, raa)
     ks, ko, bf = sun / mu_s, view / mu_v, np.cos(np.radians(inclination)) ** 2
@@ -41,7 +41,7 @@ def four_streams(lai, rho, tau, sza, vza, raa, inclination):
         ]
     )
     down = expm(streams * lai)
-    # Unknown are the streams up at the top and down at the bottom; known are those that come in.
+    # Unknown: upward streams at the top and downward streams at the bottom. Known: incoming streams.
     unknown = np.zeros((4, 4))
     unknown[:, :2] = down[:, 2:]
     unknown[0, 2] = unknown[1, 3] = -1
@@ -52,7 +52,7 @@ def four_streams(lai, rho, tau, sza, vza, raa, inclination):
 
 
 def sunlit_and_seen(lai, ks, ko, alpha):
-    """Leaf area that sun and observer both reach, by adaptive quadrature between its own length scales."""
+    """Leaf area that is both sunlit and visible, by adaptive quadrature between its length scales."""
     overlap = (lambda x: x) if alpha == 0 else (lambda x: -np.expm1(-alpha * x) / alpha)
 
     def gap(x):
@@ -64,7 +64,7 @@ def sunlit_and_seen(lai, ks, ko, alpha):
 
 
 def fpar_of_green_leaves(lai, sza, brown, dissociation, crown_cover, fpar_inf, projection=0.5):
-    """FPAR of green leaves of a mean projection: two layers of random crowns, 4SAIL2 of Verhoef and Bach (2007). [1]"""
+    """FPAR of green leaves with a mean projection: two layers of random crowns, Verhoef and Bach (2007). [1]"""
     cosine = np.cos(np.radians(sza))
     extinction, inside = projection / cosine, lai / crown_cover
     above, below = (1 - brown) * inside, brown * inside

@@ -1,4 +1,4 @@
-"""The autoregressive field by its spectrum on a torus."""
+"""Covariance of the autoregressive field from its spectrum on a torus."""
 
 import numpy as np
 
@@ -6,6 +6,6 @@ from fifesim.ground.landscape.autoregression import response
 
 
 def covariances(arp, size=512):
-    """Covariances by lag on a torus, from the two-dimensional spectrum; the torus is many correlation lengths wide."""
+    """Covariances by lag from the two-dimensional spectrum on a torus that is many correlation lengths wide."""
     u = 2 * np.pi * np.fft.fftfreq(size)
     return np.fft.ifft2(response(arp, u[:, None], u) ** 2).real

@@ -1,12 +1,12 @@
-"""Horizon and sky by other routes: marching along rays, and Dozier's integral as it is printed."""
+"""References for horizon and sky view: ray marching, and the published integral of Dozier."""
 
 import numpy as np
 
 
 def march(dem, row, column, cell_y, cell_x, azimuth, reach, step=0.05):
-    """Tangent of the horizon's elevation: bilinear samples at small steps of the distance, one cell."""
+    """Tangent of the horizon elevation at one cell, from bilinear samples in small steps of distance."""
     r = np.arange(1, int(reach / step) + 1) * step
-    # Up to the first line of cells across the ray the ground is the slope itself.
+    # Before the first grid line across the ray, the ground belongs to the local slope.
     down, right = np.cos(np.radians(azimuth)) / cell_y, np.sin(np.radians(azimuth)) / cell_x
     r = r[r >= 1 / max(abs(down), abs(right)) - 1e-9]
     i = row - r * down
@@ -20,7 +20,7 @@ def march(dem, row, column, cell_y, cell_x, azimuth, reach, step=0.05):
 
 
 def dozier(slope, aspect, tangent_of, count=200_000):
-    """Eq. 7b of Dozier and Frew by the midpoint rule; the horizon is a function of azimuth [radian]."""
+    """Eq. 7b of Dozier and Frew by the midpoint rule; `tangent_of` is a function of azimuth [radian]."""
     phi = (np.arange(count) + 0.5) * 2 * np.pi / count
     s, a = np.radians(slope), np.radians(aspect)
     own = np.arctan2(1.0, -np.tan(s) * np.cos(phi - a))  # Eq. 10

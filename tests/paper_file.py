@@ -1,4 +1,4 @@
-"""Instrument file of TM as the paper describes it."""
+"""Instrument file of TM as described in the paper."""
 
 import re
 
@@ -6,7 +6,7 @@ from fifesim.base import files
 
 
 def paper_text():
-    """Text of the TM file with the response of the paper as its only one, without noise."""
+    """Text of the TM file with only the response of the paper and without noise."""
     text = files.path("instruments/tm.toml").read_text(encoding="utf-8")
     text = re.sub(r"(?s)\[lsf\].*?\n\[paper_lsf\]", "[lsf]", text)
     text = re.sub(r"(?m)^(lsf|paper_lsf|noise|blur) = .*\n", "", text)

@@ -1,5 +1,5 @@
 """
-Small products in the agencies' form.
+Small products in the formats of the agencies.
 
 Names, groups and numbers of the metadata are those of LT05_L1TP_058014_20110312_20200823_02_T1 and
 LC08_L2SP_047027_20201204_20210313_02_T1 (USGS), of S2A_MSIL1C_20210908T042701_N0301_R133_T46RER_20210908T070248 and
@@ -27,7 +27,7 @@ MEAN_VIEWS = {number: tuple(angles) for number, angles in NUMBERS["MEAN_VIEWS"].
 
 
 def digital_numbers(kind, number, shape=SHAPE):
-    """Of a band: no data in the first pixel, saturated in the last one."""
+    """Digital numbers of a band: no data in the first pixel, saturation in the last pixel."""
     largest = np.iinfo(kind["dtype"]).max
     levels = (30, 90) if largest == 255 else (6000, 20000)
     dn = np.random.default_rng(int(number)).integers(*levels, shape).astype(kind["dtype"])
@@ -36,7 +36,7 @@ def digital_numbers(kind, number, shape=SHAPE):
 
 
 def write(path, values, crs, corner, pixel, driver="GTiff", **options):
-    """A raster, of one band or of several."""
+    """Write a raster of one or more bands."""
     path.parent.mkdir(parents=True, exist_ok=True)
     bands = values.reshape(-1, *values.shape[-2:])
     profile = {"driver": driver, "count": len(bands), "height": bands.shape[1], "width": bands.shape[2], "crs": crs}
@@ -125,7 +125,7 @@ def _level1_scales(kind):
 
 
 def surface_by_hand(toa, terms):
-    """Surface reflectance of a reflectance at the top of the atmosphere, shape (band, y, x)."""
+    """Surface reflectance from top-of-atmosphere reflectance, shape (band, y, x)."""
     names = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
     path, down, up, albedo, gas = (np.asarray(getattr(terms, name))[:, None, None] for name in names)
     below = (toa / gas - path) / (down * up)
@@ -133,7 +133,7 @@ def surface_by_hand(toa, terms):
 
 
 def mtl(groups, form="txt", root="LANDSAT_METADATA_FILE"):
-    """Metadata in one of USGS's three forms."""
+    """Metadata text in one of the three USGS formats."""
     if form == "json":
         return json.dumps({root: groups}, indent=2)
     if form == "xml":
@@ -152,12 +152,12 @@ def mtl(groups, form="txt", root="LANDSAT_METADATA_FILE"):
 
 
 def _is_plain(key, value):
-    """Numbers and dates stand without quotes."""
+    """Whether a value is a number or date, which have no quotes."""
     return key in ("DATE_ACQUIRED", "COLLECTION_NUMBER") or re.fullmatch(r"-?[\d.]+(e-?\d+)?", value)
 
 
 def landsat(folder, kind, level=1, form="txt", groups=None):
-    """A folder of a Landsat product; its digital numbers by band, quality, saturation and angles."""
+    """Write a Landsat product and return the values of its files: bands, quality, saturation and angles."""
     groups = groups or landsat_groups(kind, level)
     contents = groups["PRODUCT_CONTENTS"]
     product = contents["LANDSAT_PRODUCT_ID"]
@@ -218,7 +218,7 @@ def _file_name(band):
 
 
 def safe_files(level):
-    """Paths without ending, by band and size of pixels."""
+    """Paths without suffix, by band and pixel size."""
     _, granule, image = SENTINEL2[level]
     own = dict(zip(_BANDS, _SIZES, strict=True))
     if level == 1:
@@ -234,7 +234,7 @@ def safe_files(level):
 
 
 def product_xml(level, baseline, spacecraft="Sentinel-2A", offset=-1000, granules=1):
-    """MTD_MSIL1C.xml or MTD_MSIL2A.xml."""
+    """Text of MTD_MSIL1C.xml or MTD_MSIL2A.xml."""
     name = SENTINEL2[level][0].format(baseline.replace(".", ""))
     kind = "Level-1C" if level == 1 else "Level-2A"
     images = "".join(f"<IMAGE_FILE>{file}</IMAGE_FILE>\n" for file in safe_files(level).values())
@@ -269,13 +269,13 @@ def product_xml(level, baseline, spacecraft="Sentinel-2A", offset=-1000, granule
 
 
 def sun_grid():
-    """Zenith and azimuth at the nodes of 5 km."""
+    """Solar zenith and azimuth at the nodes of the 5 km grid. [degree]"""
     rows, columns = np.indices((23, 23))
     return 58.38 - 0.0448 * rows - 0.006 * columns, 171.9 + 0.0865 * columns
 
 
 def view_grids():
-    """Of two detectors that see the left and the right of the tile, for bands 3 and 7; nobody sees the last columns."""
+    """View grids of two detectors (left and right of the tile) for bands 3 and 7; the last columns are missing."""
     rows, columns = np.indices((23, 23))
     zenith = 5.5 + 0.3 * columns + 0.1 * rows
     left, right = np.where(columns <= 10, zenith, np.nan), np.where((columns >= 10) & (columns < 20), zenith, np.nan)

@@ -1,4 +1,4 @@
-"""The accessor forwards, and does nothing else."""
+"""The accessor only forwards to functions."""
 
 import inspect
 import pickle
@@ -15,20 +15,20 @@ from fifesim.accessor import PUBLIC
 METHODS = {name: getattr(fifesim, name) for name, found in PUBLIC.items() if "DataArray" in found.methods_of}
 
 
-def test_methods_are_the_functions(lai):
+def test_methods_are_the_public_functions(lai):
     for name, function in METHODS.items():
         method = getattr(lai.fifesim, name)
         assert method.__func__ is function and method.__self__ is lai, name
 
 
-def test_every_line_of_the_table_is_read():
-    """A line of another form would be a name that editors know and the package does not."""
+def test_every_line_of_the_stub_is_read():
+    """A line of another form would define a name for editors but not for the package."""
     table = Path(fifesim.__file__).with_name("__init__.pyi").read_text(encoding="utf-8")
     assert len(re.findall(r"\nfrom \.\w", table)) == len(PUBLIC) == len(fifesim.__all__) - 1
 
 
-def test_functions_of_a_raster_are_methods_and_no_others():
-    """Whatever takes a raster first is a method: its first parameter is documented as one."""
+def test_only_functions_of_rasters_are_methods():
+    """A function is a method if its first parameter is documented as a raster."""
     for name, found in PUBLIC.items():
         function = getattr(fifesim, name)
         if not inspect.isfunction(function):
@@ -40,8 +40,8 @@ def test_functions_of_a_raster_are_methods_and_no_others():
         assert kind is None or kind[1] in found.methods_of, name
 
 
-def test_editors_find_every_name():
-    """What the table says is where the name is defined, or where it is meant to be imported from."""
+def test_stub_names_the_defining_module():
+    """The stub gives the module that defines the name or is meant for its import."""
     for name, found in PUBLIC.items():
         defined = getattr(inspect.unwrap(getattr(fifesim, name)), "__module__", found.module)
         assert defined == found.module or not defined.startswith("fifesim"), name
@@ -53,11 +53,11 @@ def test_method_keeps_documentation_and_signature(lai):
     assert list(inspect.signature(lai.fifesim.sense).parameters) == parameters[1:]
 
 
-def test_function_is_found_on_the_class():
+def test_functions_are_class_attributes():
     assert accessor.DataArrayAccessor.fpar is fifesim.fpar
 
 
-def test_dataset_is_written_by_the_same_function(lai):
+def test_dataset_accessor_has_to_geotiff(lai):
     assert lai.to_dataset(name="lai").fifesim.to_geotiff.__func__ is fifesim.to_geotiff
 
 
@@ -73,7 +73,7 @@ def test_arguments_are_passed_on(lai):
     xr.testing.assert_identical(lai.fifesim.aggregate(30.0, min_valid=0.5), fifesim.aggregate(lai, 30.0, min_valid=0.5))
 
 
-def test_accessor_tells_its_methods_by_group(lai):
+def test_repr_lists_methods_by_group(lai):
     said = repr(lai.fifesim)
     assert all(name in said.replace(",", " ").split() for name in METHODS)
     assert "compare" in said and "comparison_table" not in said
@@ -81,7 +81,7 @@ def test_accessor_tells_its_methods_by_group(lai):
     assert "to_geotiff" in repr(lai.to_dataset(name="lai").fifesim)
 
 
-def test_a_tree_of_images_has_methods_of_its_own(lai):
+def test_datatree_accessor_has_comparison_table(lai):
     tree = xr.DataTree.from_dict({"/TM": lai.to_dataset(name="lai")})
     assert tree.fifesim.comparison_table.__func__ is fifesim.comparison_table
     assert tree.fifesim.comparison_table.__self__ is tree

@@ -1,4 +1,4 @@
-"""Every public name is annotated, and a type checker reads it as a user means it."""
+"""Type annotations of public names agree with docstrings and with correct user code."""
 
 import inspect
 import re
@@ -19,9 +19,9 @@ ROOT = Path(__file__).parents[1]
 
 
 def methods(of, found):
-    """Public methods and properties of a class that is written in the package."""
+    """Public methods and properties of a class that the package defines."""
     for each, member in vars(found).items():
-        # Of a property, a cached one or a class method.
+        # Function of a property, a cached property or a class method.
         made_of = (getattr(member, name, None) for name in ("fget", "func", "__func__"))
         function = inspect.unwrap(next(filter(None, made_of), member))
         if not each.startswith("_") and inspect.isfunction(function) and function.__module__ == found.__module__:
@@ -39,7 +39,7 @@ for public in PUBLIC:
 
 
 def test_functions_and_fields_are_annotated():
-    """Parameters, results and fields, by names that their module has."""
+    """Annotations of parameters, results and fields can be resolved in their modules."""
     breaches = []
     for name, function in FUNCTIONS.items():
         hints = get_type_hints(function)
@@ -53,7 +53,7 @@ def test_functions_and_fields_are_annotated():
 
 
 def documented(function):
-    """Parameters of a docstring with the words that say their type."""
+    """Parameters of a docstring and their stated types."""
     text = inspect.getdoc(function) or ""
     section = re.search(r"^Parameters\n-+\n(.*?)(?=\n\n\S+( \S+)?\n---|\Z)", text, re.DOTALL | re.MULTILINE)
     for line in section[1].splitlines() if section else ():
@@ -62,12 +62,12 @@ def documented(function):
                 yield name, match[2]
 
 
-# Words of docstrings that mean one type.
+# Types by their names in docstrings.
 MEANT = {"bool": bool, "int": int, "float": float, "str": str, "odc.geo.geobox.GeoBox": "GeoBox"}
 
 
 def agrees(hint, words):
-    """Whether an annotation is the type that the words of a docstring say."""
+    """Whether an annotation agrees with the type stated in a docstring."""
     given = [each for each in get_args(hint) or [hint] if each is not type(None)]
     meant = MEANT.get(words.removesuffix(", optional"))
     if meant is not None:
@@ -79,7 +79,7 @@ def agrees(hint, words):
     return not words.startswith("xarray.DataArray") or "DataArray" in {each.__name__ for each in kinds}
 
 
-def test_annotations_are_what_docstrings_say():
+def test_annotations_agree_with_docstrings():
     breaches = [
         f"{name}({parameter}): {words}"
         for name, function in FUNCTIONS.items()
@@ -89,8 +89,8 @@ def test_annotations_are_what_docstrings_say():
     assert breaches == []
 
 
-def test_what_is_right_runs(tmp_path):
-    """The lines that a type checker passes are right."""
+def test_correctly_typed_code_runs(tmp_path):
+    """Code that the type checker accepts runs without errors."""
     lai = typed_use.scene()
     rho = typed_use.ground(lai)
     image = typed_use.image(typed_use.air(rho))
@@ -102,12 +102,12 @@ def test_what_is_right_runs(tmp_path):
 
 
 @pytest.mark.slow
-def test_type_checker_passes_what_is_right_and_refuses_what_is_wrong(tmp_path):
-    """By the settings of pyproject.toml; every ``type: ignore`` of the user's code must be needed."""
+def test_mypy_accepts_correct_code_and_rejects_wrong_code(tmp_path):
+    """Settings are in pyproject.toml; mypy reports every unneeded ``type: ignore``."""
     pytest.importorskip("mypy")
     found = run([sys.executable, "-m", "mypy", "--cache-dir", tmp_path], cwd=ROOT, capture_output=True, text=True)
     assert found.returncode == 0, found.stdout
 
 
-def test_package_says_that_it_is_typed():
+def test_package_has_py_typed():
     assert Path(fifesim.__file__).with_name("py.typed").exists()

@@ -1,4 +1,4 @@
-"""The pages state the speeds that were measured, and other packages do the same work as fifesim."""
+"""Pages state the measured speeds, and benchmarked packages do the same work as fifesim."""
 
 import importlib
 import re
@@ -14,7 +14,7 @@ BENCHMARKS = ROOT / "benchmarks"
 
 @pytest.fixture
 def load(monkeypatch):
-    """Import a script of the benchmarks, which is forgotten after the test."""
+    """Function that imports a benchmark script until the end of the test."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     known = set(sys.modules)
     yield importlib.import_module
@@ -24,15 +24,15 @@ def load(monkeypatch):
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/large_scenes.md", "docs/howto/haze.md"])
-def test_page_states_the_figures_of_the_tables(load, page):
-    """Else run ``python benchmarks/summary.py``."""
+def test_page_agrees_with_the_benchmark_tables(load, page):
+    """To update the pages, run ``python benchmarks/summary.py``."""
     summary = load("summary")
     found = summary.rows(summary.TABLES.read_text("utf-8"))
     text = (ROOT / page).read_text("utf-8")
     assert text == summary.written(text, summary.PAGES[page](found))
 
 
-def test_summary_reads_rows_that_the_benchmarks_write(load):
+def test_summary_rows_exist_in_the_benchmarks(load):
     summary, work, commands, peers = (load(name) for name in ("summary", "work", "commands", "peers"))
     assert {summary.LEVEL, summary.HILLS} <= set(work.CHAINS)
     assert set(summary.RUNS) <= set(commands.CASES)
@@ -40,7 +40,7 @@ def test_summary_reads_rows_that_the_benchmarks_write(load):
 
 
 def errors(peers, name, side):
-    """Numbers of the errors of fifesim and of the other package."""
+    """Errors of fifesim and of the other package as numbers."""
     make, module, _ = peers.ROWS[name]
     pytest.importorskip(module)
     work = make(side)
@@ -49,12 +49,12 @@ def errors(peers, name, side):
 
 
 @pytest.mark.parametrize("package", ["prosail", "radiative-transfer-models"])
-def test_sail_of_other_packages_has_the_same_inputs(load, package):
+def test_sail_of_other_packages_agrees(load, package):
     found = errors(load("peers"), f"SAIL in each cell: {package}", 18)
     assert found[0] == found[1] and 0 < found[0][0] < 2e-4
 
 
-def test_interpolation_is_within_the_bound_that_the_page_states(load):
+def test_interpolation_error_is_within_the_stated_bound(load):
     peers, summary = load("peers"), load("summary")
     own, other = errors(peers, summary.INTERPOLATED, 90)
     assert own[0] < 1e-6 and other[0] < 1e-6
@@ -65,7 +65,7 @@ def test_fields_have_the_covariance_of_their_models(load):
     assert own[0] < 0.005 and other[0] < 0.005
 
 
-def test_6s_has_the_same_atmosphere(load):
+def test_6s_with_the_same_atmosphere_agrees(load):
     try:
         own, other = errors(load("peers"), "atmosphere: 6S once a band through Py6S, then its formula", 18)
     except RuntimeError as error:
@@ -83,18 +83,18 @@ def test_6s_has_the_same_atmosphere(load):
         ("sensor: scipy.ndimage, convolution", (0.001, 0.05)),
     ],
 )
-def test_only_a_spread_function_gives_the_ndvi_of_the_sensor(load, name, bounds):
+def test_ndvi_without_the_sensor_psf_differs(load, name, bounds):
     own, other = errors(load("peers"), name, 360)
     assert own[0] < 1e-12 and bounds[0] < other[0] < bounds[1]
 
 
-def test_digital_numbers_of_a_block_mean_are_near_those_of_the_sensor(load):
-    """Else the mean would be calibrated by another scale."""
+def test_digital_numbers_of_block_means_are_close_to_the_sensor(load):
+    """A larger difference would indicate a different calibration."""
     work = load("peers").numpy_mean(180)
     assert np.abs(work.ours().values.astype(int) - work.theirs()).max() <= 3
 
 
-def test_hashes_tell_types_and_shapes_apart(load):
+def test_hashes_depend_on_type_and_shape(load):
     hash_of = load("bits").of_array
     whole = np.arange(6)
     different = [whole, whole[::-1], whole.reshape(2, 3), whole.astype("int32"), whole.astype(float)]

@@ -1,4 +1,4 @@
-"""The built documentation: what its search finds first, its sidebar, and the page with sliders."""
+"""Built documentation: search results, sidebar, and the interactive page."""
 
 import asyncio
 import json
@@ -16,7 +16,7 @@ HTML = Path(os.environ.get("FIFESIM_HTML", DOCS / "_build" / "html"))
 
 pytestmark = pytest.mark.skipif(not (HTML / "searchindex.js").exists(), reason=f"no documentation is built in {HTML}")
 
-# Questions of readers, and the page that answers each.
+# Search queries and the page that should be found first.
 ANSWERS = {
     "noise": "howto/my_sensor",
     "my DEM": "howto/my_dem",
@@ -40,7 +40,7 @@ ANSWERS = {
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
-def test_search_lists_the_page_that_answers_first(tmp_path):
+def test_search_finds_the_right_page_first(tmp_path):
     ready = "typeof Search !== 'undefined' && Search._index !== null"
     query = "Search._performSearch(...Search._parseQuery({})).pop()[0]"
 
@@ -52,7 +52,7 @@ def test_search_lists_the_page_that_answers_first(tmp_path):
     assert asyncio.run(search()) == ANSWERS
 
 
-def test_reference_has_no_page_of_an_internal_module():
+def test_reference_has_only_public_names():
     index = (HTML / "searchindex.js").read_text(encoding="utf-8")
     pages = json.loads(index.removeprefix("Search.setIndex(").removesuffix(")"))["docnames"]
     names = {page.removeprefix("api/names/fifesim.") for page in pages if page.startswith("api/")}
@@ -68,7 +68,7 @@ def test_sidebar_has_at_most_40_links():
     assert numbers["index.html"] > 5 and {page: n for page, n in numbers.items() if n > 40} == {}
 
 
-def test_first_link_of_the_index_is_the_page_with_sliders():
+def test_first_link_of_the_index_is_the_interactive_page():
     text = (HTML / "index.html").read_text(encoding="utf-8")
     article = text[text.index("<article") :]
     links = [link for link in re.findall(r'href="([^"#]+)"', article) if not link.startswith("#")]
@@ -76,7 +76,7 @@ def test_first_link_of_the_index_is_the_page_with_sliders():
     assert "<title>" in (HTML / links[0]).read_text(encoding="utf-8")
 
 
-def test_words_to_search_for_are_of_pages_that_exist():
+def test_search_words_belong_to_existing_pages():
     source = (DOCS / "conf.py").read_text(encoding="utf-8")
     pages = re.findall(
         r'^    "([\w/]+)": \["', source[source.index("SEARCH_WORDS") :].partition("}\n")[0], re.MULTILINE

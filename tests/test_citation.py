@@ -1,4 +1,4 @@
-"""What hosts and indexes read of the project agrees with itself."""
+"""Project metadata for citation, hosting and indexing are consistent."""
 
 import re
 import tomllib
@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
-def test_citation_names_the_project_as_its_package_does():
+def test_citation_agrees_with_pyproject():
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert citation["cff-version"] == "1.2.0" and citation["message"] and citation["type"] == "software"
     assert citation["title"].startswith(PROJECT["name"]) and citation["license"] == PROJECT["license"]
@@ -19,17 +19,17 @@ def test_citation_names_the_project_as_its_package_does():
     assert doi in (ROOT / "docs" / "references.rst").read_text(encoding="utf-8")
 
 
-def test_readme_leads_to_the_page_on_citing():
+def test_readme_links_to_the_citation_page():
     assert "docs/cite.md" in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def test_every_work_that_the_paper_cites_is_in_its_bibliography():
+def test_bibliography_of_the_paper_is_complete():
     text, bibliography = ((ROOT / "docs" / "paper" / f"paper.{kind}").read_text("utf-8") for kind in ("md", "bib"))
     cited = set(re.findall(r"@([A-Za-z]+\d{4}|Eradiate|prosail)\b", text))
     assert cited == set(re.findall(r"^@\w+\{(\w+),", bibliography, re.MULTILINE))
 
 
-def test_workflows_run_what_the_readme_says():
+def test_workflow_runs_the_test_command_of_the_readme():
     workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "tests.yml").read_text(encoding="utf-8"))
     commands = [step.get("run", "") for step in workflow["jobs"]["tests"]["steps"]]
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
