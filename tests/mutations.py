@@ -1,4 +1,4 @@
-"""Changes of one operator, comparison, constant or call of the package at a time, and which are drawn."""
+"""Mutations of one operator, comparison, constant or call of the package, and their random selection."""
 
 import ast
 import copy
@@ -23,7 +23,7 @@ STAGES = ("base", "ground", "atmosphere", "sensor", "analysis")  # whose kernels
 
 
 def changes(tree):
-    """Every change of a module: node, field, what takes its place."""
+    """Every mutation of a module: node, field and new value."""
     for node in _code(tree):
         if isinstance(node, ast.BinOp | ast.AugAssign | ast.BoolOp) and type(node.op) in TURNED:
             yield node, "op", TURNED[type(node.op)]()
@@ -40,7 +40,7 @@ def changes(tree):
 
 
 def _code(node):
-    """Nodes that compute: no annotations, decorators, messages or texts."""
+    """Nodes that compute, i.e. no annotations, decorators, error messages or f-strings."""
     for name, value in ast.iter_fields(node):
         for child in value if isinstance(value, list) else [value]:
             skipped = name in ("annotation", "returns", "decorator_list") or isinstance(
@@ -52,7 +52,7 @@ def _code(node):
 
 
 def changed(source, number):
-    """Source with one change, its line, and the change in words."""
+    """Source with one mutation, its line number, and a description."""
     tree = ast.parse(source)
     node, field, new = list(changes(tree))[number]
     before = ast.unparse(copy.deepcopy(node))
@@ -65,7 +65,7 @@ def changed(source, number):
 
 
 def draw(count, seed, only, verify=False):
-    """Places of changes, drawn from all with equal weight; or from those in kernels that `fifesim verify` names."""
+    """Random mutations of all code, or only of kernels that `fifesim verify` checks."""
     places, start = [], ROOT / only
     for path in sorted(each.relative_to(ROOT) for each in ([start] if start.is_file() else start.rglob("*.py"))):
         tree = ast.parse((ROOT / path).read_text())
@@ -84,7 +84,7 @@ def imported(tree):
 
 @cache
 def _named():
-    """Files that the checks import, and every name that they use."""
+    """Files that the checks import, and all names that they use."""
     trees = [ast.parse(path.read_text()) for path in (ROOT / CHECKS).glob("*.py")]
     return {each for tree in trees for each in imported(tree)}, set().union(*map(_names, trees))
 
@@ -94,7 +94,7 @@ def _names(node):
 
 
 def _named_lines(path, tree):
-    """Lines of the functions of a file that the checks name, and of those of the same file that these call."""
+    """Lines of functions of a file that the checks name, and of functions of the file called by them."""
     files, names = _named()
     if path not in files or path.parts[1] not in STAGES or {"raster.py", "rasters"} & set(path.parts):
         return set()

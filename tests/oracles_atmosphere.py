@@ -72,7 +72,7 @@ class Ground(NamedTuple):
 
 
 class Air(NamedTuple):
-    """An atmosphere, with sunlight and view from given zenith angles. [1]"""
+    """Atmosphere for given zenith angles of sun and view. [1]"""
 
     path: float
     down: float
@@ -92,9 +92,9 @@ class Air(NamedTuple):
 
 def sky_directions(air, zenith, flux, *, fine):
     """
-    Directions of skylight with the sun at a zenith angle, closer together around the sun.
+    Quadrature of skylight, refined around the sun.
 
-    Zenith angles, azimuths from the sun [degree], and weights that sum up to the flux of the skylight.
+    Returns zenith angles, azimuths relative to the sun [degree], and weights that sum to the flux of the skylight.
     """
     rings, turns, nodes = ((3, 8, 20), (3, 8, 20, 50, 110), 4) if fine else ((8,), (8, 50), 2)
     rings = {0, 90, *(edge for step in rings for edge in (zenith - step, zenith, zenith + step) if 0 < edge < 75), 75}
@@ -103,7 +103,7 @@ def sky_directions(air, zenith, flux, *, fine):
     turned = np.radians(theta)
     weights = (np.cos(turned) * np.sin(turned) * np.radians(theta_weights))[:, None] * np.radians(phi_weights) / np.pi
     light = air.sky(zenith, theta, phi) * weights
-    # Both sides of the plane of the sun.
+    # Both sides of the principal plane.
     found = np.broadcast_arrays(theta[:, None], np.concatenate([phi, -phi]), np.concatenate([light, light], axis=1))
     theta, phi, light = (each.ravel() for each in found)
     assert abs(light.sum() / flux - 1) < (1e-3 if fine else 0.05)
@@ -112,11 +112,11 @@ def sky_directions(air, zenith, flux, *, fine):
 
 def coupled_reflectance(air, ground, sza, vza, raa):
     """
-    Apparent reflectance over a ground that is not Lambertian.
+    Apparent reflectance over a non-Lambertian ground.
 
-    Sunlight and skylight are scattered by the ground from each direction into each, and go up directly or scattered by
-    the air, which by reciprocity is the skylight of a sun at the sensor. Light that the air sends back to the ground
-    counts as isotropic.
+    The ground scatters sunlight and skylight between all directions. The scattered light goes up directly or is
+    scattered by the air; by reciprocity, this equals the skylight of a sun at the sensor. Light that the air scatters
+    back to the ground is taken as isotropic.
     """
     diffuse_up = air.up - air.direct_up
     below, coarse = (sky_directions(air, sza, air.down - air.direct_down, fine=fine) for fine in (True, False))

@@ -291,7 +291,7 @@ def _values(grid):
 
 
 def tile_xml(level):
-    """MTD_TL.xml."""
+    """Text of MTD_TL.xml."""
     zenith, azimuth = sun_grid()
     sun = f"<Zenith>{_values(zenith)}</Zenith>\n<Azimuth>{_values(azimuth)}</Azimuth>"
     views = "".join(
@@ -309,7 +309,7 @@ def tile_xml(level):
 
 
 def sentinel2(folder, level=1, baseline="04.00", width=120, **options):
-    """A .SAFE folder of JPEG 2000 files; its path, and digital numbers by band and size of pixels."""
+    """Write a .SAFE folder of JPEG 2000 files; return its path, and digital numbers by band and pixel size."""
     path = folder / f"{SENTINEL2[level][0].format(baseline.replace('.', ''))}.SAFE"
     files, lossless = {}, {"QUALITY": "100", "REVERSIBLE": "YES"}
     for (band, size), file in safe_files(level).items():
@@ -332,6 +332,6 @@ def sentinel2(folder, level=1, baseline="04.00", width=120, **options):
 
 
 def labelled(values, grid, bands, geometry):
-    """Reflectance at the top of the atmosphere on a grid."""
+    """Top-of-atmosphere reflectance on a grid."""
     array = xr.DataArray(values, dims=("band", "y", "x"), coords={"band": bands, **geometry}, name="toa_reflectance")
     return grids.place(array, grid)

@@ -1,4 +1,4 @@
-"""The command line as a user meets it: files, exit codes, and one line for a mistake."""
+"""Command line: files, exit codes and one-line error messages."""
 
 import json
 import os
@@ -51,26 +51,26 @@ def small(tmp_path):
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory):
-    """A run of it, and what it said."""
+    """Output folder and result of a run of the small scenario."""
     folder = tmp_path_factory.mktemp("first")
     (folder / "small.toml").write_text(SMALL)
     return folder / "out", CliRunner().invoke(app, ["simulate", str(folder / "small.toml"), "-o", str(folder / "out")])
 
 
-def test_simulate_writes_its_files_and_names_them(first):
+def test_simulate_writes_and_lists_its_files(first):
     out, result = first
     assert result.exit_code == 0, result.output
     assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
     assert all(name in result.output for name in FILES)
 
 
-def test_the_last_line_says_how_long_it_took_and_what_to_open(first):
+def test_last_line_states_duration_and_files_to_open(first):
     out, result = first
     said = rf"done in \d[\w. ]* s: open {out}/report\.html in a browser, {out}/image\.tif in a GIS"
     assert re.fullmatch(said, result.stdout.splitlines()[-1])
 
 
-def test_rerun_makes_the_same_file_again(first, invoke, monkeypatch, tmp_path):
+def test_rerun_reproduces_the_file(first, invoke, monkeypatch, tmp_path):
     monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     result = invoke("rerun", first[0] / "image.tif", "-o", "again.tif")
     assert result.exit_code == 0, result.output
@@ -80,14 +80,14 @@ def test_rerun_makes_the_same_file_again(first, invoke, monkeypatch, tmp_path):
     assert refused.exit_code == 2 and "--overwrite" in refused.stderr
 
 
-def test_rerun_of_other_bits_ends_with_code_1(first, invoke, monkeypatch):
+def test_rerun_with_different_values_exits_with_1(first, invoke, monkeypatch):
     monkeypatch.setattr("fifesim.output.reproduction.rerun", lambda *given, **options: Rerun(1200, 3, 1.0, {}))
     result = invoke("rerun", first[0] / "image.tif")
     assert result.exit_code == 1
     assert "3 of 1200 values differ, by 1 at most; the versions are the same" in result.stdout
 
 
-def test_quiet_says_nothing_and_verbose_each_step(invoke, small, monkeypatch):
+def test_quiet_prints_nothing_and_verbose_prints_steps(invoke, small, monkeypatch):
     monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     quiet = invoke("simulate", small, "-o", "quiet", "--quiet")
     assert (quiet.exit_code, quiet.stdout, quiet.stderr) == (0, "", "")
@@ -101,22 +101,22 @@ def test_quiet_says_nothing_and_verbose_each_step(invoke, small, monkeypatch):
     assert invoke("explore", "-o", "page.html", "--quiet").stdout == ""
 
 
-def test_what_writes_can_be_quiet():
+def test_commands_with_output_have_quiet_and_verbose():
     for command in typer.main.get_command(app).commands.values():
         options = {each for known in command.params for each in known.opts}
         assert "--output" not in options or {"--quiet", "--verbose"} <= options, command.name
 
 
-def test_image_lies_where_the_scenario_says(first):
+def test_image_has_the_grid_of_the_scenario(first):
     with rasterio.open(first[0] / "image.tif") as image:
         assert image.crs.to_epsg() == 26914
         assert tuple(image.bounds) == (704970.0, 4333620.0, 705870.0, 4334220.0)
         assert image.descriptions == ("TM2", "TM3", "TM4")
-        # Pixels at the edge see beyond the scene.
+        # The footprints of edge pixels extend beyond the scene.
         assert image.read()[:, 1:-1, 1:-1].min() > 0
 
 
-def test_running_the_written_scenario_gives_the_same_files(first, invoke, tmp_path):
+def test_written_scenario_reproduces_the_files(first, invoke, tmp_path):
     assert invoke("simulate", first[0] / "scenario.toml", "-o", "again").exit_code == 0
     for name in FILES:
         assert (first[0] / name).read_bytes() == (tmp_path / "again" / name).read_bytes(), name
@@ -131,7 +131,7 @@ def test_printed_scenario_is_the_default_one(invoke, tmp_path):
     assert 'cover = "none"' in paper and "[classes." not in paper and 'bands = ["TM3", "TM4"]' in paper
 
 
-def test_sensors_lists_every_instrument_in_a_line_or_the_bands_of_one(invoke):
+def test_sensors_lists_instruments_or_bands(invoke):
     lines = invoke("sensors").stdout.splitlines()
     names = [line.split()[0] for line in lines[1:]]
     assert {"TM", "L4TM", "ETM+", "OLI", "OLI2", "MSI", "MSI-B", "HRV", "MODIS", "MODIS-Aqua", "AVHRR"} <= set(names)
@@ -140,7 +140,7 @@ def test_sensors_lists_every_instrument_in_a_line_or_the_bands_of_one(invoke):
     assert "TM4" in printed and "206.20" in printed
 
 
-def test_mistakes_of_options_and_instruments_are_a_line_with_exit_code_2(invoke, small, tmp_path):
+def test_invalid_options_and_instruments_exit_with_2_and_one_line(invoke, small, tmp_path):
     text = files.path("instruments/oli.toml").read_text(encoding="utf-8")
     (tmp_path / "mine.toml").write_text(text.replace("altitude = 705000.0", "altitude = 705.0"), encoding="utf-8")
     mistakes = {
@@ -158,7 +158,7 @@ def test_mistakes_of_options_and_instruments_are_a_line_with_exit_code_2(invoke,
     assert not (tmp_path / "out").exists()
 
 
-def test_sensors_check_says_what_a_file_is(invoke, tmp_path):
+def test_sensors_check_summarizes_a_file(invoke, tmp_path):
     text = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
     (tmp_path / "mine.toml").write_text(text.replace('"AVHRR"', '"MINE"', 1), encoding="utf-8")
     result = invoke("sensors", "--check", "mine.toml")
@@ -192,7 +192,7 @@ def test_sensors_check_says_what_a_file_is(invoke, tmp_path):
         ("[terrain]\nhorizon_reach = 100000\n", "50000"),
     ],
 )
-def test_a_mistake_is_named_with_exit_code_2_and_nothing_is_written(invoke, tmp_path, text, said):
+def test_invalid_scenario_exits_with_2_and_writes_nothing(invoke, tmp_path, text, said):
     (tmp_path / "wrong.toml").write_text(text)
     result = invoke("simulate", "wrong.toml", "-o", "out")
     assert result.exit_code == 2
@@ -202,7 +202,7 @@ def test_a_mistake_is_named_with_exit_code_2_and_nothing_is_written(invoke, tmp_
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_in_use_is_not_touched_without_overwrite(invoke, small, tmp_path, monkeypatch):
+def test_existing_folder_needs_overwrite(invoke, small, tmp_path, monkeypatch):
     monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     kept = tmp_path / "out" / "notes.txt"
     kept.parent.mkdir()
@@ -217,7 +217,7 @@ def test_a_folder_in_use_is_not_touched_without_overwrite(invoke, small, tmp_pat
 
 
 def test_resuming_a_finished_run_reports_its_files(first, invoke):
-    """A batch system that queues a run again does not take a finished one for a failure."""
+    """A batch system may resubmit a finished run, which must not fail."""
     out = first[0]
     before = {path.name: path.stat().st_mtime_ns for path in out.iterdir()}
     for scenario in ([], [out.parent / "small.toml"]):
@@ -253,7 +253,7 @@ def test_dry_run_estimates_and_writes_nothing(invoke, small, tmp_path, monkeypat
     assert "million" in invoke("simulate", small, "--dry-run").stdout
 
 
-def test_json_says_how_far_it_is(invoke, small, monkeypatch):
+def test_json_reports_progress(invoke, small, monkeypatch):
     monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     lines = [json.loads(line) for line in invoke("simulate", small, "-o", "out", "--json").stdout.splitlines()]
     assert {line["event"] for line in lines[:-1]} == {"progress"}
@@ -279,7 +279,7 @@ visibility = { uniform = ["10 km", 60] }
 """
 
 
-def test_dataset_makes_chips_and_names_what_people_read(invoke, tmp_path):
+def test_dataset_writes_chips_and_lists_readable_files(invoke, tmp_path):
     (tmp_path / "study.toml").write_text(STUDY)
     result = invoke("dataset", "study.toml", "-n", 4, "--workers", 1, "--json")
     assert result.exit_code == 0, result.output
@@ -307,15 +307,15 @@ def test_dataset_makes_chips_and_names_what_people_read(invoke, tmp_path):
         (["study.toml", "--workers", "2", "--scheduler", "tcp://nowhere:1"], STUDY, "give one of them"),
     ],
 )
-def test_a_mistake_in_a_study_is_named_and_nothing_is_written(invoke, tmp_path, arguments, text, said):
+def test_invalid_study_exits_with_2_and_writes_nothing(invoke, tmp_path, arguments, text, said):
     (tmp_path / "study.toml").write_text(text)
     result = invoke("dataset", *arguments, "-n", 2)
     assert result.exit_code == 2 and said in result.stderr, result.output
     assert len(result.stderr) <= 520 and not (tmp_path / "chips.zarr").exists()
 
 
-def test_what_leads_to_other_files_is_opened_where_that_is_allowed(invoke, tmp_path):
-    """A grid of SAGA is none of the formats that are opened unasked."""
+def test_other_raster_formats_need_allow_remote(invoke, tmp_path):
+    """The SAGA grid format is not among the formats allowed by default."""
     profile = {"width": 30, "height": 30, "count": 1, "dtype": "float32", "crs": "EPSG:26914"}
     transform = rasterio.transform.from_origin(705000, 4334100, 30, 30)
     values = np.random.default_rng(1).uniform(1, 3, (1, 30, 30)).astype("float32")
@@ -329,7 +329,7 @@ def test_what_leads_to_other_files_is_opened_where_that_is_allowed(invoke, tmp_p
     assert invoke("simulate", "lai.toml", "-o", "again").exit_code == 2
 
 
-def test_names_and_values_do_not_steer_the_terminal(invoke, tmp_path):
+def test_control_characters_do_not_reach_the_terminal(invoke, tmp_path):
     (tmp_path / "wrong.toml").write_text('[ground]\n"\\u001b[31mred" = 1\n[grid]\ncrs = "\\u001b]0;title\\u0007"\n')
     for arguments in (["simulate", "wrong.toml"], ["sensors", "\x1b[31m"], ["simulate", "--\x1b[31m"], ["\x1b[2J"]):
         result = invoke(*arguments)
@@ -337,14 +337,14 @@ def test_names_and_values_do_not_steer_the_terminal(invoke, tmp_path):
         assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", result.output + result.stderr), arguments
 
 
-def test_a_message_is_not_longer_than_a_person_reads(invoke, tmp_path):
+def test_error_message_is_short(invoke, tmp_path):
     (tmp_path / "wrong.toml").write_text("".join(f"[ground{number}]\nseed = 1\n" for number in range(300)))
     result = invoke("simulate", "wrong.toml")
     assert result.exit_code == 2 and len(result.stderr) <= 520
 
 
 @pytest.mark.parametrize("command", ["reproduce", "budget", "endtoend", "verify", "simulate"])
-def test_ctrl_c_is_a_line_and_code_130(invoke, tmp_path, monkeypatch, command):
+def test_ctrl_c_exits_with_130_and_one_line(invoke, tmp_path, monkeypatch, command):
     def pressed(*arguments, **options):
         raise KeyboardInterrupt
 
@@ -361,8 +361,8 @@ def test_ctrl_c_is_a_line_and_code_130(invoke, tmp_path, monkeypatch, command):
     assert "interrupted; nothing was written" in result.stderr and "Traceback" not in result.stderr
 
 
-def test_a_warning_is_a_line_of_its_own(invoke, small, monkeypatch):
-    """Without the line of code that Python shows, and without what steers a terminal."""
+def test_warning_is_one_line(invoke, small, monkeypatch):
+    """The warning has no source line and no control characters."""
 
     def told(*arguments, **options):
         warn("the sun is taken for that of June\x1b[31m")
@@ -376,7 +376,7 @@ def test_a_warning_is_a_line_of_its_own(invoke, small, monkeypatch):
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device that takes nothing is Linux's")
 @pytest.mark.parametrize("command", ["scenario", "sensors", "verify"])
-def test_a_full_standard_output_is_an_error_in_one_line(command):
+def test_full_standard_output_is_a_one_line_error(command):
     code = "from fifesim.cli import app; app()"
     with open("/dev/full", "w") as full:
         done = subprocess.run([sys.executable, "-c", code, command], stdout=full, stderr=subprocess.PIPE, text=True)
@@ -384,7 +384,7 @@ def test_a_full_standard_output_is_an_error_in_one_line(command):
     assert len(done.stderr.splitlines()) == 1 and "space" in done.stderr
 
 
-def test_help_does_not_import_what_is_slow():
+def test_help_does_not_import_slow_packages():
     slow = ("numba", "pvlib", "matplotlib", "scipy")
     code = f"import sys; from fifesim.cli import app; print([name for name in {slow} if name in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ)
@@ -392,8 +392,8 @@ def test_help_does_not_import_what_is_slow():
 
 
 @pytest.mark.parametrize("given", [None, "2"])
-def test_commands_take_one_thread_of_blas_unless_told_otherwise(given):
-    """numpy's too, which is there before the command is: its threads wait for each other, longer than they work."""
+def test_commands_use_one_blas_thread_by_default(given):
+    """Also for numpy, which is imported earlier: its threads would mostly wait for each other."""
     given = {} if given is None else {"OPENBLAS_NUM_THREADS": given}
     code = (
         "from fifesim.cli import app, importing\nwith importing(): import scipy.linalg\n"

@@ -1,4 +1,4 @@
-"""The recipes of ``docs/contributing.md`` work on a copy of the package, in the files that they name."""
+"""The recipes of ``docs/contributing.md`` work in a copy of the package with changes only in the named files."""
 
 import json
 import re
@@ -17,12 +17,12 @@ from fifesim.analysis.index_labels import INDICES
 ROOT = Path(__file__).parents[1]
 PACKAGE = "fifesim"
 
-# The author's own file, which the recipe of a public function cannot name.
+# New file of the contributor, which the recipe of a public function cannot name.
 OWN_FILE = "fifesim/analysis/npp.py"
 
 RECIPES = tomllib.loads((ROOT / "tests" / "data" / "recipes.toml").read_text(encoding="utf-8"))
 
-# Run all checks in one process, since each would import the package again.
+# All checks run in one process to import the package only once.
 _RUN = """
 import json, tempfile, traceback
 from functools import cache
@@ -67,26 +67,26 @@ print(json.dumps({"package": fifesim.__file__, "failed": failed}))
 
 
 def rows():
-    """Rows of the table by the name of the recipe."""
+    """Rows of the table, by recipe."""
     page = (ROOT / "docs" / "contributing.md").read_text(encoding="utf-8")
     table = page[page.index("| a new | goes into |") :].split("\n\n")[0]
     return dict(re.findall(r"^\| (.+?) \| (.+) \|$", table, re.MULTILINE)[1:])
 
 
 def named_files(row):
-    """Paths that a row names, from the root of the repository."""
+    """Paths named in a row, relative to the repository root."""
     roots = ("data/", "docs/", "tests/", f"{PACKAGE}/")
     names = [name for name in re.findall(r"`([^`]+)`", row) if "/" in name]
     return [name if name.startswith(roots) else f"{PACKAGE}/{name}" for name in names]
 
 
 def is_named(path, row):
-    """Whether a row names a file, or the folder of a new one."""
+    """Whether a row names a file, or the folder of a new file."""
     return path == OWN_FILE or any(path == each or Path(path).parent == Path(each) for each in named_files(row))
 
 
 def edit(copy, file, old="", new="", **whole):
-    """Replace a passage of a file, or write it as `text` or like another."""
+    """Replace a passage of a file, or write the file from `text` or from the file `like`."""
     path = copy / file
     if not whole:
         text = path.read_text(encoding="utf-8")
@@ -97,7 +97,7 @@ def edit(copy, file, old="", new="", **whole):
 
 @pytest.fixture(scope="module")
 def failed(tmp_path_factory):
-    """Errors by recipe, in a copy of the package with all recipes, each in the files that its row names."""
+    """Errors by recipe, in a copy of the package with all recipes applied to the files named in their rows."""
     copy, table = tmp_path_factory.mktemp("copy"), rows()
     for folder in (PACKAGE, "data"):
         copytree(ROOT / folder, copy / folder, ignore=ignore_patterns("make_*.py"))
@@ -123,17 +123,17 @@ def failed(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", RECIPES)
-def test_a_recipe_works_when_it_is_followed(failed, name):
+def test_recipe_works(failed, name):
     assert name not in failed, failed[name]
 
 
-def test_every_recipe_that_changes_code_is_followed():
-    """Other tests cover documents, tests and the STAC item."""
+def test_every_recipe_that_changes_code_is_tested():
+    """Other tests cover documentation, tests and the STAC item."""
     others = {"field of the STAC item", "page of the documentation", "test"}
     assert set(rows()) == set(RECIPES) | others
 
 
-def test_files_of_the_recipes_are_there():
+def test_files_of_the_recipes_exist():
     missing = [path for row in rows().values() for path in named_files(row) if not (ROOT / path).exists()]
     assert missing == []
 

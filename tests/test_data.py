@@ -1,4 +1,4 @@
-"""Every table that the program reads says where it comes from."""
+"""Data tables of the package state their sources and units."""
 
 import re
 
@@ -12,21 +12,21 @@ SCRIPTS = {path.name for path in DATA.glob("make_*.py")}
 
 
 def header(path):
-    """The comment lines that a table begins with."""
+    """Comment lines at the start of a table."""
     lines = path.read_text(encoding="utf-8").splitlines()
     first = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
     return "\n".join(lines[:first])
 
 
 def is_named(name, readme):
-    """Whether the README names a table by its path, or in the table of a folder by its name."""
+    """Whether the README lists a table by its path, or by its name in the table of its folder."""
     folder, _, file = name.rpartition("/")
     _, _, table = readme.partition(f"| file in `{folder}/` |")
     return name in readme or f"`{file}`" in table.partition("\n\n")[0]
 
 
-def test_tables_are_named_and_have_sources_and_units():
-    """A source is a publication, the script that made the table, or what the numbers were calibrated with."""
+def test_tables_are_listed_and_have_sources_and_units():
+    """A source is a publication, the script that generates the table, or the calibration data."""
     readme, breaches = (DATA / "README.md").read_text(encoding="utf-8"), []
     for path in TABLES:
         name, text = path.relative_to(DATA).as_posix(), header(path)
@@ -42,6 +42,6 @@ def test_tables_are_named_and_have_sources_and_units():
     assert len(TABLES) >= 9 and breaches == []
 
 
-def test_everything_in_the_folder_is_a_table_or_makes_one():
+def test_folder_has_only_tables_and_their_scripts():
     extra = {path.name for path in DATA.rglob("*") if path.is_file() and path not in TABLES}
     assert [name for name in extra if name != "README.md" and not re.fullmatch(r"make_\w+\.py", name)] == []

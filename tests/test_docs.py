@@ -1,4 +1,4 @@
-"""The documentation runs, resolves and is complete."""
+"""Documentation: code runs, links resolve, and the reference is complete."""
 
 import importlib
 import re
@@ -14,7 +14,7 @@ from fifesim.accessor import PUBLIC
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 
-# A block of Python, and what it prints where the page shows it.
+# Python block and, optionally, its printed output.
 _BLOCK = re.compile(r"^```python\n(.*?)^```$(?:\n+```text\n(.*?)^```$)?", re.DOTALL | re.MULTILINE)
 _CITED = re.compile(r"\[([A-Za-z]+\d{4})\]_")
 
@@ -26,7 +26,7 @@ def api(monkeypatch):
 
 
 def python_blocks(path):
-    """Blocks that a page shows as Python, but for those marked ``no-run``."""
+    """Python blocks of a page, except blocks marked ``no-run``."""
     return [block for block, _ in _BLOCK.findall(path.read_text(encoding="utf-8"))]
 
 
@@ -35,14 +35,14 @@ PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md")), *sorted((DOCS / "howto"
 
 @pytest.mark.parametrize("page", [str(page.relative_to(ROOT)) for page in PAGES if python_blocks(page)])
 def test_code_of_a_page_runs(page, tmp_path, monkeypatch):
-    """Blocks run in order and share their names, as a reader runs them."""
+    """Blocks run in order in one namespace."""
     monkeypatch.chdir(tmp_path)
     names = {}
     for block, printed in _BLOCK.findall((ROOT / page).read_text(encoding="utf-8")):
         told = StringIO()
         with redirect_stdout(told):
             exec(compile(block, page, "exec"), names)
-        # What a page shows below a block is what the block prints.
+        # The output shown on the page is the printed output.
         assert not printed or told.getvalue().split() == printed.split()
 
 
@@ -64,7 +64,7 @@ def test_every_reference_is_in_the_bibliography():
     assert cited == defined
 
 
-def test_reference_has_every_public_name_and_no_other(api):
+def test_reference_has_exactly_the_public_names(api):
     listed = re.findall(r"^   (\w[\w.]*)$", api.functions(), re.MULTILINE)
     assert sorted(listed) == sorted([*PUBLIC, "atmosphere.spectrum"])
 
@@ -80,12 +80,12 @@ def test_code_of_pages_fits_their_width():
     assert [(page, line) for page, line in lines if len(line) > 96] == []
 
 
-def test_links_between_pages_lead_somewhere():
+def test_links_between_pages_resolve():
     pages = [*PAGES, ROOT / "data" / "README.md"]
     links = [
         (page, link) for page in pages for link in re.findall(r"\]\((?!https?:)([^)#:\s]+)", page.read_text("utf-8"))
     ]
-    # The build writes the gallery and the reference, and draws the pictures, each by its example.
+    # The build generates the gallery and its pictures, and the reference.
     scripts = (DOCS / "gallery_src").rglob("plot_*.py")
     drawn = {path.relative_to(DOCS / "gallery_src").with_suffix("").as_posix() for path in scripts}
     reference = ("api/functions", "api/functions.rst")

@@ -1,4 +1,4 @@
-"""What happens in long runs, made to happen: killed processes and workers, full disks, broken files, Ctrl-C."""
+"""Faults in long runs: killed processes and workers, full disks, broken files, and Ctrl-C."""
 
 import json
 import os
@@ -19,9 +19,9 @@ from fifesim.output.folders import UNFINISHED
 from fifesim.output.run_folder import FILES
 
 COMMAND = [sys.executable, "-c", "from fifesim.cli import app; app()", "simulate"]
-# Whoever starts tests in the background of a script has them ignore SIGINT, which programs that they start inherit.
+# Tests that a script starts in the background ignore SIGINT, and child processes inherit this.
 HEARS_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-# A run that gets a signal as soon as the first block of its image is saved, however quick the rest is.
+# Run that receives a signal as soon as the first block of its image is saved.
 SIGNALLED = f"""
 {HEARS_CTRL_C}
 import os
@@ -50,7 +50,7 @@ seed = 3
 [terrain]
 horizon_reach = 900
 """
-# Far more than any step takes: a run that hangs fails.
+# Timeout, far longer than any step. [s]
 PATIENCE = 300
 
 
@@ -59,7 +59,7 @@ def run(*arguments):
 
 
 def run_here(*arguments):
-    """The same in this process, which has imported what takes longest."""
+    """Run in this process, to save the import time."""
     return CliRunner().invoke(app, ["simulate", *map(str, arguments)])
 
 
@@ -78,7 +78,7 @@ def wait_for_a_block(folder, process):
 
 
 def signalled(signal_number, *arguments):
-    """A run that a signal ended after its first block."""
+    """Run that is ended by a signal after its first block."""
     command = [
         sys.executable,
         "-c",
@@ -102,7 +102,7 @@ def scenario(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def whole(scenario, tmp_path_factory):
-    """Files of a run that nothing happened to."""
+    """Files of an undisturbed run."""
     folder = tmp_path_factory.mktemp("whole") / "out"
     done = run_here(scenario, "-o", folder, "--threads", 1)
     assert done.exit_code == 0, done.stderr
@@ -116,7 +116,7 @@ def resumed(scenario, folder):
     return contents(folder), [json.loads(line) for line in done.stdout.splitlines()]
 
 
-def test_a_killed_run_goes_on_to_the_same_files(scenario, whole, tmp_path):
+def test_killed_run_resumes_to_the_same_files(scenario, whole, tmp_path):
     out = tmp_path / "out"
     assert signalled(signal.SIGKILL, scenario, "-o", out, "--threads", 1).returncode == -signal.SIGKILL
     assert [path.name for path in out.iterdir()] == [UNFINISHED]
@@ -126,29 +126,29 @@ def test_a_killed_run_goes_on_to_the_same_files(scenario, whole, tmp_path):
 
 
 def all_of(folder):
-    """Every file of a folder, those of a store too."""
+    """Contents of every file of a folder, including files of a store."""
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.fixture(scope="module")
 def whole_scene(scenario, tmp_path_factory):
-    """The same with its cells, and how long it takes. [s]"""
+    """Files of an undisturbed run with the scene, and its duration. [s]"""
     folder, began = tmp_path_factory.mktemp("whole") / "scene", time.monotonic()
     assert run(scenario, "-o", folder, "--scene").returncode == 0
     return all_of(folder), time.monotonic() - began
 
 
-# How a run is killed in turn: its options, and the part of its time in which that happens.
+# Options of killed runs, and the earliest time of the kill as a fraction of the duration.
 WAYS = (((), 0.0), (("--workers", 2), 0.0), (("--scene",), 0.0), ((), 0.8), (("--scene",), 0.8))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(int(os.environ.get("FIFESIM_KILLS", len(WAYS)))))
-def test_a_run_killed_at_any_moment_goes_on_to_the_same_files(scenario, whole, whole_scene, tmp_path, number):
-    """As many as the variable FIFESIM_KILLS says."""
+def test_run_killed_at_any_time_resumes_to_the_same_files(scenario, whole, whole_scene, tmp_path, number):
+    """FIFESIM_KILLS sets the number of runs."""
     (options, earliest), out = WAYS[number % len(WAYS)], tmp_path / "out"
     files, duration = whole_scene
-    # The STAC item names the files of its folder, so a run without cells has another item.
+    # The STAC item lists the files of its folder, so it differs between runs with and without the scene.
     expected = files if "--scene" in options else whole
     process = start(scenario, "-o", out, *options)
     time.sleep(duration * np.random.default_rng(number).uniform(earliest, 1))
@@ -168,8 +168,8 @@ def test_a_run_killed_at_any_moment_goes_on_to_the_same_files(scenario, whole, w
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(int(os.environ.get("FIFESIM_RIVALS", 1))))
 @pytest.mark.parametrize("option", ["--overwrite", "--resume"])
-def test_of_two_runs_at_once_one_wins_whole(scenario, whole, tmp_path, option, number):
-    """As often as the variable FIFESIM_RIVALS says."""
+def test_one_of_two_concurrent_runs_completes(scenario, whole, tmp_path, option, number):
+    """FIFESIM_RIVALS sets the number of repetitions."""
     out = tmp_path / "out"
     processes = [start(scenario, "-o", out, option) for _ in range(2)]
     said = [process.communicate(timeout=PATIENCE)[1] for process in processes]
@@ -179,7 +179,7 @@ def test_of_two_runs_at_once_one_wins_whole(scenario, whole, tmp_path, option, n
 
 
 @pytest.mark.slow
-def test_processes_that_fill_an_empty_cache_of_kernels_together_give_the_same_files(tmp_path):
+def test_processes_sharing_an_empty_kernel_cache_give_the_same_files(tmp_path):
     (tmp_path / "small.toml").write_text("[grid]\nwidth = 300\nheight = 300\n")
     new = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     commands = [[*COMMAND, str(tmp_path / "small.toml"), "-o", str(tmp_path / str(number))] for number in range(4)]
@@ -191,7 +191,7 @@ def test_processes_that_fill_an_empty_cache_of_kernels_together_give_the_same_fi
 
 
 @pytest.mark.slow
-def test_a_half_written_block_is_made_again(scenario, whole, tmp_path):
+def test_truncated_block_is_recomputed(scenario, whole, tmp_path):
     out = tmp_path / "out"
     assert signalled(signal.SIGKILL, scenario, "-o", out, "--threads", 1).returncode == -signal.SIGKILL
     block = saved(out)[0]
@@ -200,7 +200,7 @@ def test_a_half_written_block_is_made_again(scenario, whole, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_killed_worker_changes_nothing(scenario, whole, tmp_path):
+def test_killed_worker_does_not_change_the_files(scenario, whole, tmp_path):
     out = tmp_path / "out"
     process = start(scenario, "-o", out, "--workers", 2)
     wait_for_a_block(out, process)
@@ -217,7 +217,7 @@ def test_a_killed_worker_changes_nothing(scenario, whole, tmp_path):
 
 
 @pytest.mark.parametrize("options", [["--threads", 2], pytest.param(["--workers", 1], marks=pytest.mark.slow)])
-def test_ctrl_c_ends_a_run_that_can_go_on(scenario, whole, tmp_path, options):
+def test_run_ended_by_ctrl_c_can_be_resumed(scenario, whole, tmp_path, options):
     out = tmp_path / "out"
     process = signalled(signal.SIGINT, scenario, "-o", out, *options)
     assert process.returncode == 130
@@ -245,8 +245,8 @@ visibility = { uniform = ["10 km", 60] }
 @pytest.mark.parametrize(
     "delay", [0.0, 0.5, *(pytest.param(0.3 * number, marks=pytest.mark.slow) for number in range(1, 9))]
 )
-def test_ctrl_c_in_a_terminal_ends_all_processes_of_a_dataset_with_one_line(tmp_path, delay):
-    """It reaches each process of the group, from the moment at which there is a second one."""
+def test_ctrl_c_ends_all_processes_of_a_dataset_with_one_line(tmp_path, delay):
+    """The signal reaches every process of the group, at any time after the first child has started."""
     (tmp_path / "study.toml").write_text(STUDY)
     code = f"{HEARS_CTRL_C}from fifesim.cli import app; app()"
     command = [sys.executable, "-c", code, "dataset", "study.toml", "-n", "4000", "--workers", "2"]
@@ -268,7 +268,7 @@ def test_ctrl_c_in_a_terminal_ends_all_processes_of_a_dataset_with_one_line(tmp_
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """A file system of a size that a test chooses and changes."""
+    """Function that mounts a file system with given options, such as a size."""
     place = tmp_path / "disk"
     place.mkdir()
 
@@ -285,8 +285,8 @@ def small_disk(tmp_path):
 @pytest.mark.parametrize(
     "size", ["2000k", *(pytest.param(size, marks=pytest.mark.slow) for size in ("4k", "100k", "3000k"))]
 )
-def test_a_full_disk_leaves_what_is_finished_and_nothing_half_written(scenario, whole, small_disk, size):
-    """Before all else, with the first blocks, with the last ones, and with the files that are made of them."""
+def test_full_disk_leaves_only_finished_files(scenario, whole, small_disk, size):
+    """The disk is full at the start, at the first blocks, at the last blocks, or when the final files are written."""
     out = small_disk(f"size={size}") / "out"
     done = run(scenario, "-o", out)
     assert done.returncode == 1, done.stdout
@@ -298,8 +298,8 @@ def test_a_full_disk_leaves_what_is_finished_and_nothing_half_written(scenario, 
 
 
 @pytest.mark.slow
-def test_a_file_that_cannot_grow_is_not_there(scenario, whole, tmp_path):
-    """A quota that GDAL meets in the middle of a file."""
+def test_file_beyond_the_size_limit_is_removed(scenario, whole, tmp_path):
+    """GDAL reaches the size limit in the middle of a file."""
     out = tmp_path / "out"
     limited = ["bash", "-c", 'ulimit -f 400; exec "$0" "$@"', *COMMAND, str(scenario), "-o", str(out)]
     done = subprocess.run(limited, capture_output=True, text=True, timeout=PATIENCE)
@@ -309,7 +309,7 @@ def test_a_file_that_cannot_grow_is_not_there(scenario, whole, tmp_path):
     assert resumed(scenario, out)[0] == whole
 
 
-def test_an_unwritable_place_is_named(scenario, small_disk):
+def test_read_only_folder_error_names_the_folder(scenario, small_disk):
     place = small_disk("ro")
     done = run_here(scenario, "-o", place / "out")
     assert done.exit_code == 1
@@ -319,7 +319,7 @@ def test_an_unwritable_place_is_named(scenario, small_disk):
 
 @pytest.fixture(scope="module")
 def broken_dem(tmp_path_factory):
-    """A DEM whose file ends before its last rows."""
+    """DEM file that is truncated."""
     path = tmp_path_factory.mktemp("dem") / "broken.tif"
     profile = {"driver": "GTiff", "width": 400, "height": 300, "count": 1, "dtype": "float32", "crs": "EPSG:26914"}
     transform = rasterio.transform.from_origin(702000, 4337000, 30, 30)
@@ -330,7 +330,7 @@ def broken_dem(tmp_path_factory):
     return path
 
 
-def test_a_dem_that_cannot_be_read_is_named(scenario, broken_dem, tmp_path):
+def test_unreadable_dem_error_names_the_file(scenario, broken_dem, tmp_path):
     broken = tmp_path / "broken.toml"
     broken.write_text(SCENARIO + f'dem = "{broken_dem}"\n')
     done = run_here(broken, "-o", tmp_path / "out")
@@ -340,7 +340,7 @@ def test_a_dem_that_cannot_be_read_is_named(scenario, broken_dem, tmp_path):
 
 
 @pytest.mark.slow
-def test_another_scenario_does_not_resume_a_run(scenario, tmp_path):
+def test_other_scenario_cannot_resume_a_run(scenario, tmp_path):
     out = tmp_path / "out"
     assert signalled(signal.SIGKILL, scenario, "-o", out, "--threads", 1).returncode == -signal.SIGKILL
     other = tmp_path / "other.toml"

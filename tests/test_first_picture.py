@@ -1,4 +1,4 @@
-"""The panels of the picture of the first page are of one run."""
+"""All panels of the figure on the first page come from one run."""
 
 import importlib
 import re
@@ -17,9 +17,9 @@ def picture(monkeypatch):
     return importlib.import_module("make_first_picture")
 
 
-def test_budget_of_the_picture_is_the_scatter_of_its_own_run(picture, monkeypatch):
+def test_budget_of_the_picture_equals_the_scatter_of_its_run(picture, monkeypatch):
     sections = picture.scenario(cells=108).model_dump(exclude_unset=True)
-    # Hills take more time than all else.
+    # Hills take most of the time.
     sections["terrain"], sections["landscape"]["covary"] = {"dem": "flat"}, {"soil": -0.3}
     found = picture.run(picture.Scenario(**sections))
     assert found.total == pytest.approx(1 - found.fit.r2, abs=1e-9)

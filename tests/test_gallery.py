@@ -1,4 +1,4 @@
-"""Pictures of the gallery show what their axes and texts state."""
+"""Figures of the gallery agree with their axes and texts."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ SIGNED = "positive toward the sun"
 
 @pytest.fixture
 def drawn():
-    """Run cells of a script of the gallery, all or those given by number, and close their figures in the end."""
+    """Function that runs all or the given cells of a gallery script; figures are closed at the end."""
 
     def run(name, cells=None):
         source = (DOCS / "gallery_src" / f"{name}.py").read_text(encoding="utf-8")
@@ -40,8 +40,8 @@ def test_hot_spot_of_the_canopy_is_drawn_at_the_sun(drawn):
         assert peaks == [names["sun"].sza] * 2
 
 
-def test_views_below_the_air_are_drawn_with_the_sign_of_their_axis(drawn, monkeypatch):
-    """NDVI of a surface that is green toward the sun alone: minus the cosine of the scattering angle."""
+def test_views_through_the_atmosphere_have_the_sign_of_the_axis(drawn, monkeypatch):
+    """The NDVI of the test surface is minus the cosine of the scattering angle, i.e. largest toward the sun."""
 
     def mirrored(accessor, atmosphere, *, geometry, instrument):
         raa = relative_azimuth(geometry["saa"], geometry["vaa"])
@@ -60,7 +60,7 @@ def test_views_below_the_air_are_drawn_with_the_sign_of_their_axis(drawn, monkey
 
 
 def test_hot_spot_of_discs_is_drawn_at_the_sun(drawn):
-    """In the last picture of the script, by SAIL and by both references."""
+    """Last figure of the script: SAIL and both references."""
     axes = drawn("answers/plot_5_benchmarks", [0, -1])["axes"]
     assert all(axis.get_xlabel().endswith(SIGNED) for axis in axes[1])
     for axis in axes[0]:
@@ -68,8 +68,8 @@ def test_hot_spot_of_discs_is_drawn_at_the_sun(drawn):
         assert {line.get_xdata()[np.argmax(line.get_ydata())] for line in lines} == {benchmarks.RAMI_SZA}
 
 
-def test_table_of_the_hot_spot_is_that_of_its_picture():
-    """Largest differences of HOM45 by view zenith, in the sign of the table's head."""
+def test_table_of_the_hot_spot_agrees_with_its_figure():
+    """Largest differences of HOM45 by view zenith, with the sign convention of the table header."""
     page = (DOCS / "benchmarks.md").read_text(encoding="utf-8")
     assert f"| view zenith, {SIGNED} |" in page
     table, found = benchmarks.hom45()
@@ -89,8 +89,8 @@ def test_table_of_the_hot_spot_is_that_of_its_picture():
 
 
 @pytest.mark.slow
-def test_table_of_accuracy_has_the_deviations_of_the_checks():
-    """Errors of SAIL, of 5S in clear air, of successive orders and of the gases, rounded as the table has them."""
+def test_table_of_accuracy_agrees_with_the_checks():
+    """Errors of SAIL, 5S in clear air, successive orders and gases, rounded as in the table."""
     page = (DOCS / "benchmarks.md").read_text(encoding="utf-8")
     cells = dict(re.findall(r"^\| (.+?) \| (.+?) \| .+ \|$", page, re.MULTILINE))
     checks = (canopy._exact_transfer, atmosphere._five_s, atmosphere._successive_orders)
@@ -119,7 +119,7 @@ def test_table_of_accuracy_has_the_deviations_of_the_checks():
 
 
 def test_unknown_terms_of_an_instrument_are_hatched(drawn):
-    """A number or hatching in each cell, and a total only where every term has a number."""
+    """Each cell has a number or hatching; the total has a number only if every term has one."""
     names = drawn("answers/plot_3_instruments", [0])
     instruments, columns = names["names"], names["columns"]
     assert [text.get_text() for text in names["figure"].legends[0].get_texts()] == [

@@ -1,4 +1,4 @@
-"""The page on the installation names the Pythons that the package states."""
+"""The installation page lists the supported Python versions of the package."""
 
 import re
 import tomllib
@@ -7,7 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 
 
-def test_pythons_that_were_tested_are_those_that_the_package_states():
+def test_tested_python_versions_agree_with_classifiers():
     classifiers = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["classifiers"]
     stated = {each.rpartition(" ")[2] for each in classifiers if re.fullmatch(r".*Python :: 3\.\d+", each)}
     page = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""One way down: what each file may import, and how files and public functions are made."""
+"""Structure of the package: import rules, file sizes, names and docstring sections."""
 
 import ast
 import inspect
@@ -14,8 +14,8 @@ PACKAGE = Path(fifesim.__file__).parent
 STAGES = ("ground", "atmosphere", "sensor", "analysis")
 LABEL_LIBRARIES = {"xarray", "dask", "odc", "rioxarray", "rasterio"}
 
-# The rule of imports: a folder imports from those before it, and from itself. The four stages are one step, and so
-# are retrieval and models.
+# Import rule: a folder imports only from itself and from earlier folders. The four stages are one step, as are
+# retrieval and models.
 ORDER = ("base", "grids", "stages", "chain", "scenario", "output", "retrieval", "experiments", "cli")
 
 FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix().replace("/", "."): path for path in PACKAGE.rglob("*.py")}
@@ -23,7 +23,7 @@ TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FIL
 
 
 def imported(tree):
-    """Dotted names that a file imports, wherever in it."""
+    """Dotted names that a file imports anywhere."""
     names = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -35,7 +35,7 @@ def imported(tree):
 
 
 def own_imports(name):
-    """Files of the package that a file imports."""
+    """Files of the package imported by a file."""
     found = set()
     for dotted in imported(TREES[name]):
         parts = dotted.split(".")
@@ -54,12 +54,12 @@ def folder(name):
 
 
 def step(name):
-    """Place of a file's folder in the order."""
+    """Position of the folder of a file in `ORDER`."""
     return ORDER.index({"models": "retrieval"}.get(folder(name), "stages" if folder(name) in STAGES else folder(name)))
 
 
 def is_physics(name):
-    """Whether a file of a stage has formulas; ``labels.py`` and files that end in ``_labels.py`` have rasters."""
+    """Whether a file of a stage contains formulas; ``labels.py`` and ``*_labels.py`` handle rasters."""
     return folder(name) in STAGES and not re.search(r"[._]labels$", name)
 
 
@@ -67,13 +67,13 @@ ORDINARY = sorted(set(FILES) - {"__init__", "accessor"})
 PHYSICS = [name for name in ORDINARY if is_physics(name) or folder(name) == "base"]
 
 
-def test_imports_lead_down():
+def test_imports_follow_the_order():
     assert {folder(name) for name in ORDINARY} <= {*ORDER, *STAGES, "models"}
     imports = ((name, other) for name in ORDINARY for other in own_imports(name) if folder(other) != folder(name))
     assert [f"{name} imports {other}" for name, other in imports if step(other) >= step(name)] == []
 
 
-def test_physics_knows_no_labels_and_no_dask():
+def test_physics_imports_no_label_libraries():
     breaches = [f"{name} imports {other}" for name in PHYSICS for other in libraries(name) & LABEL_LIBRARIES]
     for name in PHYSICS:
         for other in own_imports(name):
@@ -82,8 +82,8 @@ def test_physics_knows_no_labels_and_no_dask():
     assert breaches == []
 
 
-def circle():
-    """Files that import each other in a circle, an empty list where none do."""
+def import_cycle():
+    """Files of a circular import, or an empty list."""
     done, path = set(), []
 
     def visit(name):
@@ -101,18 +101,18 @@ def circle():
     return next(filter(None, map(visit, sorted(FILES))), [])
 
 
-def test_imports_have_no_circle():
-    assert circle() == []
+def test_imports_have_no_cycle():
+    assert import_cycle() == []
 
 
-def test_a_folder_is_read_at_a_glance():
-    """Whoever opens the package sees Figure 1: the four stages, what lies below them and what is built on them."""
+def test_top_folder_is_small_and_has_the_known_folders():
+    """The package folder shows the four stages of Figure 1, the base below them and the tools above them."""
     shown = [path for path in PACKAGE.iterdir() if not path.name.startswith(("__pycache__", "."))]
     assert len([path for path in shown if path.name not in ("data", "py.typed")]) <= 16
     assert {path.name for path in shown if path.is_dir()} - {"data"} == {*ORDER, *STAGES, "models"} - {"stages", "cli"}
 
 
-# Parts of a stage in the order of their imports; "" are the files of the stage itself.
+# Parts of a stage in import order; "" are the files directly in the stage folder.
 PARTS = {
     "ground": ({"canopy"}, {"terrain"}, {"landscape"}),
     "sensor": ({"response"}, {"description"}, {""}, {"products"}),
@@ -120,13 +120,13 @@ PARTS = {
 
 
 def place_in_stage(name):
-    """Place of a file among the parts of its stage."""
+    """Position of a file among the parts of its stage."""
     stage, *folders, last = name.split(".")
     part = folders[0] if folders else ""
     return next(number for number, parts in enumerate(PARTS[stage]) if part in parts or last == "__init__")
 
 
-def test_parts_of_a_stage_import_down():
+def test_parts_of_a_stage_follow_the_import_order():
     stages = [name for name in ORDINARY if folder(name) in PARTS]
     inside = ((name, other) for name in stages for other in own_imports(name) if folder(other) == folder(name))
     above = [f"{name} imports {other}" for name, other in inside if place_in_stage(other) > place_in_stage(name)]
@@ -137,8 +137,8 @@ def test_only_the_package_imports_the_accessor():
     assert [name for name in FILES if "accessor" in own_imports(name)] == ["__init__"]
 
 
-def test_imports_stand_at_the_top():
-    """The command line imports late, so that its help is instant; others only what is slow and what few runs need."""
+def test_imports_are_at_the_top():
+    """Exceptions: the command line (for fast help), and slow libraries that few runs need."""
     breaches = []
     for name in sorted(set(FILES) - {"cli"}):
         functions = [node for node in ast.walk(TREES[name]) if isinstance(node, ast.FunctionDef)]
@@ -147,8 +147,8 @@ def test_imports_stand_at_the_top():
     assert breaches == []
 
 
-def test_only_the_front_doors_import_by_name():
-    """`import_module` would pass by the other tests."""
+def test_only_lazy_modules_import_by_name():
+    """The other tests do not detect `import_module`."""
     by_name = {name for name in FILES if "importlib.import_module" in imported(TREES[name])}
     assert by_name <= {"__init__", "accessor", "atmosphere.__init__"}
 
@@ -159,7 +159,7 @@ def test_no_file_shares_a_name_with_a_public_function_in_it():
 
 
 def docstring_lines(name):
-    """Numbers of the lines of a file that are in docstrings."""
+    """Line numbers of docstrings in a file."""
     found = set()
     for node in ast.walk(TREES[name]):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node, clean=False):
@@ -168,7 +168,7 @@ def docstring_lines(name):
 
 
 def lines_of_code(name):
-    """Number of lines of a file that are not blank, comments or docstrings."""
+    """Number of lines that are not blank, comments or docstrings."""
     docstrings = docstring_lines(name)
     lines = FILES[name].read_text(encoding="utf-8").splitlines()
     return sum(
@@ -178,20 +178,20 @@ def lines_of_code(name):
 
 
 def test_no_file_has_more_than_400_lines_of_code():
-    """A longer file covers more than one topic; docstrings do not count."""
+    """A longer file covers more than one topic. Docstrings do not count."""
     assert {name: lines_of_code(name) for name in FILES if lines_of_code(name) > 400} == {}
 
 
-def test_package_has_few_and_full_files():
-    """Otherwise a reader changes files too often."""
+def test_package_has_few_files():
+    """Many small files are hard to read."""
     assert len(FILES) <= 218
     assert len({path.parent for path in FILES.values()}) <= 24
     assert median(map(lines_of_code, FILES)) > 100
     assert sum(len(docstring_lines(name)) for name in FILES) <= 15_000
 
 
-# Names that more than one file may define: commands carry the names of functions, every file of verification has a
-# list of checks, and the two experiments and the sweeps each name the variables that they regress.
+# Names that several files may define: commands have the names of functions, every verification file has a list of
+# checks, and experiments and sweeps list their regressed variables.
 SHARED_NAMES = {
     "CHECKS",
     "VARIABLES",
@@ -219,7 +219,7 @@ def test_names_are_defined_in_one_file():
 
 
 def public_functions():
-    """Functions of modules and methods of classes, by a readable name; the command line's speak to a terminal."""
+    """Public functions and methods by dotted name, except the command line."""
     for name, tree in TREES.items():
         if name == "cli":
             continue
@@ -233,7 +233,7 @@ def public_functions():
 
 
 def own_nodes(function):
-    """Nodes of a function without those of functions inside it."""
+    """Nodes of a function, excluding nested functions."""
     for child in ast.iter_child_nodes(function):
         if not isinstance(child, ast.FunctionDef | ast.Lambda):
             yield child
@@ -242,9 +242,9 @@ def own_nodes(function):
 
 def sections_needed(function):
     """
-    Sections that its docstring must have.
+    Sections that the docstring of a function must have.
 
-    A method that takes nothing, such as a property, says what it gives in one line.
+    A method without arguments, such as a property, needs only one line.
     """
     arguments = function.args
     parameters = [each.arg for each in [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]]
@@ -260,7 +260,7 @@ def sections_needed(function):
 
 
 def test_functions_have_their_docstrings():
-    """A public function has all sections; an internal one has them too, or one sentence."""
+    """A public function has all sections; an internal function may have a single sentence."""
     exported = {f"{found.module.removeprefix('fifesim.')}.{name}" for name, found in PUBLIC.items()}
     lacking = []
     for name, function in public_functions():

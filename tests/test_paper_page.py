@@ -1,4 +1,4 @@
-"""The page on the paper is made of its numbers, and they bear its conclusions."""
+"""The page on the paper is generated from stored numbers, which support its statements."""
 
 import importlib
 import json
@@ -16,7 +16,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 NUMBERS = json.loads((DOCS / "paper.json").read_text(encoding="utf-8"))
 
 
-# What the paper states, and round numbers of the definitions.
+# Numbers that the paper states, and round numbers in definitions.
 STATED = {"0.05", "0.15", "0.24", "3.33", "4.778", "0.1", "1.0"}
 
 
@@ -36,12 +36,12 @@ def reading(name, dem="flat"):
 
 
 def nine(row, name):
-    """Values of LAI by treatment and arp, shape (3, 3)."""
+    """Values for LAI by treatment and arp, shape (3, 3)."""
     return np.array([row[f"{name} {treatment} {arp:g}"] for treatment, arp in friedl1995.scenes()]).reshape(3, 3)
 
 
-def test_page_is_made_of_its_numbers(make_paper):
-    """Else run ``python docs/make_paper.py --text``."""
+def test_page_is_generated_from_the_numbers(make_paper):
+    """To update the page, run ``python docs/make_paper.py --text``."""
     assert (DOCS / "paper.md").read_text(encoding="utf-8") == make_paper.text(NUMBERS)
 
 
@@ -50,8 +50,8 @@ def test_no_number_of_the_page_is_typed_by_hand():
     assert set(re.findall(r"(?<![\w.])\d+\.\d+", text)) <= STATED
 
 
-def test_numbers_bear_the_statements_of_the_page(make_paper):
-    """The numbers are made anew with each change of the model, and the words of the template stay."""
+def test_numbers_support_the_statements_of_the_page(make_paper):
+    """A change of the model updates the numbers, but not the text of the template."""
     drift, shift, aligned, narrow = map(reading, ("native", "offset", "aligned", "narrow"))
     hills, both = reading("aligned", "flint-hills"), reading("native", "flint-hills")
     blurred = [reading("blur-40.8"), reading("blur-48.6")]
@@ -95,14 +95,14 @@ def test_numbers_bear_the_statements_of_the_page(make_paper):
     assert [words for words, holds in statements.items() if not holds] == []
 
 
-def of_text(quantity, name):
-    """Values of a reading and the paper's, by variable and arp."""
+def text_values(quantity, name):
+    """Values of a reading and of the paper, by variable and arp."""
     rows = (row for row in NUMBERS["text"][name] if row["quantity"] == quantity and row["paper"] is not None)
     return {(row["variable"], row["arp"]): row for row in rows}
 
 
-def test_estimate_of_noise_is_that_of_a_normal_pair(make_paper):
-    """Deviation about the line over the slope and the mean, which is Eq. 7, of drawn pairs."""
+def test_noise_estimate_agrees_with_normal_pairs(make_paper):
+    """Eq. 7 from drawn pairs: residual standard deviation divided by slope and mean."""
     rng = np.random.default_rng(0)
     lai = 0.74 + 0.11 * rng.standard_normal(20_000)
     ndvi = 0.3 * lai + 0.03 * rng.standard_normal(lai.size)
@@ -111,13 +111,13 @@ def test_estimate_of_noise_is_that_of_a_normal_pair(make_paper):
     assert make_paper.expected_noise(r2, lai.std() / lai.mean()) == pytest.approx(expected, rel=1e-9)
 
 
-def test_noise_and_spread_are_those_of_this_program(make_paper):
-    """Of three realisations, within four standard errors. Else run ``python docs/make_paper.py --only scenes``."""
+def test_noise_and_spread_agree_with_the_program(make_paper):
+    """Three realisations, four standard errors. To update, run ``python docs/make_paper.py --only scenes``."""
     seeds = range(make_paper.SEED + 100, make_paper.SEED + 103)
     case, options = friedl1995.Case(), {"readings": [NATIVE, ALIGNED], "distributions": ["burned-grazed"]}
     found = friedl1995_table.realise_scenes(case, seeds, **options)["ren"].mean("realisation").squeeze("distribution")
     for name in ("native", "aligned"):
-        for (variable, arp), row in of_text("ren", name).items():
+        for (variable, arp), row in text_values("ren", name).items():
             value = float(found.sel(reading=name, variable=variable, arp=arp))
             assert value == pytest.approx(row["value"], abs=4 * row["deviation"] * np.sqrt(1 / 3 + 1 / 20))
     for variable, by_arp in make_paper.spread(case, seeds).items():
@@ -125,8 +125,12 @@ def test_noise_and_spread_are_those_of_this_program(make_paper):
 
 
 @pytest.mark.slow
-def test_numbers_are_those_of_this_program(make_paper):
-    """Sizes that need no realisation, and Table 2 within the scatter of two. Else run ``python docs/make_paper.py``."""
+def test_numbers_agree_with_the_program(make_paper):
+    """
+    Values without realisations, and Table 2 within the scatter of two realisations.
+
+    To update, run ``python docs/make_paper.py``.
+    """
     for name, found in make_paper._plain(make_paper.words(friedl1995.Case())).items():
         assert found == NUMBERS[name]
     sizes = make_paper.paper_deviations

@@ -1,4 +1,4 @@
-"""Tables that the documentation makes from the code are complete."""
+"""Tables that the documentation generates from the code are complete."""
 
 import importlib
 import tomllib
@@ -26,14 +26,14 @@ def tables(monkeypatch):
 
 
 def sections(text):
-    """Text below each heading of the second level."""
+    """Text of each second-level section, by heading."""
     parts = text.split("\n## ")
     parts[0] = parts[0].removeprefix("## ")
     return {part.partition("\n")[0].strip("`"): part for part in parts}
 
 
 def rows(text):
-    """Cells of the tables of a text by the first cell."""
+    """Cells of table rows in a text, by the first cell."""
     lines = [line.strip("|").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     return {cells[0].strip(" `"): [cell.strip() for cell in cells] for cells in lines}
 
@@ -87,11 +87,11 @@ def approx(value):
         ("atmosphere", "h2o", ["number", "g\N{NO-BREAK SPACE}cm⁻²", "[0, 10]", "–"]),
     ],
 )
-def test_rows_of_some_keys(tables, section, key, row):
+def test_rows_of_selected_keys(tables, section, key, row):
     assert rows(sections(tables.scenario_keys())[f"[{section}]"])[key][1:5] == row
 
 
-def test_names_of_the_table_are_those_that_a_scenario_accepts(tables):
+def test_scenario_accepts_exactly_the_listed_names(tables):
     for (section, key), names in tables.NAMES.items():
         annotation = Scenario.section((section,)).model_fields[key].annotation
         for name in names:
@@ -106,14 +106,14 @@ def test_names_of_the_table_are_those_that_a_scenario_accepts(tables):
             fifesim.Scenario(**{section: {key: wrong}})
 
 
-def test_limits_of_a_landscape_are_those_of_the_table(tables):
+def test_landscape_limits_agree_with_the_table(tables):
     for key, (low, high) in FIELD_LIMITS.items():
         assert rows(sections(tables.scenario_keys())["[landscape]"])[key][3] == f"[{low:g}, {high:g}]"
         with pytest.raises(ValueError, match="must be in"):
             fifesim.Scenario(landscape={"cover": "none", "deviations": {"soil": 0.1}} | {key: {"soil": high + 0.01}})
 
 
-def test_a_key_of_an_unknown_type_is_an_error(tables):
+def test_key_of_unknown_type_raises(tables):
     class Other(Section):
         key: bytes = b""
 
@@ -121,7 +121,7 @@ def test_a_key_of_an_unknown_type_is_an_error(tables):
         tables._type(Other.model_fields["key"], ())
 
 
-def test_every_command_option_and_help_text_is_on_the_page(tables):
+def test_page_has_every_command_option_and_help_text(tables):
     group = typer.main.get_command(app)
     if any(parameter.help is None for command in group.commands.values() for parameter in command.params):
         pytest.skip(f"typer {typer.__version__} has no help of arguments, which the page then lacks")
@@ -141,7 +141,7 @@ def test_every_command_option_and_help_text_is_on_the_page(tables):
     assert "fifesim rerun [OPTIONS] {file}" in found["rerun"]
 
 
-def test_every_number_of_an_instrument_has_its_source_on_the_page(tables):
+def test_page_has_a_source_for_every_instrument_value(tables):
     page = tables.instruments()
     found = {name.partition("\n")[0]: text for name, text in sections(page).items()}
     for name in fifesim.instrument_names():
@@ -169,7 +169,7 @@ def test_values_of_an_instrument(tables):
     assert overview["[L4TM](#instrument-l4tm)"][-3] != "unknown" and overview["[L4TM](#instrument-l4tm)"][-1] == "8.5 m"
 
 
-def test_page_on_citing_has_the_work_and_the_paper(tables):
+def test_citation_page_has_the_software_and_the_paper(tables):
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     (paper,) = cited["references"]
     text = tables.citation()
@@ -181,7 +181,7 @@ def test_page_on_citing_has_the_work_and_the_paper(tables):
     assert max(map(len, text.partition("```bibtex")[2].splitlines())) <= 96
 
 
-def test_visibilities_of_the_page_have_their_optical_thickness():
+def test_visibility_table_agrees_with_optical_thickness():
     page = (DOCS / "howto" / "aerosol.md").read_text("utf-8")
     found = [cells for name, cells in rows(page).items() if name.endswith(" km")]
     assert len(found) == 5

@@ -1,4 +1,4 @@
-"""Directions of sun and sensor that vary over the scene, from leaf area to digital numbers."""
+"""Sun and view angles that vary over the scene, from LAI to digital numbers."""
 
 import numpy as np
 import pytest
@@ -12,13 +12,13 @@ BANDS = ["TM3", "TM4"]
 
 
 def ramp(lai, low, high):
-    """A raster on the cells that grows to the east."""
+    """Raster on the grid of `lai` that increases to the east."""
     values = np.broadcast_to(np.linspace(low, high, lai.sizes["x"]), lai.shape)
     return lai.copy(data=values).drop_attrs(deep=False)
 
 
 def by_cell(sza, saa, vza, vaa):
-    """Directions of which some are rasters."""
+    """Geometry with some angles as rasters."""
     return xr.Dataset({"sza": sza, "saa": saa, "vza": vza, "vaa": vaa})
 
 
@@ -27,8 +27,8 @@ def swath(lai):
     return by_cell(ramp(lai, 25.0, 31.0), 117.0, ramp(lai, 0.0, 50.0), ramp(lai, 350.0, 370.0))
 
 
-def test_each_cell_has_its_own_direction(lai, swath):
-    """Against one geometry at a time; the share of skylight is interpolated over the sun's angle, to 1e-6."""
+def test_each_cell_uses_its_angles(lai, swath):
+    """Compared with single geometries; the skylight fraction is interpolated over sza to 1e-6."""
     rho = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath)
     for column in (0, 20, lai.sizes["x"] - 1):
         own = fifesim.Geometry(
@@ -38,7 +38,7 @@ def test_each_cell_has_its_own_direction(lai, swath):
         np.testing.assert_allclose(rho[..., column], alone[..., column], rtol=0, atol=1e-6)
 
 
-def test_reflectance_keeps_its_word(lai_with_hole, swath):
+def test_reflectance_follows_the_raster_rules(lai_with_hole, swath):
     result = check_raster_function(
         lambda array: fifesim.surface_reflectance(array, "TM", bands=BANDS, geometry=swath),
         lai_with_hole,
@@ -48,7 +48,7 @@ def test_reflectance_keeps_its_word(lai_with_hole, swath):
     np.testing.assert_array_equal(np.isnan(result[0]), np.isnan(lai_with_hole))
 
 
-def test_background_may_be_a_raster_too(lai, swath):
+def test_background_may_be_a_raster(lai, swath):
     litter = (lai * 0 + 0.2).drop_attrs(deep=False)
     mapped = lai.fifesim.surface_reflectance(
         "TM", bands=BANDS, geometry=swath, canopy=fifesim.Canopy(background=litter)
@@ -57,19 +57,19 @@ def test_background_may_be_a_raster_too(lai, swath):
     np.testing.assert_allclose(mapped, uniform, rtol=1e-14)
 
 
-def test_image_of_a_swath_knows_its_directions(lai, swath):
+def test_image_of_a_swath_has_pixel_angles(lai, swath):
     toa = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath).fifesim.to_toa()
     image = check_raster_function(lambda array: array.fifesim.sense("TM"), toa, quantity="dn")
     there = directions.geometry_of(image)
     assert directions.varying(there) == ("sza", "vza", "vaa")
     middle = toa["sza"].values.reshape(5, 9, 6, 9).mean((1, 3))
     np.testing.assert_allclose(there.sza, middle, rtol=1e-12)
-    # North lies between 350 and 10 degrees, and a mean of numbers would be in the south.
+    # The mean of azimuths between 350 and 10 degrees is north; an arithmetic mean would be south.
     assert np.all((there.vaa < 10.1) | (there.vaa > 349.9))
 
 
-def test_planetary_reflectance_of_a_swath_is_what_it_was(lai, swath):
-    """To half a count: the sun is that of the pixel there and back."""
+def test_planetary_reflectance_of_a_swath_round_trips(lai, swath):
+    """Within half a count: both conversions use the solar angle of the pixel."""
     toa = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath).fifesim.to_toa()
     paper = fifesim.instrument("TM", response="paper")
     image = toa.fifesim.sense(paper)
@@ -79,7 +79,7 @@ def test_planetary_reflectance_of_a_swath_is_what_it_was(lai, swath):
     assert np.all(np.abs(image.fifesim.to_reflectance() - one_sun).values <= 0.5 * count + 1e-9)
 
 
-def test_one_direction_as_a_raster_is_that_direction(lai):
+def test_constant_angle_raster_equals_a_single_geometry(lai):
     level = by_cell(28.5, 117.0, ramp(lai, 20.0, 20.0), 200.0)
     one = fifesim.Geometry(28.5, 117.0, 20.0, 200.0)
     images = [
@@ -90,7 +90,7 @@ def test_one_direction_as_a_raster_is_that_direction(lai):
 
 
 @pytest.mark.parametrize("call", ["slopes", "fpar"])
-def test_what_needs_one_sun_says_so(lai, swath, call):
+def test_functions_that_need_one_geometry_raise(lai, swath, call):
     with pytest.raises(ValueError, match="needs one direction of sun and sensor, got rasters of sza, vza, vaa"):
         if call == "fpar":
             lai.fifesim.fpar(geometry=swath)
@@ -98,7 +98,7 @@ def test_what_needs_one_sun_says_so(lai, swath, call):
             lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath, dem=ramp(lai, 0, 10))
 
 
-def test_a_low_view_is_named(lai):
+def test_view_below_the_horizon_raises(lai):
     low = by_cell(28.5, 117.0, ramp(lai, 20.0, 95.0), 200.0)
     with pytest.raises(ValueError, match=r"vza must be in \[0, 90\) degrees in every cell, got"):
         lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=low)

@@ -1,12 +1,16 @@
 """
-Mistakes of users and their expected outcome: an error, a warning, or the right numbers.
+User mistakes and their expected outcome: an error, a warning, or the correct result.
 
-``data/user_mistakes.toml`` lists them by topic and title. Each has ``code`` as a user types it, whose last line is an
-expression. The fixture ``names`` defines the names in it: a landscape of 60 x 60 cells on the FIFE site, its image, and
-its NDVI. A silent wrong result is a failure: ``refused`` are words of the error that is raised (a ValueError unless
-``error`` names another) and ``unsaid`` a text that it lacks; ``warned`` are words of a warning; ``expected`` is an
-expression for the right value, from an independent calculation. Code with both ``refused`` and ``expected`` may do
-either.
+``data/user_mistakes.toml`` lists the mistakes by topic and title:
+
+- ``code`` is user code whose last line is an expression. The fixture ``names`` defines its names: a landscape of
+  60 x 60 cells on the FIFE site, its image, and its NDVI.
+- ``refused`` are words of the expected error, a ValueError unless ``error`` names another type. ``unsaid`` is text that
+  the message must not contain.
+- ``warned`` are words of the expected warning.
+- ``expected`` is an expression for the correct value from an independent calculation.
+
+Code with both ``refused`` and ``expected`` may do either. A silent wrong result is a failure.
 """
 
 import ast
@@ -31,12 +35,12 @@ from fifesim.cli import app
 
 PACKAGE = str(Path(fifesim.__file__).parent)
 MISTAKES = tomllib.loads((Path(__file__).parent / "data" / "user_mistakes.toml").read_text(encoding="utf-8"))
-# Command lines that end with exit code 2 and write nothing.
+# Command lines that exit with code 2 and write nothing.
 COMMANDS = MISTAKES.pop("commands")
 
 
 def plain(values, crs=26914, x0=7e5, y0=4.33e6, cell=10.0, **coords):
-    """Raster as another program makes it, with no attributes but a CRS."""
+    """Raster from another program, with a CRS but no attributes."""
     rows, columns = values.shape[-2:]
     place = {"y": y0 - cell * (np.arange(rows) + 0.5), "x": x0 + cell * (np.arange(columns) + 0.5)}
     raster = xr.DataArray(values, dims=("band", "y", "x")[-values.ndim :], coords=place | coords)
@@ -44,30 +48,30 @@ def plain(values, crs=26914, x0=7e5, y0=4.33e6, cell=10.0, **coords):
 
 
 def own(values, **coords):
-    """Raster of a red and a near infrared band as another program makes it."""
+    """Red and near-infrared raster from another program."""
     return plain(np.asarray(values), **(coords or {"band": ["TM3", "TM4"]}))
 
 
 def west(raster, value):
-    """Raster with a value in its four western columns."""
+    """Raster with its four western columns set to a value."""
     return raster.where(raster.x > raster.x[3], value)
 
 
 def normalized(bands):
-    """NDVI of a red and a near infrared band by its definition."""
+    """NDVI of a red and a near-infrared band by definition."""
     with np.errstate(invalid="ignore"):
         return (bands[1] - bands[0]) / (bands[1] + bands[0])
 
 
 def planetary(image):
-    """Planetary reflectance of digital numbers by hand [1]."""
+    """Planetary reflectance of digital numbers by hand. [1]"""
     gain, offset, irradiance = (image[name].values[:, None, None] for name in ("gain", "offset", "solar_irradiance"))
     radiance = image.values * gain + offset
     return np.pi * radiance * float(image.earth_sun_distance) ** 2 / (irradiance * np.cos(np.radians(float(image.sza))))
 
 
 def blocks(values):
-    """Means over blocks of 3 x 3 cells; NaN where one is NaN."""
+    """Means over blocks of 3 x 3 cells; NaN if any cell is NaN."""
     return values.reshape(20, 3, 20, 3).mean((1, 3))
 
 
@@ -83,15 +87,15 @@ def polar(longitude, latitude):
 
 
 def polar_slope(x0, y0):
-    """Elevation of 60 x 60 cells of 10 m around a place in EPSG:3413 that falls toward true south [m]."""
+    """Elevation of 60 x 60 cells of 10 m around a point in EPSG:3413 that decreases toward true south. [m]"""
     step = 10 * (np.arange(60) + 0.5) - 300
     x, y = np.meshgrid(x0 + step, y0 - step)
-    # The pole is the origin: true north is toward it.
+    # The pole is the origin, so true north is toward the origin.
     return 500 - 0.1 * (np.hypot(x, y) - np.hypot(x0, y0))
 
 
 def translate(source, target, bands, unscale=False):
-    """What ``gdal_translate -b`` makes of a file, with ``-unscale -ot Float32`` too."""
+    """Copy a file as ``gdal_translate -b`` does, optionally with ``-unscale -ot Float32``."""
     with rasterio.open(source) as old:
         profile = {"driver": "GTiff", "width": old.width, "height": old.height, "count": len(bands), "crs": old.crs}
         profile |= {"transform": old.transform, "nodata": old.nodata, "dtype": "float32" if unscale else old.dtypes[0]}
@@ -106,7 +110,7 @@ def translate(source, target, bands, unscale=False):
 
 
 def camera(altitude="705000.0", gsd="30", bits="12", center="0.668", width="0.01", snr="200", more=""):
-    """Instrument from a short file."""
+    """Instrument from a minimal file."""
     bits, more = f"bits = {bits}\n" if bits else "", f", {more}" if more else ""
     band = f'name = "red", center = {center}, width = {width}, snr = {snr}, snr_radiance = 100.0{more}'
     text = f'name = "Camera"\naltitude = {altitude}\ngsd = {gsd}\n{bits}bands = [{{ {band} }}]\n'
@@ -115,7 +119,7 @@ def camera(altitude="705000.0", gsd="30", bits="12", center="0.668", width="0.01
 
 
 def simulate(**sections):
-    """Simulation of 300 m x 300 m on level ground."""
+    """Simulation of 300 m x 300 m on flat ground."""
     size = {"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}}
     return fifesim.simulate(fifesim.Scenario(**(size | sections)))
 
@@ -127,18 +131,18 @@ def study(draws=None, **how):
 
 
 def canopy(**options):
-    """Red reflectance of the leaf area of the scene."""
+    """Red reflectance of the LAI of the scene."""
     own = fifesim.Canopy(**options)
     return shared()["lai"].fifesim.surface_reflectance("TM", bands=["TM3"], canopy=own)
 
 
 def fine(arp=0.2, **options):
-    """Leaf area of the cells of the truth."""
+    """LAI of the cells, downscaled from the truth."""
     return fifesim.downscale(shared()["truth"], shared()["grid"], arp=arp, seed=7, **options)
 
 
 def own_lai():
-    """Leaf area as another program makes it."""
+    """LAI raster from another program."""
     return plain(shared()["lai"].values)
 
 
@@ -146,7 +150,7 @@ _SHARED = {}
 
 
 def shared():
-    """Landscape, image and NDVI of 60 x 60 cells of 10 m, made once."""
+    """Landscape, image and NDVI of 60 x 60 cells of 10 m, computed once."""
     if not _SHARED:
         grid = fifesim.fife_site(cell=10, window=((90, 150), (180, 240)))
         lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7)
@@ -162,14 +166,14 @@ def shared():
 
 @pytest.fixture
 def names(tmp_path, monkeypatch):
-    """Names in the code: fresh copies, and an empty working folder."""
+    """Names in the code, as fresh copies, with an empty working folder."""
     monkeypatch.chdir(tmp_path)
     scene = {name: each.copy(deep=True) if isinstance(each, xr.DataArray) else each for name, each in shared().items()}
     return globals() | scene
 
 
 def run(code, names):
-    """Value of the last line of some code, computed, and the warnings."""
+    """Computed value of the last line of code, and warnings."""
     *lines, last = ast.parse(code).body
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -180,7 +184,7 @@ def run(code, names):
 
 
 def check_error(error, mistake):
-    """The error is one of fifesim, short, and says the words."""
+    """Check that the error is raised in fifesim, is short and contains the words."""
     text, last = str(error), traceback.extract_tb(error.__traceback__)[-1].filename
     assert isinstance(error, getattr(builtins, mistake.get("error", "ValueError"))), f"{type(error).__name__}: {text}"
     assert last.startswith(PACKAGE) and len(text) <= 600, f"{last}: {text}"
@@ -196,7 +200,7 @@ CASES = [
 
 
 @pytest.mark.parametrize("mistake", CASES)
-def test_a_mistake_is_not_a_silent_wrong_result(mistake, names):
+def test_mistake_gives_no_silent_wrong_result(mistake, names):
     try:
         found, told = run(mistake["code"], names)
     except Exception as error:
@@ -214,7 +218,7 @@ def test_a_mistake_is_not_a_silent_wrong_result(mistake, names):
 
 
 @pytest.mark.parametrize("title", COMMANDS)
-def test_a_mistake_on_the_command_line_ends_with_2_and_writes_nothing(title, names):
+def test_mistake_on_the_command_line_exits_with_2_and_writes_nothing(title, names):
     Path("mine.toml").write_text(COMMANDS[title]["scenario"])
     done = CliRunner().invoke(app, shlex.split(COMMANDS[title]["command"]))
     assert done.exit_code == 2, done.output

@@ -1,4 +1,4 @@
-"""Pictures, table and statements of the page on the scatter between NDVI and LAI follow from the budget."""
+"""Figures, table and statements of the page on NDVI-LAI scatter agree with the error budget."""
 
 import importlib
 from pathlib import Path
@@ -22,13 +22,13 @@ def why(monkeypatch):
 
 @pytest.fixture
 def case(why):
-    """A small part of the scene without hills, which take more time than all else."""
+    """Small part of the scene, without hills, which take most of the time."""
     sections = why.scenario(cells=90).model_dump(exclude_unset=True)
     sections["terrain"], sections["landscape"]["covary"] = {"dem": "flat"}, {"soil": -0.3}
     return fifesim.Scenario(**sections)
 
 
-def test_panels_are_the_budget_of_their_scene(why, case):
+def test_panels_agree_with_the_budget_of_their_scene(why, case):
     found = why.panels(case)
     budget = fifesim.budget(case, realisations=1, cells=90).isel(realisation=0).sel(variable="lai")
     assert found[0].r2 == pytest.approx(1 - float(budget["curvature"]), abs=1e-9)
@@ -77,7 +77,7 @@ def test_statements_of_the_page_on_the_table(why):
 
 @pytest.mark.slow
 def test_statements_of_the_page_on_the_panels(why):
-    """Of the very scene of the picture."""
+    """Full scene of the figure."""
     page = (DOCS / "why_scatter.md").read_text("utf-8")
     assert "most in panels 3 and 5" in page
     found = why.panels(why.scenario())

@@ -1,8 +1,8 @@
 """
-Code as a user writes it, for a type checker.
+User code for a type checker.
 
-What is right runs in the tests and has no errors. Each line that is wrong says the error it has, and mypy reports an
-``ignore`` that nothing needs.
+The correct functions have no type errors and run in the tests. Each wrong line has an ``ignore`` with its error code,
+and mypy reports unneeded ones.
 """
 
 from datetime import datetime
