@@ -1,4 +1,4 @@
-"""Wrong arguments of every public function: one line that names it, and no raw message of a library."""
+"""Invalid arguments of every public function give one line that names the argument, and no raw library error."""
 
 from __future__ import annotations
 
@@ -48,22 +48,22 @@ NO_ARGUMENTS = {
     "verify",
 }
 
-# Results of other functions, whose fields users do not type.
+# Classes of results, whose fields users do not type.
 RESULTS = {"Instrument", "Regression", "Retrieval"}
 
 KINDS = ("numpy", "list", "none", "str", "dataset", "empty", "1-d", "crs")
 
-# Values that look wrong and are allowed, by function and argument. Besides, the first argument of a function may be a
+# Accepted values that look wrong, by function and argument. In addition, the first argument of a function may be a
 # raster elsewhere ("crs").
 LIST, ARRAYS = {"list"}, {"numpy", "list", "empty", "1-d", "crs"}
 ACCEPTED = {
-    # A label of any text; None and others are refused.
+    # Any text is a valid label; None and other types are rejected.
     ("Band", "name"): {"str"}, ("CoverClass", "name"): {"str"},
     ("to_geotiff", "path"): {"str"}, ("dataset", "folder"): {"str"},
     ("write_style", "path"): {"str"},
-    # Descriptions without a grid check rasters and spectra when they are used: see the test of fields of a canopy.
+    # Descriptions without a grid check rasters and spectra when they are used; see the test of canopy fields.
     **{("Canopy", name): {"list", "str", "dataset", "numpy", "1-d", "crs"} for name in PROPERTIES},
-    # Setup is a description without a raster, and the steps check names of bands, instruments and noise.
+    # Setup is a description without a raster; names of bands, instruments and noise are checked by the steps.
     ("Setup", "instrument"): {"str"}, ("Setup", "dem"): {"crs"},
     ("Setup", "clouds"): {"dataset"}, ("Setup", "surroundings"): ARRAYS - {"empty"},
     **{("Setup", name): {"list", "str"} for name in ("bands", "noise", "interval", "offset")},
@@ -72,7 +72,7 @@ ACCEPTED = {
     **{("RossLi", name): ARRAYS for name in ("iso", "vol", "geo")},
     **{("Leaf", name): {"numpy", "1-d", "crs", "empty"} for name in ("structure", "chlorophyll", "carotenoids",
                                                             "anthocyanins", "brown", "water", "dry_matter")},
-    # A Dataset of rasters is taken raster by raster, and one with coordinates of the sun is a geometry.
+    # A Dataset is processed raster by raster, and a Dataset with sun coordinates is a geometry.
     ("aggregate", "array"): {"dataset", "crs"}, ("to_geotiff", "raster"): {"dataset", "crs"},
     **{(name, "geometry"): {"dataset"} for name in ("fpar", "illumination", "kt", "sense", "shadow",
                                                     "surface_reflectance", "to_surface", "to_toa",
@@ -81,17 +81,17 @@ ACCEPTED = {
                                                     "evapotranspiration", "albedo", "brdf_normalise", "cast_clouds",
                                                     "topographic_correction")},
     ("brdf_normalise", "to"): {"dataset"}, ("topographic_correction", "c"): LIST,
-    # Numbers in any shape.
+    # Numbers of any shape.
     ("mtf", "frequency"): {"list", "1-d"}, ("snr", "radiance"): ARRAYS,
     ("noise_equivalent_radiance", "radiance"): ARRAYS,
     **{("sun_position", name): {"list", "1-d"} for name in ("latitude", "longitude", "altitude")},
-    # Pairs: down and across, or bottom and top.
+    # Pairs: (down, across) or (bottom, top).
     ("grid_at", "cell"): LIST, ("read_aerosol", "layer"): LIST, ("sense", "interval"): LIST, ("sense", "offset"): LIST,
     ("sense", "gain_drift"): LIST,
-    # Statistics need no places, and chunks of a raster elsewhere are chunks.
+    # Statistics need no coordinates; chunks of a raster elsewhere are valid chunks.
     ("density", "array"): {"1-d", "crs"}, ("share_kept", "pixels"): {"1-d", "crs"}, ("share_kept", "cells"): {"crs"},
     ("horizon", "beside"): {"crs"}, ("scale_bias", "array"): {"crs"}, ("landscape", "dem"): {"crs"},
-    # Names of three bands, which a raster without bands does not need; two limits; None where it says something.
+    # Names of three bands, ignored for a raster without bands; pairs of limits; None where it has a meaning.
     ("plot", "composite"): LIST, ("plot", "limits"): LIST, ("plot_comparison", "limits"): LIST,
     ("plot", "stretch"): LIST,
     **{("cloud_field", name): LIST for name in ("thickness", "height", "drift")},
@@ -102,25 +102,25 @@ ACCEPTED = {
 }  # fmt: skip
 
 
-def defaults(name):
-    """Arguments of a public function that need not be given."""
+def default_arguments(name):
+    """Optional arguments of a public function and their default values."""
     parameters = inspect.signature(getattr(fifesim, name)).parameters
     return {key: each.default for key, each in parameters.items() if each.default is not each.empty}
 
 
-def breach(error, argument, kind):
-    """What is wrong with a refusal: it is long, does not name the argument, or comes from a library."""
+def message_faults(error, argument, kind):
+    """Faults of an error message: too long, does not name the argument, or raised by a library."""
     text, last = str(error), traceback.extract_tb(error.__traceback__)[-1].filename
     short = len(text) <= 500 and text.count("\n") <= 2
-    good = short and names_it(text, argument, kind) and last.startswith(PACKAGE)
+    good = short and names_argument(text, argument, kind) and last.startswith(PACKAGE)
     return [] if good else [f"{argument} = {kind}: {text[:150]} ({last})"]
 
 
-def required(name):
-    return set(inspect.signature(getattr(fifesim, name)).parameters) - set(defaults(name))
+def required_arguments(name):
+    return set(inspect.signature(getattr(fifesim, name)).parameters) - set(default_arguments(name))
 
 
-def spectra(grid):
+def reflectance_spectra(grid):
     """Reflectance spectra of the cells of a grid."""
     wavelength = np.linspace(0.4, 2.4, 201)
     values = np.broadcast_to(np.linspace(0.05, 0.4, 201)[:, None, None], (201, *grid.shape)).copy()
@@ -128,19 +128,19 @@ def spectra(grid):
     return cells.assign_coords(wavelength=wavelength)
 
 
-def placed(values, grid, name):
+def make_raster(values, grid, name):
     raster = grids.place(xr.DataArray(values, dims=("band", "y", "x")[-values.ndim :], name=name), grid)
     return raster.assign_coords(sza=30.0, saa=120.0, vza=0.0, vaa=0.0, earth_sun_distance=1.0)
 
 
 @pytest.fixture(scope="module")
-def calls(tmp_path_factory):
-    """Arguments with which each public function works, as far as it can on twelve cells."""
+def valid_calls(tmp_path_factory):
+    """Arguments with which each public function works, as far as possible on a raster of twelve by twelve cells."""
     folder = tmp_path_factory.mktemp("arguments")
     rng, grid = np.random.default_rng(1), fifesim.fife_site(10.0, window=((90, 102), (180, 192)))
-    lai = placed(rng.uniform(0.5, 4, grid.shape), grid, "lai")
-    dem = placed(300 + rng.uniform(0, 4, grid.shape), grid, "dem")
-    rho = placed(rng.uniform(0.05, 0.4, (2, *grid.shape)), grid, "rho").assign_coords(
+    lai = make_raster(rng.uniform(0.5, 4, grid.shape), grid, "lai")
+    dem = make_raster(300 + rng.uniform(0, 4, grid.shape), grid, "dem")
+    rho = make_raster(rng.uniform(0.05, 0.4, (2, *grid.shape)), grid, "rho").assign_coords(
         band=["TM3", "TM4"], wavelength=("band", [0.66, 0.83])
     )
     rho.attrs["instrument"] = "TM"
@@ -152,20 +152,20 @@ def calls(tmp_path_factory):
     tiny = fifesim.Scenario(grid={"width": 60, "height": 60}, terrain={"dem": "flat"}, sensor={"response": "paper"})
     study = fifesim.Study(tiny, {"visibility": {"uniform": [10, 60]}}, landscapes=1, split={"train": 1.0})
     counts = image.drop_vars(["gain", "offset"])
-    of_classes = placed(np.ones(grid.shape, np.uint8), grid, "cover")
+    of_classes = make_raster(np.ones(grid.shape, np.uint8), grid, "cover")
     style = shutil.copy(file, folder / "style.tif")
     images = fifesim.compare(lai, ["TM"], fifesim.Setup(interval=20.0, min_valid=0.1))
     wide = fifesim.fife_site(250.0, window=((20, 26), (20, 26)))
-    radiance = placed(np.full((1, *wide.shape), 80.0), wide, "toa_radiance").assign_coords(band=["MODIS1"])
+    radiance = make_raster(np.full((1, *wide.shape), 80.0), wide, "toa_radiance").assign_coords(band=["MODIS1"])
     radiance.attrs |= {"instrument": "MODIS", "units": "W m-2 sr-1 um-1"}
     swath = fifesim.sense_swath(radiance, "MODIS", min_valid=0.1)
     coarse = fifesim.fife_site(1100.0, window=((0, 12), (0, 12)))
-    avhrr = placed(np.full((1, *coarse.shape), 0.2), coarse, "toa_reflectance").assign_coords(band=["AVHRR1"])
+    avhrr = make_raster(np.full((1, *coarse.shape), 0.2), coarse, "toa_reflectance").assign_coords(band=["AVHRR1"])
     samples = fifesim.sense_swath(avhrr, "AVHRR", min_valid=0.1, quantise=False)
     many = fifesim.Study(tiny, {"visibility": {"uniform": [10, 60]}}, landscapes=3)
     chips = fifesim.dataset(many, folder / "training.zarr", 3)
     retrieval = fifesim.train(chips, "line", path=folder / "line.nc")
-    # Required arguments by their names, and then others by function.
+    # Arguments shared by name; below, the others by function.
     shared = {
         "grid": grid, "lai": lai, "dem": dem, "reflectance": rho, "toa": rho, "image": image, "ndvi": ndvi,
         "array": lai, "raster": lai, "path_or_raster": file, "scenario": tiny, "study": study, "fit": fit,
@@ -181,7 +181,7 @@ def calls(tmp_path_factory):
         "correlated_fields": {"arps": {"lai": 0.1}},
         "downscale": {"lai": fifesim.aggregate(lai, 60.0, min_valid=0.1)},
         "canopy_spectra": {"canopies": {"lai": [1.0, 2.0]}, "geometry": fifesim.fife_geometry()},
-        "to_bands": {"spectra": spectra(grid)},
+        "to_bands": {"spectra": reflectance_spectra(grid)},
         "adjust_bands": {"instrument": "OLI", "bands": ["OLI4"], "source": "TM"},
         "as_seen_by": {"instrument": "OLI", "bands": ["OLI4"], "source": "TM", "atmosphere": fifesim.Atmosphere(),
                        "onto": grid},
@@ -262,16 +262,20 @@ def calls(tmp_path_factory):
         "fpar_bias": {"extinction": 0.5},
         **{name: {"reach": 30.0} for name in ("autocovariance", "variogram")},
     }  # fmt: skip
-    calls = {}
+    valid_calls = {}
     for name in set(PUBLIC) - NO_ARGUMENTS - RESULTS:
-        calls[name] = {key: shared[key] for key in required(name) & set(shared)} | defaults(name) | given.pop(name, {})
+        valid_calls[name] = (
+            {key: shared[key] for key in required_arguments(name) & set(shared)}
+            | default_arguments(name)
+            | given.pop(name, {})
+        )
     assert given == {}
-    return calls
+    return valid_calls
 
 
 @pytest.fixture(scope="module")
-def wrong(calls):
-    lai = calls["fpar"]["lai"]
+def wrong_values(valid_calls):
+    lai = valid_calls["fpar"]["lai"]
     elsewhere = fifesim.grid_at("EPSG:32633", 5e5, 5e6, 120, 120, 10)
     return {
         "numpy": np.ones((12, 12)),
@@ -281,18 +285,18 @@ def wrong(calls):
         "dataset": xr.Dataset({"a": lai, "b": lai}),
         "empty": lai.isel(y=slice(0, 0)),
         "1-d": lai.isel(y=0, drop=True),
-        "crs": placed(lai.values, elsewhere, "elsewhere"),
+        "crs": make_raster(lai.values, elsewhere, "elsewhere"),
     }
 
 
-def names_it(text, argument, kind):
-    """Whether a message names the argument; of a name that is none, or of grids that differ, it names these."""
+def names_argument(text, argument, kind):
+    """Whether a message names the argument, the unknown name, or the grids that differ."""
     stem = argument.replace("_", " ").rstrip("s")
     others = {"str": ("nonsense",), "crs": ("raster", "grid", "lattice")}.get(kind, ())
     also = {
         "leaf_optics": ("leaf reflectance", "leaf transmittance"),
         "source": ("aerosol",),
-        # The items of lists are named: classes and quantities.
+        # Classes and quantities are named item by item.
         "classes": ("class 1 must be", "class a must be"),
         "derivatives": ("1.0 is no quantity of canopies and their derivatives",),
         "composite": ("colours",),
@@ -304,25 +308,27 @@ def names_it(text, argument, kind):
     return any(word in text.lower() for word in words)
 
 
-def test_every_public_function_is_tried(calls):
-    assert [f"{name}: {missing}" for name in calls if (missing := required(name) - set(calls[name]))] == []
+def test_every_public_function_has_a_valid_call(valid_calls):
+    assert [
+        f"{name}: {missing}" for name in valid_calls if (missing := required_arguments(name) - set(valid_calls[name]))
+    ] == []
 
 
-def accepted(name, argument, first):
-    """Kinds of values that may be accepted, though they look wrong."""
+def accepted_kinds(name, argument, first):
+    """Kinds of values that may be accepted although they look wrong."""
     return ACCEPTED.get((name, argument), {"crs"} if first else set())
 
 
 @pytest.mark.parametrize("name", sorted(set(PUBLIC) - NO_ARGUMENTS - RESULTS))
-def test_a_wrong_argument_is_named_in_a_line(calls, wrong, name, tmp_path, monkeypatch):
+def test_wrong_argument_is_named_in_one_line(valid_calls, wrong_values, name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    function, given, found = getattr(fifesim, name), calls[name], []
+    function, given, found = getattr(fifesim, name), valid_calls[name], []
     for argument in given:
         first = argument == next(iter(inspect.signature(function).parameters))
-        for kind, value in wrong.items():
-            if value is defaults(name).get(argument, wrong):
+        for kind, value in wrong_values.items():
+            if value is default_arguments(name).get(argument, wrong_values):
                 continue
-            # A Dataset of bands is a raster to some.
+            # Some functions accept a Dataset of bands as a raster.
             if kind == "dataset" and first and "Dataset" in PUBLIC[name].methods_of:
                 continue
             # A valid path, whose page takes many simulations.
@@ -333,25 +339,25 @@ def test_a_wrong_argument_is_named_in_a_line(calls, wrong, name, tmp_path, monke
                     warnings.simplefilter("ignore")
                     function(**(given | {argument: value}))
             except (ValueError, TypeError, FileNotFoundError) as error:
-                found += breach(error, argument, kind)
+                found += message_faults(error, argument, kind)
             else:
-                if kind not in accepted(name, argument, first):
+                if kind not in accepted_kinds(name, argument, first):
                     found.append(f"{argument} = {kind} is accepted")
     assert found == []
 
 
 @pytest.mark.parametrize("field", list(PROPERTIES))
-def test_a_wrong_field_of_a_canopy_is_named_in_a_line(calls, wrong, field):
-    given, found, refused = calls["surface_reflectance"], [], 0
-    for kind, value in wrong.items():
+def test_wrong_canopy_field_is_named_in_one_line(valid_calls, wrong_values, field):
+    given, found, refused = valid_calls["surface_reflectance"], [], 0
+    for kind, value in wrong_values.items():
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                # Dead leaves, so that their optics are used.
+                # Dead leaves make the function use their optics.
                 dead = {} if field in ("brown", "lai") else {"brown": 0.3}
                 fifesim.surface_reflectance(**given | {"canopy": fifesim.Canopy(**dead | {field: value})})
         except (ValueError, TypeError, FileNotFoundError) as error:
-            found += breach(error, field, kind)
+            found += message_faults(error, field, kind)
             refused += 1
     assert found == [] and refused >= 5
 
@@ -360,9 +366,9 @@ NOT_REAL = ["bool", "complex64", "datetime64[s]", "timedelta64[s]", "str", "obje
 
 
 @pytest.mark.parametrize("name", sorted(set(PUBLIC) - NO_ARGUMENTS - RESULTS))
-def test_rasters_must_hold_real_numbers(calls, name):
-    """A mask, dates, text and complex numbers convert to floating point, so that they would pass for a quantity."""
-    function, given = getattr(fifesim, name), calls[name]
+def test_rasters_must_hold_real_numbers(valid_calls, name):
+    """Masks, dates, text and complex numbers could be converted to floating point and pass for a quantity."""
+    function, given = getattr(fifesim, name), valid_calls[name]
     for argument, raster in given.items():
         for dtype in NOT_REAL if isinstance(raster, xr.DataArray) else ():
             if (name, dtype) in (("aggregate", "bool"), ("score", "bool")):
@@ -371,9 +377,9 @@ def test_rasters_must_hold_real_numbers(calls, name):
                 function(**(given | {argument: raster.astype(dtype)}))
 
 
-def test_rasters_within_an_argument_must_hold_real_numbers(calls):
-    given = calls["surface_reflectance"]
-    lai, rho = given["lai"], calls["to_toa"]["reflectance"]
+def test_rasters_within_an_argument_must_hold_real_numbers(valid_calls):
+    given = valid_calls["surface_reflectance"]
+    lai, rho = given["lai"], valid_calls["to_toa"]["reflectance"]
     mask = lai > 1
     within = {
         "canopy": fifesim.Canopy(background={"TM3": mask, "TM4": 0.2}),
@@ -397,8 +403,8 @@ def test_rasters_within_an_argument_must_hold_real_numbers(calls):
 
 
 @pytest.mark.parametrize("name", ["ndvi", "sense", "grid_at"])
-def test_a_function_that_looks_is_still_a_function(name):
-    """Its name, documentation and signature stay, and it goes to other processes."""
+def test_checked_function_keeps_its_signature_and_can_be_pickled(name):
+    """The name, documentation and signature are kept, and worker processes can load the function."""
     function = getattr(fifesim, name)
     bare = inspect.unwrap(function)
     assert bare is not function and function.__doc__ == bare.__doc__
@@ -406,9 +412,9 @@ def test_a_function_that_looks_is_still_a_function(name):
     assert pickle.loads(pickle.dumps(function)) is function
 
 
-def test_what_a_user_typed(calls):
-    """Messages that were raw: each names the argument and what to type."""
-    lai, rho = calls["fpar"]["lai"], calls["to_toa"]["reflectance"]
+def test_messages_name_the_argument_and_the_remedy(valid_calls):
+    """Mistakes that libraries report obscurely: each message names the argument and what to type."""
+    lai, rho = valid_calls["fpar"]["lai"], valid_calls["to_toa"]["reflectance"]
     masked = np.ma.masked_less(lai.values, 1)
     typed = [
         (lambda: fifesim.Geometry([30, 40], 100.0), "sza of a Geometry is one number, got an array: .*xarray.Dataset"),
@@ -449,7 +455,7 @@ def test_what_a_user_typed(calls):
 
 
 class Sieve:
-    """A description that no table of the package names."""
+    """A description that is in no table of the package."""
 
 
 def sieved(
@@ -468,7 +474,7 @@ def sieved(
     sizes: Sequence[float] = (),
     each: Callable[[float], float] | None = None,
 ) -> str:
-    """A public function that no table of the package names."""
+    """A public function that is in no table of the package."""
     return "done"
 
 
@@ -494,18 +500,18 @@ def sieved(
         ({"meshes": 5}, "sieved has no argument 'meshes': did you mean 'mesh'?"),
     ],
 )
-def test_a_new_function_is_checked_by_its_annotations(lai, given, message):
+def test_new_function_is_checked_by_its_annotations(lai, given, message):
     message = message.replace("tests.Sieve", f"{__name__.partition('.')[0]}.Sieve")
     with pytest.raises(TypeError) as caught:
         checked(sieved)(**{"raster": lai, "mesh": 2.0, **given})
     assert str(caught.value).startswith(message)
 
 
-def test_a_new_function_takes_what_its_annotations_allow(lai):
+def test_new_function_accepts_values_allowed_by_its_annotations(lai):
     every = {"wet": np.bool_(True), "pixel": 5, "times": 2, "names": ["a"], "grid": lai.odc.geobox, "by": "mass"}
     every |= {"weights": {"a": 1.0}, "source": xr.Dataset(), "sizes": np.ones(2), "each": np.sqrt}
     assert checked(sieved)(lai, 2, Sieve(), **every) == "done"
-    # An argument may always have its default value.
+    # The default value of an argument is always valid.
     assert checked(sieved)(lai, np.float32(2), None, weights=None, each=None) == "done"
 
 
@@ -524,7 +530,7 @@ def test_fields_of_a_new_description_are_checked_by_their_annotations():
             Mesh(**{"width": 2.0, **given})
 
 
-def arguments():
+def public_arguments():
     """Public functions with their parameters and annotations."""
     for name in PUBLIC:
         function = inspect.unwrap(getattr(fifesim, name))
@@ -534,9 +540,9 @@ def arguments():
                 yield name, parameter, hints.get(parameter)
 
 
-def test_every_argument_of_public_functions_has_an_annotation_with_a_kind():
+def test_every_public_argument_has_an_annotation_with_a_kind():
     breaches = []
-    for name, parameter, annotation in arguments():
+    for name, parameter, annotation in public_arguments():
         try:
             assert annotation is not None, "it has no annotation"
             assert kind_of(annotation).words and callable(kind_of(annotation).fits)
@@ -545,17 +551,17 @@ def test_every_argument_of_public_functions_has_an_annotation_with_a_kind():
     assert breaches == []
 
 
-def test_an_annotation_without_a_kind_is_an_error():
+def test_annotation_without_a_kind_is_an_error():
     for annotation in (tuple[int, int, str], Annotated[tuple[int, int, str], "metres"]):
         with pytest.raises(TypeError, match="nothing states the kind of tuple"):
             kind_of(annotation)
     assert kind_of(Any).fits(None)
 
 
-def test_methods_take_the_containers_that_they_are_methods_of(lai):
+def test_methods_accept_their_container(lai):
     values = {"DataArray": lai, "Dataset": lai.to_dataset(name="lai"), "DataTree": xr.DataTree()}
     first = {}
-    for name, _, annotation in arguments():
+    for name, _, annotation in public_arguments():
         first.setdefault(name, annotation)
     for name, public in PUBLIC.items():
         if public.methods_of:
@@ -563,7 +569,7 @@ def test_methods_take_the_containers_that_they_are_methods_of(lai):
             assert taken == set(public.methods_of), name
 
 
-def test_a_class_names_the_function_that_gives_its_objects(lai):
+def test_class_error_names_the_function_that_returns_its_objects(lai):
     with pytest.raises(
         TypeError, match=r"^scenario must be a fifesim\.Scenario, as fifesim\.read_scenario gives it, got 5$"
     ):
@@ -586,6 +592,6 @@ def test_a_class_names_the_function_that_gives_its_objects(lai):
         (kind_of(InstrumentLike), ["TM", fifesim.instrument("TM")], [None, ["TM"], 5]),
     ],
 )
-def test_kinds_know_their_own(kind, fits, others):
+def test_kinds_accept_and_reject_values(kind, fits, others):
     assert all(kind.fits(value) for value in fits)
     assert not any(kind.fits(value) for value in others)

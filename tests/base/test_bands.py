@@ -1,4 +1,4 @@
-"""Bands: spectral means, solar irradiance, nearest bands, and their digital numbers."""
+"""Bands: spectral means, solar irradiance, nearest bands and digital numbers."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from fifesim.base.bands import (
 BOX = Band("box", (0.6, 0.6001, 0.6999, 0.7), (0.0, 1.0, 1.0, 0.0))
 
 
-def test_means_of_constants_and_lines():
+def test_band_means_of_constant_and_linear_spectra():
     wavelength = np.linspace(0.5, 0.8, 301)
     assert BOX.center == pytest.approx(0.65, abs=1e-12)
     assert BOX.mean(np.full(3, 0.25), [0.5, 0.65, 0.8]) == pytest.approx(0.25, rel=1e-14)
@@ -48,7 +48,7 @@ def test_solar_irradiance_over_all_wavelengths_is_the_solar_constant():
     assert np.trapezoid(irradiance, wavelength) == pytest.approx(0.985 * 1361, rel=0.01)
 
 
-def test_steps_of_the_sun_conserve_its_energy():
+def test_solar_irradiance_steps_conserve_energy():
     wavelength = np.linspace(0.4, 2.5, 841)
     steps = solar_irradiance_steps(wavelength)
     width = np.gradient(wavelength)
@@ -78,12 +78,12 @@ def test_thematic_mapper_irradiance_agrees_with_landsat_handbook():
         (RED, (), None),
     ],
 )
-def test_the_band_nearest_to_the_best_place_of_a_window_is_taken(window, wavelengths, number):
-    """Limits belong to a window; what lies outside is not taken, however near to the best place."""
+def test_band_nearest_to_the_best_wavelength_is_taken(window, wavelengths, number):
+    """Only wavelengths within the limits of the window qualify."""
     assert nearest_band(wavelengths, window) == number
 
 
-def test_a_quadrature_is_the_mean_of_any_spectrum_on_its_wavelengths():
+def test_quadrature_gives_the_mean_of_any_spectrum_on_its_wavelengths():
     band, wavelength = Band("red", (0.6, 0.63, 0.66), (0.2, 1.0, 0.4)), np.linspace(0.55, 0.7, 31)
     spectra, weight = np.random.default_rng(1).random((3, 31)), np.linspace(1, 2, 31)
     found = band.quadrature(wavelength, weight)
@@ -92,16 +92,16 @@ def test_a_quadrature_is_the_mean_of_any_spectrum_on_its_wavelengths():
     assert found.mean(np.ones(31)) == pytest.approx(1, rel=1e-14)
 
 
-def test_common_names_are_those_of_catalogues():
-    """Pystac has the table of an earlier version, whose blue is narrower."""
+def test_common_names_agree_with_pystac():
+    """Pystac uses an earlier version of the table with a narrower blue band."""
     eo = pytest.importorskip("pystac.extensions.eo")
     known = {name: eo.Band.band_range(name) for name in COMMON_NAMES if name != "blue"}
     found = {name: COMMON_NAMES[name][1:3] for name, limits in known.items() if limits}
     assert len(found) == 10 and found == {name: known[name] for name in found}
 
 
-def test_common_names_have_their_middle_where_landsat_and_sentinel_2_have_a_band():
-    """Within 3 nm; neither has yellow."""
+def test_centres_of_common_names_match_landsat_and_sentinel_2():
+    """Centres agree to 3 nm; neither mission has a yellow band."""
     centres = np.array(
         [band.response.center for name in ("MSI", "OLI", "TM") for band in fifesim.instrument(name).bands]
     )
@@ -110,12 +110,12 @@ def test_common_names_have_their_middle_where_landsat_and_sentinel_2_have_a_band
 
 
 @pytest.mark.parametrize(("dn", "said"), [(-1.0, "-1"), (256, "256"), (1.5, "1.5"), (-1, "-1"), (np.inf, "inf")])
-def test_values_that_no_instrument_records_are_refused(dn, said):
+def test_impossible_digital_numbers_are_rejected(dn, said):
     with pytest.raises(ValueError, match=f"digital number of {said} is not a whole number from 0 to 255: give nodata="):
         counts(np.array([dn]), 0, 255, "give nodata=")
 
 
-def test_counts_are_kept_and_no_data_are_0():
+def test_counts_are_kept_and_no_data_becomes_0():
     np.testing.assert_array_equal(counts(np.array([-9999, 7, 255], np.int16), -9999, 255, ""), [0, 7, 255])
     np.testing.assert_array_equal(counts(np.array([7, 254, 255]), 0, 255, "", saturated=255), [7, 254, 0])
     check_counts(np.array([np.nan, 0.0, 255.0]), 255, "")

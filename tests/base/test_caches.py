@@ -1,4 +1,4 @@
-"""What functions keep is bounded, named and given back; results do not depend on it."""
+"""Caches are bounded, named and clearable; results do not depend on them."""
 
 import re
 from pathlib import Path
@@ -10,37 +10,37 @@ import fifesim
 from fifesim.base import caches
 from fifesim.base.caches import CACHES, Results, cached, clear_caches
 
-# Functions that check arguments or find public names keep no results.
+# These modules cache the results of argument checks and name look-ups only, or define the caches.
 OTHERS = {"accessor.py", "base/arguments.py", "base/caches.py"}
 
 
 @pytest.fixture
-def own(monkeypatch):
-    """Caches of this test alone."""
+def empty_registry(monkeypatch):
+    """Registry of caches that holds only the caches of this test."""
     monkeypatch.setattr(caches, "CACHES", [])
     return caches.CACHES
 
 
-def test_what_is_kept_is_made_once_and_again_when_it_is_cleared(own):
+def test_cached_results_are_recomputed_after_clearing(empty_registry):
     calls = []
     add = cached(2, "sums")(lambda a, b: calls.append((a, b)) or a + b)
     assert [add(1, 2), add(1, 2), len(calls)] == [3, 3, 1]
     clear_caches()
     assert [add(1, 2), len(calls), add.cache_info().currsize] == [3, 2, 1]
-    assert [each[:2] for each in own] == [("sums", 2)]
+    assert [each[:2] for each in empty_registry] == [("sums", 2)]
 
 
-def test_no_more_is_kept_than_the_cache_may_hold(own):
+def test_cache_keeps_at_most_its_size(empty_registry):
     double = cached(3, "doubles")(lambda number: 2 * number)
     assert [double(number) for number in range(9)][-1] == 16
-    assert double.cache_info().currsize == own[0].size == 3
+    assert double.cache_info().currsize == empty_registry[0].size == 3
 
 
-def test_results_that_threads_share_are_bounded_and_cleared(own):
+def test_results_shared_by_threads_are_bounded_and_cleared(empty_registry):
     shared = Results(2, "shared results")
     for number in range(4):
         shared[number] = number**2
-    assert shared == {2: 4, 3: 9} and [each[:2] for each in own] == [("shared results", 2)]
+    assert shared == {2: 4, 3: 9} and [each[:2] for each in empty_registry] == [("shared results", 2)]
     assert shared.cache_info().currsize == 2
     clear_caches()
     assert not shared
@@ -56,7 +56,7 @@ def test_every_cache_of_the_package_is_listed():
     assert found == OTHERS
 
 
-def test_caches_are_bounded_and_have_names_of_their_own():
+def test_caches_are_bounded_and_have_distinct_names():
     for name in fifesim.__all__:
         getattr(fifesim, name)
     assert len(CACHES) > 80
@@ -64,7 +64,7 @@ def test_caches_are_bounded_and_have_names_of_their_own():
     assert [each.what for each in CACHES if each.size is None] == ["instruments of the package"]
 
 
-def test_results_are_the_same_bits_after_caches_are_cleared():
+def test_clearing_caches_does_not_change_results():
     def image():
         lai = fifesim.lai_scene(fifesim.fife_site(cell=10.0)[:120, :120], "burned-grazed", seed=3)
         surface = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], canopy=fifesim.Canopy(background=0.1))

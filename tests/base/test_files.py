@@ -1,4 +1,4 @@
-"""Files from outside and tables of the package: no file makes a reader wait, and no value spoils a message."""
+"""Input files and package tables: no file blocks a reader, and no value makes a message long or unprintable."""
 
 import os
 import socket
@@ -10,10 +10,10 @@ from fifesim.base.files import check_regular, in_a_line, read_toml, shown
 
 
 def test_only_regular_files_are_opened(tmp_path, monkeypatch):
-    """A pipe that nobody writes to would wait for ever."""
+    """Opening a pipe without a writer would block for ever."""
     os.mkfifo(tmp_path / "pipe")
     with socket.socket(socket.AF_UNIX) as listening:
-        # From there: the path of a socket may be 107 characters long.
+        # Use a relative path, because the path of a socket is limited to 107 characters.
         monkeypatch.chdir(tmp_path)
         listening.bind("socket")
         for name, kind in (("pipe", "a pipe"), (".", "a folder"), ("/dev/null", "a device"), ("socket", "a socket")):
@@ -22,7 +22,7 @@ def test_only_regular_files_are_opened(tmp_path, monkeypatch):
                     read(tmp_path / name)
 
 
-def test_a_missing_file_is_for_the_reader_to_tell(tmp_path):
+def test_missing_file_raises_oserror(tmp_path):
     with pytest.raises(FileNotFoundError):
         read_toml(tmp_path / "none.toml")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
@@ -44,7 +44,7 @@ def test_a_missing_file_is_for_the_reader_to_tell(tmp_path):
     ],
     ids=["cut", "brackets", "dots", "quoted", "dots inside", "digits", "size", "escape"],
 )
-def test_text_that_would_break_the_parser_is_refused(tmp_path, text, said):
+def test_text_that_would_break_the_parser_is_rejected(tmp_path, text, said):
     (tmp_path / "a\x1bb.toml").write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=said) as caught:
         read_toml(tmp_path / "a\x1bb.toml")
@@ -52,7 +52,7 @@ def test_text_that_would_break_the_parser_is_refused(tmp_path, text, said):
     assert str(caught.value).isprintable()
 
 
-def test_the_dots_of_a_path_nest_nothing(tmp_path):
+def test_dots_of_a_path_do_not_count_as_nesting(tmp_path):
     (tmp_path / "a.toml").write_text(f"file = '{'../' * 1000}a.b.tif'")
     assert read_toml(tmp_path / "a.toml")["file"].endswith("a.b.tif")
 
@@ -69,16 +69,16 @@ def deep(levels):
     ["a" * 1000, "\x1b[31m\n", 16**6000, list(range(1000)), deep(100_000), {"k" * 1000: 1}, b"\0" * 1000, "röd\u202e"],
     ids=["long", "escapes", "digits", "list", "deep", "key", "bytes", "right to left"],
 )
-def test_any_value_is_shown_in_a_few_characters(value):
+def test_any_value_is_shown_in_at_most_60_printable_characters(value):
     assert len(shown(value)) <= 60 and shown(value).isprintable()
 
 
-def test_the_end_of_a_long_line_stays():
+def test_end_of_a_long_line_is_kept():
     line = in_a_line("key: " + "a\n" * 1000 + ": type another")
     assert line.startswith("key: a\\n") and line.endswith(": type another") and len(line) <= 400
 
 
-def test_tables_are_copies_that_may_be_changed():
+def test_tables_are_modifiable_copies():
     files.table("lai_distributions.csv").loc[:, "mean"] = -1.0
     assert (files.table("lai_distributions.csv")["mean"] > 0).all()
 

@@ -1,4 +1,4 @@
-"""Footprints against quadrature, Fourier transform and symmetry, and line spread functions against their transforms."""
+"""Footprints compared with quadrature, Fourier transform and symmetry; line spread functions with their transforms."""
 
 from itertools import pairwise
 
@@ -63,7 +63,7 @@ def operator(n_cells, n_pixels, pixel=30.0, origin=0.0, width=TM_WIDTH, cell=CEL
 
 @pytest.mark.parametrize(("pixel", "origin", "width"), GRIDS)
 def test_weights_agree_with_quadrature(pixel, origin, width):
-    """Every impulse response at once: column j of the matrix is the image of a single bright cell j."""
+    """Column j of the matrix is the image of a single bright cell j, so all impulse responses are compared."""
     n_cells, n_pixels = 90, int(300 / pixel) + 2
     found = dense(operator(n_cells, n_pixels, pixel, origin, width), n_cells)
     expected = brute_force_weights(width, pixel, origin, n_pixels, n_cells)
@@ -76,9 +76,9 @@ def test_weights_agree_with_quadrature(pixel, origin, width):
 @pytest.mark.parametrize("interval", [30.0, 30.315])
 def test_sinusoid_is_reduced_by_the_mtf(wavelength, interval):
     """
-    The Fourier transform of the line spread by quadrature, a route that knows no cells.
+    The attenuation is compared with the Fourier transform of the line spread function by quadrature, without cells.
 
-    Cells hold the means of the sinusoid. What is lost lies in the two cells that the ends of the support cut:
+    Cells hold the means of the sinusoid. The error comes from the two cells that the ends of the support cut:
     at most w k cell^2 / 8 each, 4e-10 together for w = 0.02 m-1 and cells of 0.5 mm.
     """
     cell, n_cells, n_pixels, k = 5e-4, 200_000, 2, 2 * np.pi / wavelength
@@ -91,7 +91,7 @@ def test_sinusoid_is_reduced_by_the_mtf(wavelength, interval):
     np.testing.assert_allclose(CosineSpread(TM_WIDTH).mtf(1 / wavelength), mtf, rtol=0, atol=1e-12)
 
 
-def test_response_is_half_its_maximum_where_it_ends():
+def test_line_spread_ends_at_half_its_maximum():
     """The paper truncates the cosine at half its amplitude."""
     spread, step = CosineSpread(30.0), 1e-4
     at_the_end = spread.cumulative(15.0) - spread.cumulative(15.0 - step)
@@ -101,7 +101,7 @@ def test_response_is_half_its_maximum_where_it_ends():
 
 @pytest.mark.parametrize(("pixel", "origin", "width"), GRIDS)
 def test_constant_scene_stays_constant(pixel, origin, width):
-    """Edges of the scene and holes included, wherever a pixel is given at all."""
+    """This includes pixels at the scene edges and at holes, wherever a value is given."""
     scene = np.full((90, 120), 204.3)
     rows, columns = (operator(n, int(400 / pixel) + 1, pixel, origin, width) for n in scene.shape)
     full = regularize(scene, rows, columns, min_valid=0.3)
@@ -128,7 +128,7 @@ def test_scene_with_holes_is_the_normalized_sum_over_valid_cells():
 
 
 def test_min_valid_decides_at_the_scene_edge():
-    """TM's footprint of 30.32 m overhangs the scene by 0.16 m: it stays; one cell further out it goes."""
+    """The 30.32 m TM footprint may overhang the scene by 0.16 m, but not by one more cell."""
     scene = np.ones((90, 90))
     rows = operator(90, 10)
     assert np.isfinite(regularize(scene, rows, rows)).all()
@@ -141,7 +141,7 @@ def test_min_valid_decides_at_the_scene_edge():
 @pytest.mark.parametrize(("pixel", "origin", "width"), GRIDS)
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_any_window_gives_the_same_bits(pixel, origin, width, dtype):
-    """Holes stand in some windows only: a pixel must not notice holes outside its own footprint."""
+    """Only some windows contain holes; holes outside the footprint must not affect a pixel."""
     rng = np.random.default_rng(11)
     scene = rng.normal(100.0, 30.0, (2, 151, 173)).astype(dtype)
     scene[:, 31:33, 100:] = np.nan
@@ -159,7 +159,7 @@ def test_any_window_gives_the_same_bits(pixel, origin, width, dtype):
             np.testing.assert_array_equal(part, whole[:, i0:i1, j0:j1])
 
 
-def test_window_holds_only_the_cells_that_are_needed():
+def test_window_holds_only_the_required_cells():
     rows = operator(4500, 500, width=30.0)
     assert rows.window == slice(0, 4500)
     assert rows[100:200].window == slice(900, 1800)
@@ -177,7 +177,7 @@ def test_rows_of_a_north_up_grid_count_from_the_north():
     np.testing.assert_allclose(north.weights, plain.weights, rtol=0, atol=1e-12)
 
 
-def test_mistakes_are_named():
+def test_invalid_operators_are_rejected():
     with pytest.raises(ValueError, match="width"):
         CosineSpread(-30.0)
     for cell, pixel in ((-3, 9), (0, 9), (3, 0)):
@@ -195,19 +195,19 @@ def test_mistakes_are_named():
         rows[::2]
 
 
-def test_uniform_response_grows_evenly_from_edge_to_edge():
+def test_uniform_response_has_a_linear_edge_response():
     spread = Boxcar(30.0)
     assert spread.half_width == 15.0
     np.testing.assert_allclose(spread.cumulative([-99.0, -15.0, -7.5, 0.0, 15.0, 99.0]), [0, 0, 0.25, 0.5, 1, 1])
 
 
 @pytest.mark.parametrize("frequency", [0.0, 0.01, 0.05, 0.2])
-def test_uniform_transfer_is_the_transform_of_its_response(frequency):
+def test_uniform_mtf_is_the_transform_of_the_response(frequency):
     transform, _ = quad(lambda x: np.cos(2 * np.pi * frequency * x) / 30.0, -15.0, 15.0)
     np.testing.assert_allclose(Boxcar(30.0).mtf(frequency), transform, atol=1e-12)
 
 
 @pytest.mark.parametrize("width", [0.0, -30.0, np.inf, np.nan])
-def test_width_is_positive(width):
+def test_width_must_be_positive(width):
     with pytest.raises(ValueError, match=f"must be positive metres, got {width}"):
         Boxcar(width)

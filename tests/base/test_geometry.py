@@ -1,4 +1,4 @@
-"""Directions of sun and sensor, and dates and times."""
+"""Directions of the sun and sensor, dates and times."""
 
 import dataclasses
 from datetime import datetime, timedelta, timezone
@@ -13,7 +13,7 @@ from fifesim.base.times import utc
 
 
 def almanac_sun(time, latitude, longitude):
-    """Zenith and azimuth of the sun by the Astronomical Almanac's low precision formulas, good to 0.01 degree."""
+    """Solar zenith and azimuth by the low-precision formulas of the Astronomical Almanac, accurate to 0.01 degrees."""
     days = (pd.Timestamp(time).tz_convert("UTC") - pd.Timestamp("2000-01-01T12:00Z")) / pd.Timedelta(days=1)
     anomaly = np.radians(357.528 + 0.9856003 * days)
     ecliptic = np.radians(280.460 + 0.9856474 * days + 1.915 * np.sin(anomaly) + 0.020 * np.sin(2 * anomaly))
@@ -43,20 +43,20 @@ def test_sun_agrees_with_the_almanac(time, latitude, longitude):
     assert sun.saa == pytest.approx(azimuth, abs=0.03)
 
 
-def test_paper_case():
-    """In the morning the sun stands in the southeast; in June the Earth is far from it."""
+def test_sun_of_the_paper_case():
+    """In the morning the sun is in the southeast; in June the Earth is near aphelion."""
     case = fifesim.fife_geometry()
     assert (round(case.sza, 1), round(case.saa, 1), case.vza, case.vaa) == (28.5, 117.0, 0.0, 0.0)
     assert case.earth_sun_distance == pytest.approx(1.0148, abs=5e-4)
 
 
-def test_sun_below_the_horizon_is_refused():
+def test_sun_below_the_horizon_is_rejected():
     with pytest.raises(ValueError, match=r"sza must be in \[0, 90\).*the sun is below the horizon"):
         sun_geometry("1987-06-06T06:00:00Z", 39.06, -96.54)
 
 
 @pytest.mark.parametrize("values", [{"sza": -1}, {"vza": 90}, {"sza": np.nan}, {"earth_sun_distance": 149.6e6}])
-def test_impossible_directions_are_refused(values):
+def test_impossible_directions_are_rejected(values):
     with pytest.raises(ValueError, match=next(iter(values))):
         Geometry(**({"sza": 30.0, "saa": 0.0} | values))
 
@@ -69,7 +69,7 @@ def test_relative_azimuth_is_symmetric_and_folded():
     assert raa.min() >= 0 and raa.max() <= 180
 
 
-def test_sun_and_sensor_on_one_side_have_no_relative_azimuth():
+def test_relative_azimuth_is_zero_if_sun_and_sensor_are_on_one_side():
     assert Geometry(30, 117, 20, 117).raa == 0
     assert Geometry(30, 117, 20, 297).raa == 180
 
@@ -82,8 +82,8 @@ def unit_vector(zenith, azimuth):
 @pytest.mark.parametrize(
     "sza, saa, vza, vaa", [(30, 117, 20, 117), (60, 10, 45, 200), (0, 0, 70, 33), (50, 350, 50, 90)]
 )
-def test_scattering_angle_is_that_of_the_vectors(sza, saa, vza, vaa):
-    """Light travels away from the sun, and toward the sensor."""
+def test_scattering_angle_matches_the_unit_vectors(sza, saa, vza, vaa):
+    """Light travels away from the sun and toward the sensor."""
     expected = -unit_vector(sza, saa) @ unit_vector(vza, vaa)
     assert scattering_angle_cosine(sza, vza, relative_azimuth(saa, vaa)) == pytest.approx(expected, abs=1e-12)
 
@@ -95,7 +95,7 @@ def test_geometry_is_frozen_and_hashable():
     assert Geometry(60.0, 0.0, 0.0).mu_s == pytest.approx(0.5, abs=1e-15)
 
 
-def test_angle_between_directions_is_that_of_their_unit_vectors():
+def test_angle_between_directions_matches_the_unit_vectors():
     zenith, azimuth = np.random.default_rng(6).uniform(0, [[[90.0]], [[360.0]]], (2, 2, 50))
     one, other = (
         np.stack([np.sin(t) * np.sin(a), np.sin(t) * np.cos(a), np.cos(t)])
@@ -118,11 +118,11 @@ SUMMER = pd.Timestamp("1987-06-06T16:35Z")
         datetime(1987, 6, 6, 11, 35, tzinfo=timezone(timedelta(hours=-5))),
     ],
 )
-def test_time_without_zone_is_utc_and_others_are_converted(time):
+def test_time_without_zone_is_utc_and_other_times_are_converted(time):
     assert utc(time).tolist() == [SUMMER]
 
 
-def test_what_is_no_time_is_refused():
+def test_invalid_times_are_rejected():
     refused = {
         r"such as 1987-06-06T16:35:00Z, got.*the year first": [
             "3.6.2022 10:00", "03/06/2022 10:00", "13.6.2022 10:00", "10:00", "June 3, 2022 9:00",
@@ -137,6 +137,6 @@ def test_what_is_no_time_is_refused():
         for time in times:
             with pytest.raises(ValueError, match=message):
                 utc(time)
-    # The ends of the years that dates in nanoseconds hold.
+    # First and last years that nanosecond timestamps can hold.
     for time in ("1700-01-01T00:00", "2199-12-31T23:59"):
         assert utc(time)[0] == pd.Timestamp(time, tz="UTC")

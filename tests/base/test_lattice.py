@@ -1,4 +1,4 @@
-"""Windows of a lattice of tiles, and the seeds and streams of random numbers on it."""
+"""Windows of a lattice of tiles, and its random seeds and streams."""
 
 import numpy as np
 import pytest
@@ -10,25 +10,25 @@ from fifesim.ground.landscape.autoregression import periodic_field, streaming_fi
 TILE = 5
 
 
-def place(row, column):
-    """A value that tells the place."""
+def place_code(row, column):
+    """A value that encodes the row and column."""
     return 1000.0 * row + column
 
 
 def tile(tile_row, tile_column):
     rows, columns = (np.arange(TILE) + index * TILE for index in (tile_row, tile_column))
-    return place(rows[:, None], columns)
+    return place_code(rows[:, None], columns)
 
 
 @pytest.mark.parametrize("row, column", [(0, 0), (3, 4), (-7, 2), (-5, -10), (-1, -1), (10**9, -(10**9))])
 @pytest.mark.parametrize("shape", [(1, 1), (5, 5), (4, 13), (11, 2)])
-def test_window_holds_its_places(row, column, shape):
+def test_window_holds_the_right_cells(row, column, shape):
     found = assemble(tile, TILE, row, column, shape)
-    expected = place(row + np.arange(shape[0])[:, None], column + np.arange(shape[1]))
+    expected = place_code(row + np.arange(shape[0])[:, None], column + np.arange(shape[1]))
     np.testing.assert_array_equal(found, expected)
 
 
-def test_each_tile_is_made_once_and_no_other():
+def test_each_required_tile_is_made_once():
     made = []
     assemble(lambda i, j: made.append((i, j)) or tile(i, j), TILE, -2, 5, (7, 5))
     assert made == [(-1, 1), (0, 1)]
@@ -62,26 +62,31 @@ def draw(request, toa):
 
 
 @pytest.mark.parametrize("seed", [7.0, 1.5, None, True, np.True_, "7", [7]])
-def test_what_is_no_whole_number_is_no_seed(draw, seed):
+def test_non_integer_seeds_are_rejected(draw, seed):
     with pytest.raises(TypeError, match=r"seed must be a whole number from 0 to 2\*\*63 - 1, got .*: give for inst"):
         draw(seed)
 
 
 @pytest.mark.parametrize("seed", [-1, 2**63, 2**64 - 1, np.int8(-3), np.uint64(2**63)])
-def test_a_number_that_scenarios_cannot_hold_is_no_seed(draw, seed):
+def test_seeds_that_scenarios_cannot_hold_are_rejected(draw, seed):
     with pytest.raises(ValueError, match=rf"seed must be a whole number from 0 to 2\*\*63 - 1, got {seed}: give"):
         draw(seed)
 
 
-def test_a_whole_number_of_any_type_is_the_seed(draw):
+def test_integer_types_give_the_same_seed(draw):
     np.testing.assert_array_equal(draw(np.uint16(9)), draw(9))
     last, before = draw(np.int64(2**63 - 1)), draw(2**63 - 2)
     assert not np.array_equal(last, before)
 
 
-def test_places_streams_and_seeds_are_unrelated():
-    """Neighbouring numbers from 2**63 up are the same in double precision; places are words of 64 bits."""
-    keys = [(seed, stream, (0, 0, place, 0)) for seed in (0, 2**63 - 1) for stream in (1, 2**63) for place in (0, -1)]
+def test_places_streams_and_seeds_give_independent_numbers():
+    """Neighbouring integers above 2**63 are equal in double precision; place indices are 64-bit words."""
+    keys = [
+        (seed, stream, (0, 0, place_code, 0))
+        for seed in (0, 2**63 - 1)
+        for stream in (1, 2**63)
+        for place_code in (0, -1)
+    ]
     keys += [(2**63 - 2, 1, (0, 0, 0, 0)), (0, 2**63 + 1, (0, 0, 0, 0)), (0, 1, (0, 0, -2, 0)), (0, 1, (0, 0, 0, -1))]
     drawn = [generator(*key).standard_normal(40_000) for key in keys]
     np.testing.assert_allclose(np.corrcoef(drawn), np.eye(len(keys)), rtol=0, atol=4.5 / 200)

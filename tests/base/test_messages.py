@@ -1,4 +1,4 @@
-"""Messages: misspelt names, refusals of pydantic, warnings at the user's line, and a logger."""
+"""Messages: misspelt names, pydantic errors, warnings at the user's line, and the logger."""
 
 import inspect
 import logging
@@ -14,12 +14,12 @@ import fifesim
 from fifesim.base.messages import LOG, in_own_words, is_quiet, nearest, quiet, spelled, unknown_argument, warn
 
 
-def test_the_nearest_is_named_and_none_where_none_is_near():
+def test_nearest_name_is_suggested_if_it_is_similar():
     assert nearest("sens", ["sense", "slope"]) == "did you mean 'sense'? "
     assert nearest("zzz", ["sense", "slope"]) == ""
 
 
-def test_known_arguments_are_nothing_wrong():
+def test_only_unknown_arguments_give_a_message():
     signature = inspect.signature(lambda toa, offset=0: None)
     assert unknown_argument("sense", signature, {"toa": 1, "offset": 2}) == ""
     said = "sense has no argument 'ofset': did you mean 'offset'? There are toa, offset"
@@ -31,7 +31,7 @@ class Plain:
     visibility: float = 45.0
 
 
-def test_a_class_keeps_its_signature_and_says_which_argument_is_misspelt():
+def test_class_keeps_its_signature_and_names_misspelt_arguments():
     before = inspect.signature(Plain)
     assert spelled(Plain) is Plain and inspect.signature(Plain) == before
     assert Plain(23.0) == Plain(visibility=23.0) == pickle.loads(pickle.dumps(Plain(23.0)))
@@ -39,7 +39,7 @@ def test_a_class_keeps_its_signature_and_says_which_argument_is_misspelt():
         Plain(visibilty=23.0)
 
 
-def test_what_a_user_misspells(lai):
+def test_misspelt_names_give_a_suggestion(lai):
     typed = [
         (lambda: fifesim.sens, AttributeError, "no attribute 'sens': did you mean 'sense'"),
         (lambda: lai.fifesim.sens, AttributeError, "no method 'sens' of an xarray.DataArray: did you mean 'sense'"),
@@ -59,7 +59,7 @@ def test_what_a_user_misspells(lai):
         assert len(str(caught.value)) <= 500
 
 
-def test_a_method_of_another_kind_of_raster_is_told(lai):
+def test_method_of_another_container_names_that_container(lai):
     (name,) = [name for name, public in fifesim.accessor.PUBLIC.items() if public.methods_of == ("DataTree",)][:1]
     with pytest.raises(AttributeError, match=f"{name} is a method of an xarray.DataTree, this is an xarray.DataArray"):
         getattr(lai.fifesim, name)
@@ -90,13 +90,13 @@ class Table(BaseModel):
         (Annotated[list[float], Field(max_length=1)], [1.0, 2.0], "takes 1 of them at most"),
     ],
 )
-def test_each_refusal_says_what_the_value_must_be(kind, value, said):
+def test_validation_errors_state_the_allowed_values(kind, value, said):
     with pytest.raises(ValidationError) as caught:
         TypeAdapter(kind).validate_python(value)
     assert in_own_words(caught.value.errors()[0]) == said
 
 
-def test_a_warning_points_outside_of_the_package():
+def test_warning_points_outside_the_package():
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         warn("careful")

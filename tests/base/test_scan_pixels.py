@@ -1,4 +1,4 @@
-"""Pixels of a scan on a map, against polygons and against all distances."""
+"""Scan pixels on a map, compared with polygons and brute-force distances."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ CELL = (20.0, 30.0)
 
 
 def swath(lines=7, samples=9):
-    """Centres on a map, turned and bent, off the lattice of its cells."""
+    """Pixel centres on a map, rotated and bent, off the lattice of cells."""
     line, sample = np.mgrid[0:lines, 0:samples]
     row = 2.3 + 0.9 * line + 0.23 * sample + 0.01 * sample**2
     return row, 3.1 - 0.31 * line + 1.21 * sample + 0.02 * sample**2
@@ -26,8 +26,8 @@ def test_corners_lie_between_centres_and_tile_the_swath():
     assert columns[0, 0, 0] < column[0, 0] < columns[0, 1, 1]
 
 
-def test_lines_of_one_sweep_share_their_edges_alone():
-    """Sweeps of 1, 3 and 3 lines are the sweeps by themselves; a single line is as high as its neighbours."""
+def test_only_lines_of_one_sweep_share_edges():
+    """Each sweep has the same corners as alone, except that a single line takes its height from its neighbours."""
     row, column = swath()
     sweep = np.array([4, 5, 5, 5, 6, 6, 6])
     row = row - 0.4 * sweep[:, None]
@@ -42,7 +42,7 @@ def test_lines_of_one_sweep_share_their_edges_alone():
     np.testing.assert_allclose(last[4, 0][1:-1], (row[4, 1:] + row[4, :-1]) / 2 - 0.45, rtol=0, atol=1e-13)
 
 
-def test_reach_is_the_farthest_corner():
+def test_reach_is_the_distance_to_the_farthest_corner():
     row, column = swath()
     rows, columns = corners(row, column)
     found = reach(row, column, (rows, columns), CELL)
@@ -57,7 +57,7 @@ def test_reach_is_the_farthest_corner():
         assert found[line, sample] == pytest.approx(max(away), rel=1e-14)
 
 
-def test_nearest_is_the_nearest_of_all():
+def test_nearest_pixel_matches_brute_force():
     row, column = swath()
     far = reach(row, column, corners(row, column), CELL)
     found = nearest_pixels(row.ravel(), column.ravel(), far.ravel(), CELL, (1, 12), (0, 15))
@@ -69,18 +69,18 @@ def test_nearest_is_the_nearest_of_all():
     assert (found == -1).any() and (found >= 0).sum() > 50
 
 
-def test_of_two_that_are_equally_near_the_first_is_taken():
+def test_first_of_two_equidistant_pixels_is_taken():
     row, column = np.array([0.5, 0.5]), np.array([0.0, 1.0])
     assert nearest_pixels(row, column, np.array([30.0, 30.0]), (20.0, 20.0), (0, 1), (0, 1)) == 0
 
 
-def test_pixels_without_a_place_are_nowhere():
+def test_pixels_without_coordinates_are_ignored():
     row, column = np.array([np.nan, 0.5]), np.array([0.5, np.nan])
     found = nearest_pixels(row, column, np.array([30.0, 30.0]), CELL, (0, 2), (0, 2))
     assert (found == -1).all()
 
 
-def test_means_go_by_the_area_that_polygons_share():
+def test_means_are_weighted_by_polygon_overlap():
     row, column = swath()
     rows, columns = corners(row, column)
     values = np.random.default_rng(3).uniform(0, 1, (2, *row.shape))
@@ -104,7 +104,7 @@ def test_means_go_by_the_area_that_polygons_share():
     assert np.isnan(means[covered == 0]).all()
 
 
-def test_a_window_has_the_bits_of_the_whole():
+def test_window_is_identical_to_the_whole_map():
     rows, columns = corners(*swath())
     values = np.random.default_rng(3).uniform(0, 1, (1, 7, 9))
     whole = covered_means(values, rows, columns, (0, 12), (0, 15))[0]
@@ -112,6 +112,6 @@ def test_a_window_has_the_bits_of_the_whole():
     np.testing.assert_array_equal(part, whole[:, 5:9, 4:11])
 
 
-def test_one_line_does_not_tell_how_large_pixels_are():
+def test_single_line_without_pixel_size_is_rejected():
     with pytest.raises(ValueError, match="1 x 4 pixels does not tell"):
         corners(np.zeros((1, 4)), np.zeros((1, 4)))

@@ -1,4 +1,4 @@
-"""A small run with its cells, which other programs are to open."""
+"""A small run folder that includes the cells of the scene, for other programs to open."""
 
 import pytest
 
@@ -16,8 +16,8 @@ TRAVELLED = {
 
 
 @pytest.fixture(scope="session")
-def travelled(tmp_path_factory):
-    """Its folder; nobody looks at its pictures."""
+def small_run(tmp_path_factory):
+    """Folder of the run, written without pictures."""
     folder = tmp_path_factory.mktemp("travelled") / "out"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(report, "png", lambda figure, dpi: b"")

@@ -1,4 +1,4 @@
-"""One table of quantities: every picture, style, report and page has its words and colours from there."""
+"""All pictures, styles, reports and pages take words and colours from one table of quantities."""
 
 import dataclasses
 from xml.etree import ElementTree
@@ -39,18 +39,18 @@ CLUMPING = cf.Quantity(
 
 @pytest.fixture
 def clumping(monkeypatch, lai):
-    """A raster of a quantity that is in the table for the time of a test."""
+    """A raster of a quantity that is in the table only during a test."""
     matplotlib.use("agg")
     monkeypatch.setitem(cf.QUANTITIES, "clumping", CLUMPING)
     return cf.label(0.3 + lai / 10, "clumping", history="made")
 
 
-def ramp(path):
+def colour_ramp(path):
     root = ElementTree.parse(path).getroot()
     return [(float(item.get("value")), item.get("color")) for item in root.iter("item")]
 
 
-def test_a_quantity_of_the_table_has_its_words_everywhere(clumping, whole):
+def test_quantity_words_come_from_the_table(clumping, whole):
     assert clumping.name == "clumping" and clumping.attrs["long_name"] == "clumping index"
     assert (short_name(clumping), unit(clumping), long_name(clumping)) == ("clumping", "[m² m⁻²]", "Clumping index")
     assert axis_label("clumping") == "clumping [m² m⁻²]"
@@ -66,14 +66,14 @@ def test_a_quantity_of_the_table_has_its_words_everywhere(clumping, whole):
     assert [axis.get_ylabel() for axis in sheet.axes if axis.get_ylabel()] == ["image: TM4", "clumping"]
 
 
-def test_a_quantity_of_the_table_has_its_colours_everywhere(clumping, tmp_path):
+def test_quantity_colours_come_from_the_table(clumping, tmp_path):
     magma = [to_hex(colormaps["magma"](share)) for share in np.linspace(0, 1, 9)]
     low, high = percentile_limits(clumping, middle=0.5)
     assert (low + high) / 2 == pytest.approx(0.5) and high > 0.5 > low
     picture = clumping.fifesim.plot().images[0]
     assert picture.get_cmap().name == "magma" and picture.get_clim() == pytest.approx((low, high))
     assert value_map(clumping, "").bar.stops == layer_words(["clumping"])["clumping"]["stops"] == magma
-    shown = ramp(fifesim.write_style(clumping.fifesim.to_geotiff(tmp_path / "clumping.tif")))
+    shown = colour_ramp(fifesim.write_style(clumping.fifesim.to_geotiff(tmp_path / "clumping.tif")))
     assert [colour for _, colour in shown] == magma
     assert (shown[0][0], shown[-1][0]) == (0.25, pytest.approx(high, rel=1e-5))
     row = contact_sheet(chips(clumping), ["train"]).axes[1].images[0]
@@ -81,7 +81,7 @@ def test_a_quantity_of_the_table_has_its_colours_everywhere(clumping, tmp_path):
 
 
 def chips(raster):
-    """A dataset of one chip: its image in one band, and the raster as its truth."""
+    """A Dataset of one chip with a one-band image and the raster as truth."""
     reflectance = ("chip", "band", "y", "x"), raster.values[None, None]
     coordinates = {"band": ["TM4"], "wavelength": ("band", [0.83]), "split": ("chip", ["train"])}
     return xr.Dataset(
@@ -89,7 +89,7 @@ def chips(raster):
     )
 
 
-def test_quantities_have_short_words_a_range_and_a_colour_map():
+def test_quantities_have_short_name_range_and_colour_map():
     wrong = []
     for name, quantity in cf.QUANTITIES.items():
         raster = cf.label(xr.DataArray(np.zeros((2, 2)), dims=("y", "x")), name, history="")
@@ -105,7 +105,7 @@ def test_quantities_have_short_words_a_range_and_a_colour_map():
     assert wrong == []
 
 
-def test_rasters_of_a_run_lie_within_the_ranges(whole, site):
+def test_rasters_of_a_run_lie_within_the_valid_range(whole, site):
     dem = fifesim.flint_hills(site, seed=1)
     rasters = [
         *whole.values(),
@@ -126,7 +126,7 @@ def test_rasters_of_a_run_lie_within_the_ranges(whole, site):
 
 
 @pytest.mark.parametrize("name", instrument_names())
-def test_bands_of_a_composite_are_the_same_for_instruments_images_and_styles(name, lai, tmp_path):
+def test_instruments_images_and_styles_use_the_same_composite_bands(name, lai, tmp_path):
     own = instrument(name)
     bands = false_colour_bands(own)
     wavelengths = [band.wavelength for band in bands]
@@ -142,7 +142,7 @@ def test_bands_of_a_composite_are_the_same_for_instruments_images_and_styles(nam
     assert numbers == colour_composite(wavelengths)
 
 
-def test_a_composite_is_stretched_alike_in_qgis_and_in_a_picture(whole, tmp_path):
+def test_composite_is_stretched_alike_in_qgis_and_in_a_picture(whole, tmp_path):
     toa = whole["toa"]
     style = fifesim.write_style(toa.fifesim.to_geotiff(tmp_path / "toa.tif"))
     renderer = ElementTree.parse(style).getroot().find("pipe/rasterrenderer")
@@ -156,7 +156,7 @@ def test_a_composite_is_stretched_alike_in_qgis_and_in_a_picture(whole, tmp_path
         np.testing.assert_allclose(toa.fifesim.rgb()[..., place], expected, rtol=0, atol=1e-6)
 
 
-def test_limits_pass_over_what_is_missing():
+def test_percentile_limits_ignore_missing_values():
     assert percentile_limits([np.nan, 1.0, 3.0, np.inf], (0, 100)) == (1.0, 3.0)
     assert percentile_limits(np.full(3, np.nan)) == (0.0, 1.0)
     values = np.arange(101.0)
@@ -175,7 +175,7 @@ def test_limits_pass_over_what_is_missing():
         (None, None, ""),
     ],
 )
-def test_units_are_written_as_in_print(name, units, said):
+def test_units_are_typeset(name, units, said):
     assert unit(xr.DataArray(0.0, name=name, attrs={} if units is None else {"units": units})) == said
 
 
@@ -186,7 +186,7 @@ def test_quantities_have_a_short_and_a_long_name(whole):
     assert long_name(xr.DataArray(0.0, name="my_field")) == "My field" and long_name(xr.DataArray(0.0)) == "Values"
 
 
-def test_a_picture_says_whose_it_is(whole):
+def test_subject_names_instrument_date_and_location(whole):
     said = subject(whole["image"].assign_coords(time=np.datetime64("1987-06-06T16:35", "ns")))
     assert said == "Landsat-5 Thematic Mapper, 6 June 1987, 39.13° N, 96.62° W"
     own = whole["lai"].assign_attrs(instrument="mine").drop_vars("time", errors="ignore")

@@ -1,4 +1,4 @@
-"""Results appear under their names when all of them are whole, and nothing else is touched."""
+"""Results appear under their names only when all are complete; other files stay untouched."""
 
 import multiprocessing
 import os
@@ -22,14 +22,14 @@ def write(folder, text, names=NAMES, **options):
             (hidden / name).write_text(text)
 
 
-def test_files_replace_those_of_their_names_and_no_others(tmp_path):
+def test_only_files_of_the_same_name_are_replaced(tmp_path):
     write(tmp_path, "old")
     (tmp_path / "notes.txt").write_text("mine")
     write(tmp_path, "new", overwrite=True)
     assert contents(tmp_path) == {"one.txt": "new", "two.txt": "new", "notes.txt": "mine"}
 
 
-def test_what_gdal_kept_of_a_replaced_raster_goes_with_it(tmp_path):
+def test_gdal_sidecar_of_a_replaced_raster_is_removed(tmp_path):
     for name in ("image.tif", "image.tif.aux.xml", "other.tif.aux.xml"):
         (tmp_path / name).write_text("old")
     with results(tmp_path, ["image.tif"], overwrite=True) as partial:
@@ -38,11 +38,11 @@ def test_what_gdal_kept_of_a_replaced_raster_goes_with_it(tmp_path):
 
 
 class Killed(BaseException):
-    """Stands for a signal that ends the process at once."""
+    """Stand-in for a signal that ends the process at once."""
 
 
-def failing_moves(monkeypatch, folder, number, error, forever):
-    """Let moves out of a folder or into it fail, from the given one on, or that one alone."""
+def make_moves_fail(monkeypatch, folder, number, error, forever):
+    """Make the move with this number, and optionally all later moves, into or out of a folder fail."""
     moved, replace = [], os.replace
 
     def move(source, target):
@@ -55,8 +55,8 @@ def failing_moves(monkeypatch, folder, number, error, forever):
     monkeypatch.setattr(os, "replace", move)
 
 
-def replaced_run(folder, **options):
-    """New results in the place of old ones, with the last name as the mark of a whole run."""
+def write_new_run(folder, **options):
+    """Replace the results; the last name marks a complete run."""
     with results(folder, ["store", "one.txt", "mark"], stale=["stale"], **options) as hidden:
         (hidden / BEGUN).touch()
         (hidden / "store").mkdir(exist_ok=True)
@@ -65,7 +65,7 @@ def replaced_run(folder, **options):
             (hidden / name).write_text("new")
 
 
-def old_run(folder):
+def write_old_run(folder):
     (folder / "store").mkdir(parents=True)
     for name in ("store/part", "one.txt", "mark", "stale", "one.txt.aux.xml"):
         (folder / name).write_text("old")
@@ -81,32 +81,32 @@ NEW = {"store/part": "new", "one.txt": "new", "mark": "new"}
 
 
 @pytest.mark.parametrize("number", range(1, 9))
-def test_a_run_killed_between_its_moves_leaves_no_mix_of_two_runs(tmp_path, monkeypatch, number):
+def test_run_killed_between_moves_leaves_no_mix_of_two_runs(tmp_path, monkeypatch, number):
     out = tmp_path / "out"
-    old_run(out)
+    write_old_run(out)
     with monkeypatch.context() as patch, pytest.raises(Killed):
-        failing_moves(patch, out, number, Killed, forever=True)
-        replaced_run(out, overwrite=True, worth_keeping=lambda hidden, error: True)
+        make_moves_fail(patch, out, number, Killed, forever=True)
+        write_new_run(out, overwrite=True, worth_keeping=lambda hidden, error: True)
     found = all_files(out)
     assert len(set(found.values())) <= 1
-    # The first move takes the old mark away, and the last one brings the new one.
+    # The first move removes the old mark; the last one adds the new mark.
     assert ("mark" in found) == (number == 1)
-    replaced_run(out, resume=True)
+    write_new_run(out, resume=True)
     assert all_files(out) == NEW and not (out / UNFINISHED).exists()
 
 
 @pytest.mark.parametrize(("number", "error"), [(1, OSError), (4, KeyboardInterrupt), (8, OSError)])
-def test_an_error_between_the_moves_leaves_the_old_results(tmp_path, monkeypatch, number, error):
+def test_error_between_moves_restores_the_old_results(tmp_path, monkeypatch, number, error):
     out = tmp_path / "out"
-    old = old_run(out)
+    old = write_old_run(out)
     with monkeypatch.context() as patch, pytest.raises(error):
-        failing_moves(patch, out, number, error, forever=False)
-        replaced_run(out, overwrite=True)
+        make_moves_fail(patch, out, number, error, forever=False)
+        write_new_run(out, overwrite=True)
     assert all_files(out) == old and not (out / UNFINISHED).exists()
 
 
 @pytest.mark.parametrize("error", [ValueError, OSError, KeyboardInterrupt])
-def test_an_error_leaves_a_folder_as_it_was(tmp_path, error):
+def test_error_leaves_the_folder_unchanged(tmp_path, error):
     write(tmp_path / "there", "old")
     for name in ("there", "new"):
         with pytest.raises(error), results(tmp_path / name, NAMES, overwrite=True) as hidden:
@@ -116,8 +116,8 @@ def test_an_error_leaves_a_folder_as_it_was(tmp_path, error):
     assert not (tmp_path / "new").exists()
 
 
-def keep_from(tmp_path, error, **options):
-    """A run that is worth keeping after an error of the system alone."""
+def interrupt_run(tmp_path, error, **options):
+    """Folder of a run that is kept only if an OSError interrupted it."""
     out = tmp_path / "out"
     options |= {"worth_keeping": lambda hidden, error: isinstance(error, OSError)}
     with pytest.raises(error), results(out, NAMES, **options) as hidden:
@@ -127,8 +127,8 @@ def keep_from(tmp_path, error, **options):
     return out
 
 
-def test_what_is_worth_it_is_kept_and_gone_on_with(tmp_path):
-    out = keep_from(tmp_path, OSError)
+def test_partial_results_worth_keeping_are_resumed(tmp_path):
+    out = interrupt_run(tmp_path, OSError)
     assert [path.name for path in out.iterdir()] == [UNFINISHED]
     with results(out, NAMES, resume=True, worth_keeping=lambda hidden, error: True) as hidden:
         assert contents(hidden) == {BEGUN: "", "block": "done"}
@@ -137,13 +137,13 @@ def test_what_is_worth_it_is_kept_and_gone_on_with(tmp_path):
     assert contents(out) == {"one.txt": "whole", "two.txt": "whole"}
 
 
-def test_another_beginning_finds_nothing_of_the_one_before(tmp_path):
-    out = keep_from(tmp_path, OSError)
+def test_overwriting_discards_partial_results(tmp_path):
+    out = interrupt_run(tmp_path, OSError)
     kept = {"overwrite": True, "worth_keeping": lambda hidden, error: True}
     with pytest.raises(OSError), results(out, NAMES, **kept) as hidden:
         assert contents(hidden) == {}
         raise OSError("again")
-    assert not keep_from(tmp_path / "another", ValueError).exists()
+    assert not interrupt_run(tmp_path / "another", ValueError).exists()
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_another_beginning_finds_nothing_of_the_one_before(tmp_path):
         ([f"{UNFINISHED}/{BEGUN}", "notes.txt"], {"overwrite": False}, "--resume"),
     ],
 )
-def test_a_folder_in_use_is_refused_with_what_to_type(tmp_path, held, options, said):
+def test_folder_in_use_is_rejected_with_the_option_to_use(tmp_path, held, options, said):
     with pytest.raises(ValueError, match="is a file"):
         check_folder(Path(__file__), overwrite=True)
     for name in held:
@@ -169,7 +169,7 @@ def test_a_folder_in_use_is_refused_with_what_to_type(tmp_path, held, options, s
     assert all((tmp_path / name).read_text() == "kept" for name in held)
 
 
-def hold(folder, ready, end):
+def hold_folder(folder, ready, end):
     with results(folder, NAMES, overwrite=True) as hidden:
         for name in NAMES:
             (hidden / name).write_text("first")
@@ -179,10 +179,10 @@ def hold(folder, ready, end):
 
 @pytest.fixture
 def rival(tmp_path):
-    """A process that writes into the folder until it is told to end."""
+    """A process that holds the folder until it is told to end."""
     spawn = multiprocessing.get_context("spawn")
     ready, end = spawn.Event(), spawn.Event()
-    process = spawn.Process(target=hold, args=(tmp_path / "out", ready, end))
+    process = spawn.Process(target=hold_folder, args=(tmp_path / "out", ready, end))
     process.start()
     assert ready.wait(60)
     yield process, end
@@ -191,7 +191,7 @@ def rival(tmp_path):
 
 
 @pytest.mark.parametrize("options", [{"overwrite": True}, {"overwrite": False}, {"overwrite": False, "resume": True}])
-def test_a_second_run_in_a_folder_is_refused_with_the_name_of_the_first(tmp_path, rival, options):
+def test_second_run_in_a_folder_is_rejected_and_names_the_first(tmp_path, rival, options):
     process, end = rival
     for attempt in (check_folder, lambda folder, **options: write(folder, "second", **options)):
         with pytest.raises(ValueError, match=f"in use by process {process.pid} on "):
@@ -217,7 +217,7 @@ def test_links_and_pipes_in_an_unfinished_run_are_not_followed(tmp_path, name, k
     assert elsewhere.read_text() == "mine"
 
 
-def test_a_link_in_the_place_of_the_hidden_folder_is_refused(tmp_path):
+def test_link_in_place_of_the_hidden_folder_is_rejected(tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "elsewhere").mkdir()
     os.symlink(tmp_path / "elsewhere", tmp_path / "out" / UNFINISHED)
@@ -226,7 +226,7 @@ def test_a_link_in_the_place_of_the_hidden_folder_is_refused(tmp_path):
     assert not list((tmp_path / "elsewhere").iterdir())
 
 
-def test_a_finished_run_is_recognised_by_all_its_files(tmp_path):
+def test_finished_run_needs_all_its_files(tmp_path):
     write(tmp_path, "1")
     assert check_folder(tmp_path, overwrite=False, resume=True, names=NAMES)
     assert not check_folder(tmp_path, overwrite=True, resume=True, names=NAMES)
@@ -240,7 +240,7 @@ def test_a_finished_run_is_recognised_by_all_its_files(tmp_path):
     assert not (tmp_path / UNFINISHED).exists()
 
 
-def test_a_dead_run_holds_nothing(tmp_path, rival):
+def test_killed_run_releases_its_folder(tmp_path, rival):
     process, _ = rival
     os.kill(process.pid, signal.SIGKILL)
     process.join(60)

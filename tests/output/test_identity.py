@@ -1,4 +1,4 @@
-"""A run goes on with what it was begun with, and with files that did not change."""
+"""A run resumes only with the same scenario and versions and with unchanged input files."""
 
 import json
 import os
@@ -37,14 +37,14 @@ SMALL = {"grid": {"width": 90, "height": 90}, "terrain": {"dem": "flat"}}
 
 @pytest.fixture
 def lai_file(tmp_path):
-    """A VRT, and the file that it names."""
+    """A VRT and the file that it refers to."""
     place = rasterio.transform.from_origin(704970, 4334220, 30, 30)
     source = write(tmp_path / "source.tif", np.full((9, 9), 2.0), place)
     rasterio.shutil.copy(source, tmp_path / "lai.vrt", driver="VRT")
     return tmp_path / "lai.vrt"
 
 
-def test_files_that_others_name_are_inputs(lai_file, tmp_path):
+def test_files_named_by_other_files_are_inputs(lai_file, tmp_path):
     text = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8").replace('"AVHRR"', '"MINE"', 1)
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
     (tmp_path / "avhrr_response.csv").write_bytes(files.path("avhrr_response.csv").read_bytes())
@@ -56,37 +56,37 @@ def test_files_that_others_name_are_inputs(lai_file, tmp_path):
     assert names == {"lai.vrt", "source.tif", "mine.toml", "avhrr_response.csv", "samples.csv"}
 
 
-def test_a_table_of_bands_is_an_input(tmp_path):
-    """It says how wide the bands are and what noise they have, as the instrument's file does."""
+def test_band_table_is_an_input(tmp_path):
+    """It holds the bandwidths and noise, like the instrument file."""
     (tmp_path / "bands.csv").write_text("name,center,width\nred,0.668,0.010\nnir,0.840,0.040\n")
     (tmp_path / "mine.toml").write_text('name = "Mine"\naltitude = 7e5\ngsd = 30.0\nbits = 12\nbands = "bands.csv"\n')
     found = inputs_of(parse_scenario(SMALL | {"sensor": {"instrument": str(tmp_path / "mine.toml")}}))
     assert {os.path.basename(name) for name in found} == {"mine.toml", "bands.csv"}
 
 
-def scenario_of(lai_file):
+def scenario_with_lai(lai_file):
     return parse_scenario(SMALL | {"ground": {"lai_file": str(lai_file)}}).complete()
 
 
-def identity_of(scenario, scene):
+def make_identity(scenario, scene):
     return state_of(inputs_of(scenario), write_scenario(scenario), scene=scene)
 
 
-def test_a_source_that_changed_is_told_at_resume_and_at_the_end(lai_file, tmp_path):
-    identity = identity_of(scenario_of(lai_file), False)
+def test_changed_source_is_reported_on_resume_and_at_the_end(lai_file, tmp_path):
+    identity = make_identity(scenario_with_lai(lai_file), False)
     before = json.loads(identity["run.json"])["inputs"]
     begin(tmp_path, identity)
-    check_inputs(before, inputs_of(scenario_of(lai_file)))
+    check_inputs(before, inputs_of(scenario_with_lai(lai_file)))
     with rasterio.open(tmp_path / "source.tif", "r+") as sink:
         sink.write(np.full((1, 9, 9), 3.0))
     with pytest.raises(ValueError, match=r"source\.tif changed while it was read"):
-        check_inputs(before, inputs_of(scenario_of(lai_file)))
+        check_inputs(before, inputs_of(scenario_with_lai(lai_file)))
     with pytest.raises(NotThisRun, match=r"an input file that has changed.*--overwrite"):
-        begin(tmp_path, identity_of(scenario_of(lai_file), False))
+        begin(tmp_path, make_identity(scenario_with_lai(lai_file), False))
 
 
-def written_again(path, value, way):
-    """Write a map anew with the size and time of modification that it had."""
+def rewrite_map(path, value, way):
+    """Write new values to a map but keep its size and modification time."""
     status = path.stat()
     target = path if way == "in place" else path.with_suffix(".new")
     content = path.read_bytes()
@@ -97,14 +97,14 @@ def written_again(path, value, way):
 
 
 @pytest.mark.parametrize("way", ["in place", "by a copy"])
-def test_a_changed_input_of_the_same_size_and_time_is_found(lai_file, tmp_path, way):
-    identity = identity_of(scenario_of(lai_file), False)
+def test_changed_input_of_the_same_size_and_time_is_found(lai_file, tmp_path, way):
+    identity = make_identity(scenario_with_lai(lai_file), False)
     begin(tmp_path, identity)
-    written_again(tmp_path / "source.tif", 3.0, way)
+    rewrite_map(tmp_path / "source.tif", 3.0, way)
     with pytest.raises(ValueError, match=r"source\.tif changed while it was read"):
-        check_inputs(json.loads(identity["run.json"])["inputs"], inputs_of(scenario_of(lai_file)))
+        check_inputs(json.loads(identity["run.json"])["inputs"], inputs_of(scenario_with_lai(lai_file)))
     with pytest.raises(NotThisRun, match="an input file that has changed"):
-        begin(tmp_path, identity_of(scenario_of(lai_file), False))
+        begin(tmp_path, make_identity(scenario_with_lai(lai_file), False))
 
 
 def chmod(path):
@@ -112,8 +112,8 @@ def chmod(path):
 
 
 def move_away_and_back(path):
-    """As a backup that is restored."""
-    written_again(path, 2.0, "by a copy")
+    """Change the status time like a restored backup."""
+    rewrite_map(path, 2.0, "by a copy")
 
 
 def link(path):
@@ -122,31 +122,31 @@ def link(path):
 
 @pytest.mark.parametrize("change", [chmod, link, move_away_and_back])
 @pytest.mark.parametrize(("largest", "found"), [(2**30, []), (100, ["source.tif"])])
-def test_other_attributes_of_the_same_content_are_no_change_where_it_can_be_compared(
+def test_changed_attributes_count_only_for_files_too_large_to_compare(
     lai_file, tmp_path, monkeypatch, change, largest, found
 ):
-    """Larger files are compared by their attributes alone."""
+    """Files above the size limit are compared by their attributes alone."""
     monkeypatch.setattr(run_identity, "_COMPARED", largest)
-    before = with_checksums(inputs_of(scenario_of(lai_file)))
+    before = with_checksums(inputs_of(scenario_with_lai(lai_file)))
     change(tmp_path / "source.tif")
-    changed = changed_inputs(json.loads(json.dumps(before)), inputs_of(scenario_of(lai_file)))
+    changed = changed_inputs(json.loads(json.dumps(before)), inputs_of(scenario_with_lai(lai_file)))
     assert [os.path.basename(path) for path in changed] == found
 
 
 @pytest.mark.parametrize("braces", [False, True])
-def test_the_archive_of_an_input_is_watched(lai_file, tmp_path, braces):
+def test_changed_archive_of_an_input_is_found(lai_file, tmp_path, braces):
     archive = tmp_path / "maps.zip"
     with zipfile.ZipFile(archive, "w") as packed:
         packed.write(tmp_path / "source.tif", "lai.tif")
     inside = f"/vsizip/{{{archive}}}/lai.tif" if braces else f"/vsizip/{archive}/lai.tif"
-    before = with_checksums(inputs_of(scenario_of(inside)))
+    before = with_checksums(inputs_of(scenario_with_lai(inside)))
     assert list(before) == [str(archive)]
     with zipfile.ZipFile(archive, "a") as packed:
         packed.writestr("more.txt", "more")
-    assert changed_inputs(before, inputs_of(scenario_of(inside))) == [str(archive)]
+    assert changed_inputs(before, inputs_of(scenario_with_lai(inside))) == [str(archive)]
 
 
-def test_a_finished_run_is_that_of_its_scenario_and_older_than_its_results(tmp_path):
+def test_finished_run_must_match_the_scenario_and_be_newer_than_its_inputs(tmp_path):
     (tmp_path / "scenario.toml").write_text("seed = 3  # of the ground\n")
     written = (tmp_path / "scenario.toml").stat().st_mtime_ns
     check_finished(tmp_path / "scenario.toml", "a", "a", {"lai.tif": [9, written, written, 1]})
@@ -157,15 +157,15 @@ def test_a_finished_run_is_that_of_its_scenario_and_older_than_its_results(tmp_p
             check_finished(tmp_path / "scenario.toml", "a", "a", {"lai.tif": [9, *times, 1]})
 
 
-def test_a_finished_scenario_is_the_one_to_resume(tmp_path):
+def test_scenario_to_resume_is_read_from_the_folder(tmp_path):
     assert scenario_to_resume(tmp_path) is None
     (tmp_path / "scenario.toml").write_text("[ground]\nseed = 3\n")
     assert scenario_to_resume(tmp_path).ground.seed == 3
 
 
 @pytest.mark.parametrize("text", ["[]", "{}", "{", "1", '{"versions": []}', "[" * 100_000])
-def test_a_state_that_no_run_wrote_is_named(tmp_path, text):
-    identity = identity_of(parse_scenario(SMALL).complete(), False)
+def test_invalid_run_state_is_rejected(tmp_path, text):
+    identity = make_identity(parse_scenario(SMALL).complete(), False)
     begin(tmp_path, identity)
     (tmp_path / "run.json").write_text(text)
     with pytest.raises(NotThisRun, match=r"run\.json is invalid.*--overwrite"):
@@ -173,8 +173,8 @@ def test_a_state_that_no_run_wrote_is_named(tmp_path, text):
 
 
 @pytest.mark.parametrize(("key", "said"), [("versions", "package versions"), ("scene", "another setting of --scene")])
-def test_another_state_is_not_gone_on_with(tmp_path, key, said):
-    identity = identity_of(parse_scenario(SMALL).complete(), False)
+def test_run_with_other_versions_or_options_is_not_resumed(tmp_path, key, said):
+    identity = make_identity(parse_scenario(SMALL).complete(), False)
     begin(tmp_path, identity)
     state = json.loads(identity["run.json"])
     other = identity | {"run.json": json.dumps(state | {key: {} if key == "versions" else True})}
@@ -182,11 +182,11 @@ def test_another_state_is_not_gone_on_with(tmp_path, key, said):
         begin(tmp_path, other)
 
 
-def test_a_run_is_gone_on_with_whatever_the_comments_say(tmp_path):
-    """The first line of a scenario may change its words; classes in another order have other codes."""
+def test_comments_of_a_scenario_do_not_prevent_resuming(tmp_path):
+    """The wording of the first line may change, but classes in another order have other codes."""
     classes = {name: {"share": 0.5, "distribution": name} for name in ("burned-grazed", "burned-ungrazed")}
     values = SMALL | {"landscape": {"cover": "pastures"}, "classes": classes}
-    identity = identity_of(parse_scenario(values).complete(), False)
+    identity = make_identity(parse_scenario(values).complete(), False)
     begin(tmp_path, identity)
     heading, rest = identity[BEGUN].split("\n", 1)
     assert heading.startswith("# Synthetic landscape: fields are synthetic; the ground is level")
@@ -194,18 +194,18 @@ def test_a_run_is_gone_on_with_whatever_the_comments_say(tmp_path):
     begin(tmp_path, identity | {BEGUN: f"# Other words.\n{rest}"})
     turned = parse_scenario(values | {"classes": dict(reversed(classes.items()))}).complete()
     with pytest.raises(NotThisRun, match="has another scenario"):
-        begin(tmp_path, identity_of(turned, False))
+        begin(tmp_path, make_identity(turned, False))
 
 
-def test_tags_hold_the_scenario_and_what_computed_it(travelled):
-    with rasterio.open(travelled / "truth.tif") as source:
+def test_tags_hold_the_scenario_and_the_versions(small_run):
+    with rasterio.open(small_run / "truth.tif") as source:
         tags = source.tags()
-    assert tags[SCENARIO_TAG] == write_scenario(read_scenario(travelled / "scenario.toml"))
+    assert tags[SCENARIO_TAG] == write_scenario(read_scenario(small_run / "scenario.toml"))
     assert (tags[PRODUCT], json.loads(tags[VERSIONS])) == ("truth.tif", versions())
 
 
-def test_files_are_named_from_where_the_file_lies(tmp_path):
-    """So that nobody reads in an image where its maker's files are, and all can be moved together."""
+def test_paths_in_tags_are_relative_to_the_image(tmp_path):
+    """An image then reveals no folder names, and it can be moved together with its inputs."""
     data = tmp_path / "data" / "hills.tif"
     data.parent.mkdir()
     data.touch()

@@ -1,4 +1,4 @@
-"""Maps of a page show the values at their places, in the colours that their bars say."""
+"""Maps of a page show each value at its location, in the colour given by the colour bar."""
 
 import io
 from xml.etree import ElementTree
@@ -49,15 +49,15 @@ def dn(lai):
         (340.0, 440.0, ["350", "375", "400", "425"]),
     ],
 )
-def test_numbers_of_a_bar_have_the_digits_that_they_need(lai, low, high, texts):
+def test_tick_labels_have_enough_digits(lai, low, high, texts):
     bar = value_map(lai, "leaves", limits=(low, high)).bar
     assert [text for _, text in bar.ticks] == texts
     for place, text in bar.ticks:
         assert place == pytest.approx(100 * (float(text.replace("−", "-")) - low) / (high - low))
 
 
-def test_colours_are_those_of_the_bar(lai):
-    """A value at the low end has the first stop, one beyond the high end the last, and no data is grey."""
+def test_map_colours_match_the_colour_bar(lai):
+    """The lower limit maps to the first stop, values above the upper limit to the last, and no data to grey."""
     values = lai.copy(data=np.linspace(0.0, 4.0, lai.size).reshape(lai.shape))
     values[5, 5] = np.nan
     found = value_map(values, "leaves", limits=(0.0, 2.0))
@@ -72,8 +72,8 @@ def test_colours_are_those_of_the_bar(lai):
     assert dict((text, place) for place, text in found.bar.ticks)["1.0"] == pytest.approx(50.0)
 
 
-def test_a_frame_lies_where_its_ground_is(lai):
-    """The ground is 600 m wide and 300 m high; the right half of its lowest 90 m is marked."""
+def test_frame_marks_its_part_of_the_map(lai):
+    """The ground is 600 m wide and 300 m high; the frame marks the right half of its lowest 90 m."""
     part = fifesim.grids.grid.geobox(lai[21:, 30:]).boundingbox
     assert value_map(lai, "", frame=part).frame == pytest.approx((50.0, 70.0, 50.0, 30.0))
     assert value_map(lai, "").scale == (pytest.approx(100 / 6), "100 m")
@@ -82,7 +82,7 @@ def test_a_frame_lies_where_its_ground_is(lai):
 
 
 def test_leaves_are_red_and_soil_is_not(dn):
-    """The picture has near infrared as red: the pixel with the highest NDVI is the reddest by its share of red."""
+    """The composite shows near infrared as red, so the pixel with the highest NDVI has the largest share of red."""
     found = image_map(dn, "", stretch_of(dn)).pixels.astype(float)
     ndvi = dn.fifesim.ndvi().values
     red = found[..., 0] - found[..., 1:].mean(axis=-1)
@@ -98,7 +98,7 @@ def test_no_data_is_grey_in_an_image(dn):
 
 
 def test_relief_is_lit_from_the_north_west(lai):
-    """The side of a ridge that looks to the north-west is brighter than the other."""
+    """The side of a ridge that faces north-west is brighter than the other."""
     rows, columns = np.indices(lai.shape)
     ridge = lai.copy(data=-2.0 * np.abs(rows + columns - 44.0))
     shown = relief_map(ridge, "").pixels.astype(float).sum(axis=-1)
@@ -106,7 +106,7 @@ def test_relief_is_lit_from_the_north_west(lai):
 
 
 @pytest.mark.parametrize(("size", "kind"), [(40, "PNG"), (400, "WEBP")])
-def test_few_pixels_keep_their_edges(size, kind):
+def test_small_images_keep_sharp_pixel_edges(size, kind):
     pixels = np.zeros((size, size, 3), np.uint8)
     pixels[: size // 2] = 200
     picture = Image.open(io.BytesIO(encoded(pixels)))
@@ -119,15 +119,15 @@ GRID = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 1200.0, 900.0, 30.0)
 WAVELENGTHS = {"B2": 0.48, "B3": 0.56, "B4": 0.66, "B8": 0.84}
 
 
-def image_in(bands=tuple(WAVELENGTHS), dtype=float):
+def make_image(bands=tuple(WAVELENGTHS), dtype=float):
     values = np.random.default_rng(4).uniform(1, 200, (len(bands), 30, 40)).astype(dtype)
     array = xr.DataArray(values, dims=("band", "y", "x"), coords={"band": list(bands)})
     array = array.assign_coords(wavelength=("band", [WAVELENGTHS[name] for name in bands]), sza=30.0)
     return grids.place(array, GRID).assign_attrs(instrument="MSI")
 
 
-def test_colours_are_percentiles_of_the_bands():
-    array = image_in()
+def test_colours_are_stretched_between_percentiles():
+    array = make_image()
     found = rgb(array, stretch=(10, 80))
     assert found.dims == ("y", "x", "rgb") and found["rgb"].values.tolist() == ["red", "green", "blue"]
     for colour, name in zip(("red", "green", "blue"), ("B8", "B4", "B3"), strict=True):
@@ -137,7 +137,7 @@ def test_colours_are_percentiles_of_the_bands():
         np.testing.assert_allclose(found.sel(rgb=colour), expected, rtol=0, atol=1e-7)
     assert found.attrs["long_name"] == "B8, B4, B3 as red, green, blue"
     assert found.rio.crs.to_epsg() == 26914
-    # xarray makes its titles of scalars.
+    # xarray turns scalar coordinates into titles.
     assert not {"sza", "band", "wavelength"} & set(found.coords)
 
 
@@ -151,32 +151,32 @@ def test_colours_are_percentiles_of_the_bands():
         (("B3", "B4"), ("B3", "B4"), "a composite is of three of the bands B3, B4"),
     ],
 )
-def test_bands_that_are_missing_are_named(bands, composite, message):
+def test_missing_bands_are_named(bands, composite, message):
     with pytest.raises(ValueError, match=message):
-        rgb(image_in(bands), composite)
+        rgb(make_image(bands), composite)
 
 
 def test_other_mistakes_are_named():
     with pytest.raises(ValueError, match="stretch must be two percentiles"):
-        rgb(image_in(), stretch=(98, 2))
+        rgb(make_image(), stretch=(98, 2))
     with pytest.raises(ValueError, match="along a dimension band"):
-        rgb(image_in().isel(band=0))
+        rgb(make_image().isel(band=0))
     with pytest.raises(ValueError, match=r"has no wavelength .*composite=\('\w+', '\w+', '\w+'\)"):
-        rgb(image_in().drop_vars("wavelength"))
+        rgb(make_image().drop_vars("wavelength"))
 
 
-def test_bands_of_a_composite_may_be_numbers_and_have_no_contrast():
-    assert composite_bands(image_in(), "natural colour") == ["B4", "B3", "B2"]
-    numbered = image_in().assign_coords(band=[2, 3, 4, 8])
+def test_composite_bands_may_be_numbers_or_have_no_contrast():
+    assert composite_bands(make_image(), "natural colour") == ["B4", "B3", "B2"]
+    numbered = make_image().assign_coords(band=[2, 3, 4, 8])
     found = rgb(numbered, (8, 4, 3))
-    np.testing.assert_array_equal(found, rgb(image_in(), ("B8", "B4", "B3")))
+    np.testing.assert_array_equal(found, rgb(make_image(), ("B8", "B4", "B3")))
     assert found.attrs["long_name"] == "8, 4, 3 as red, green, blue"
     numbered[3] = 7.0
     assert (rgb(numbered).sel(rgb="red") == 0.5).all()
 
 
-def test_no_data_have_no_colour():
-    array = image_in(dtype=np.uint8)
+def test_no_data_has_no_colour():
+    array = make_image(dtype=np.uint8)
     array[2, 3, 4] = 0
     found = rgb(array)
     assert found[3, 4].isnull().all() and int(found.isnull().sum()) == 3
@@ -185,21 +185,21 @@ def test_no_data_have_no_colour():
     assert np.isnan(valid(other).values[1, 1])
 
 
-def test_colours_of_a_lazy_image_are_lazy_and_the_same():
-    array = image_in()
+def test_colours_of_a_lazy_image_are_lazy_and_identical():
+    array = make_image()
     read = []
     lazy = in_chunks(array, CHUNKS)
     lazy = lazy.copy(data=lazy.data.map_blocks(lambda block: read.append(1) or block, meta=np.empty((0, 0, 0))))
     found = rgb(lazy)
     assert found.chunks is not None
-    # Colours are stretched between limits of the whole image, which is read once for them; no pixel is kept.
+    # The stretch limits need one pass over the whole image, which keeps no pixel.
     limits = len(read)
     assert limits == lazy.data.npartitions
     with dask.config.set(scheduler="synchronous"):
         xr.testing.assert_identical(found.compute(), rgb(array))
 
 
-def test_a_large_raster_is_thinned_from_the_middle_of_its_blocks():
+def test_large_raster_is_thinned_to_the_middle_of_each_block():
     array = xr.DataArray(np.arange(12.0)[:, None] * np.ones(7), dims=("y", "x"))
     assert thinned(array, 12) is array
     few = thinned(array, 4)
@@ -207,13 +207,13 @@ def test_a_large_raster_is_thinned_from_the_middle_of_its_blocks():
     assert thinned(array.rename(y="line", x="sample"), 4).sizes == {"line": 4, "sample": 2}
 
 
-def style(raster, path):
+def read_style(raster, path):
     return ElementTree.parse(write_style(fifesim.to_geotiff(raster, path))).getroot().find("pipe/rasterrenderer")
 
 
 @pytest.fixture(scope="module")
-def image(travelled):
-    return fifesim.open_image(travelled / "image.tif")
+def image(small_run):
+    return fifesim.open_image(small_run / "image.tif")
 
 
 def limits(renderer, colour):
@@ -232,10 +232,10 @@ def limits(renderer, colour):
         (["TM2", "TM3"], None),
     ],
 )
-def test_bands_are_found_by_their_wavelengths(lai, tmp_path, bands, numbers):
-    """In false colour, else in natural colour, else the first band in grey."""
+def test_style_selects_bands_by_wavelength(lai, tmp_path, bands, numbers):
+    """The style shows false colour if possible, else natural colour, else the first band in grey."""
     rho = fifesim.surface_reflectance(lai[:6, :6], bands=bands)
-    renderer = style(rho, tmp_path / "image.tif")
+    renderer = read_style(rho, tmp_path / "image.tif")
     if numbers is None:
         assert (renderer.get("type"), renderer.get("grayBand")) == ("singlebandgray", "1")
         return
@@ -243,31 +243,31 @@ def test_bands_are_found_by_their_wavelengths(lai, tmp_path, bands, numbers):
     assert " ".join(renderer.get(f"{colour}Band") for colour in ("red", "green", "blue")) == numbers
 
 
-def ramp(renderer):
+def colour_ramp(renderer):
     return [(float(item.get("value")), item.get("color")) for item in renderer.iter("item")]
 
 
-def test_leaf_area_and_ndvi_have_ramps_of_their_own(image, travelled, tmp_path):
-    truth = fifesim.open_image(travelled / "truth.tif")
-    shown = ramp(style(truth, tmp_path / "truth.tif"))
+def test_leaf_area_and_ndvi_have_specific_colour_ramps(image, small_run, tmp_path):
+    truth = fifesim.open_image(small_run / "truth.tif")
+    shown = colour_ramp(read_style(truth, tmp_path / "truth.tif"))
     assert shown[0] == (0.0, "#ffffe5")
     assert shown[-1][0] == pytest.approx(float(np.percentile(truth.sel(band="lai"), 99)), rel=1e-5)
     assert [value for value, _ in shown] == sorted(value for value, _ in shown)
-    ndvi = ramp(style(image.fifesim.ndvi(), tmp_path / "ndvi.tif"))
+    ndvi = colour_ramp(read_style(image.fifesim.ndvi(), tmp_path / "ndvi.tif"))
     assert (ndvi[0], ndvi[-1]) == ((0.0, "#440154"), (1.0, "#fde725"))
 
 
-def test_no_data_is_not_stretched(image, tmp_path):
+def test_no_data_does_not_affect_the_stretch(image, tmp_path):
     holed = image.sel(band=["TM4"]).copy()
     holed[:, :, :15] = 0
-    renderer = style(holed, tmp_path / "holed.tif")
+    renderer = read_style(holed, tmp_path / "holed.tif")
     expected = np.percentile(fifesim.to_radiance(image).sel(band="TM4")[:, 15:], (1, 99))
     np.testing.assert_allclose(limits(renderer, ""), expected, rtol=1e-5)
-    low, high = limits(style(image.sel(band=["TM4"]).where(False, 7).astype("uint8"), tmp_path / "flat.tif"), "")
+    low, high = limits(read_style(image.sel(band=["TM4"]).where(False, 7).astype("uint8"), tmp_path / "flat.tif"), "")
     assert low < high
 
 
-def test_a_style_of_ones_own_stays(image, tmp_path):
+def test_existing_style_is_kept_unless_overwritten(image, tmp_path):
     path = fifesim.to_geotiff(image, tmp_path / "image.tif")
     (tmp_path / "image.qml").write_text("mine")
     with pytest.raises(FileExistsError, match="overwrite=True"):

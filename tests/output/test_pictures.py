@@ -1,4 +1,4 @@
-"""Pictures: what they draw, in which colours, where and under which title."""
+"""Contents, colours, coordinates and titles of pictures."""
 
 import dask.array as da
 import matplotlib
@@ -12,65 +12,65 @@ from fifesim.grids import grid as grids
 
 
 @pytest.fixture(autouse=True)
-def closed():
+def close_figures():
     matplotlib.use("agg")
     yield
     plt.close("all")
 
 
-def drawn(axes):
+def drawn_artist(axes):
     return (axes.images or axes.collections)[0]
 
 
-def test_an_image_is_drawn_in_colours_on_its_ground(whole):
+def test_image_is_drawn_in_colour_at_its_coordinates(whole):
     axes = whole["image"].fifesim.plot(composite=("TM4", "TM3", "TM3"))
     box = grids.geobox(whole["image"]).boundingbox
-    np.testing.assert_allclose(drawn(axes).get_extent(), [box.left, box.right, box.bottom, box.top])
+    np.testing.assert_allclose(drawn_artist(axes).get_extent(), [box.left, box.right, box.bottom, box.top])
     assert axes.get_xlabel() == "Easting [m]" and axes.get_aspect() == 1
     colours = whole["image"].fifesim.rgb(("TM4", "TM3", "TM3"))
     found = np.isfinite(colours.values)
-    np.testing.assert_array_equal(np.asarray(drawn(axes).get_array()[..., :3])[found], colours.values[found])
+    np.testing.assert_array_equal(np.asarray(drawn_artist(axes).get_array()[..., :3])[found], colours.values[found])
     assert axes.get_title().startswith("TM4, TM3, TM3 as red, green, blue\nLandsat-5 Thematic Mapper")
     assert "earth_sun_distance" not in axes.get_title()
 
 
-def test_no_data_are_transparent_above_grey(whole):
+def test_no_data_is_transparent(whole):
     image = whole["image"].copy(deep=True)
     image[0, 1, 2] = 0
-    alpha = np.asarray(drawn(image.fifesim.plot()).get_array())[..., 3]
+    alpha = np.asarray(drawn_artist(image.fifesim.plot()).get_array())[..., 3]
     valid = (image != 0).all("band").values
     assert alpha[1, 2] == 0 and not valid[1, 2]
     np.testing.assert_array_equal(alpha, valid)
-    one = np.ma.getmaskarray(drawn(image.fifesim.plot(band="TM3")).get_array())
+    one = np.ma.getmaskarray(drawn_artist(image.fifesim.plot(band="TM3")).get_array())
     assert one[1, 2]
     np.testing.assert_array_equal(one, (image.sel(band="TM3") == 0).values)
 
 
-def test_a_quantity_has_its_colours_and_a_bar_with_its_unit(whole):
+def test_quantity_has_a_colour_map_and_a_bar_with_its_unit(whole):
     axes = whole["lai"].fifesim.plot(stretch=(0, 100))
-    picture = drawn(axes)
+    picture = drawn_artist(axes)
     assert picture.get_cmap().name == "YlGn"
     assert picture.get_clim() == (float(whole["lai"].min()), float(whole["lai"].max()))
     assert axes.figure.axes[1].get_ylabel() == "LAI [m² m⁻²]"
     factor = (whole["lai"] * 0 + 1.0).rename("kt")
     factor[0, 0], factor[0, 1] = 0.9, 1.3
-    picture = drawn(factor.fifesim.plot(stretch=(0, 100)))
+    picture = drawn_artist(factor.fifesim.plot(stretch=(0, 100)))
     assert picture.get_cmap().name == "RdBu_r" and picture.get_clim() == pytest.approx((0.7, 1.3))
-    picture = drawn(factor.fifesim.plot(cmap="magma", limits=(0, 2)))
+    picture = drawn_artist(factor.fifesim.plot(cmap="magma", limits=(0, 2)))
     assert picture.get_cmap().name == "magma" and picture.get_clim() == (0, 2)
 
 
-def test_axes_of_one_s_own_and_kilometres(whole):
+def test_given_axes_and_kilometres(whole):
     figure, axes = plt.subplots()
     large = whole["lai"].isel(y=slice(2), x=slice(2)).drop_attrs()
     large = grids.place(large, fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 8000.0, 8000.0, 4000.0))
     assert large.fifesim.plot(axes=axes) is axes and len(figure.axes) == 2
     assert axes.get_ylabel() == "Northing [km]"
-    np.testing.assert_allclose(drawn(axes).get_extent(), [705, 713, 4326, 4334])
+    np.testing.assert_allclose(drawn_artist(axes).get_extent(), [705, 713, 4326, 4334])
 
 
-def test_a_large_lazy_scene_is_not_loaded_whole():
-    """60 km in cells of 3 m, of which the picture takes chunks one by one."""
+def test_large_lazy_scene_is_not_loaded_whole():
+    """The picture reads a 60 km scene in 3 m cells chunk by chunk."""
     grid = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 60000.0, 60000.0, 3.0)
     held = []
 
@@ -80,25 +80,25 @@ def test_a_large_lazy_scene_is_not_loaded_whole():
 
     cells = da.map_blocks(make, chunks=((4000,) * 5, (4000,) * 5), dtype=np.float32, meta=np.empty((0, 0), np.float32))
     scene = grids.place(xr.DataArray(cells, dims=("y", "x"), name="ndvi"), grid)
-    picture = drawn(scene.fifesim.plot(size=100))
+    picture = drawn_artist(scene.fifesim.plot(size=100))
     assert picture.get_array().shape == (100, 100)
-    # The middle of 200 cells is the edge of one: half a cell.
+    # Each block of 200 cells is shown by one cell next to its middle, half a cell off.
     np.testing.assert_allclose(picture.get_extent(), [705, 765, 4274, 4334], rtol=0, atol=1.6e-3)
     assert len(held) == 25
 
 
-def test_a_scan_is_drawn_where_its_pixels_lie(site):
+def test_scan_is_drawn_at_its_pixel_locations(site):
     lai = fifesim.lai_scene(site, "burned-grazed", seed=7)
     image = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa()
     image = image.fifesim.sense_swath("TM", heading=193.6)
     for axes in (image.fifesim.plot(), image.fifesim.ndvi().fifesim.plot()):
-        corners = drawn(axes).get_coordinates()
+        corners = drawn_artist(axes).get_coordinates()
         sweeps = len(np.unique(image["sweep"]))
         assert sweeps > 1
         assert corners.shape == (image.sizes["line"] + sweeps, image.sizes["sample"] + 1, 2)
-        # Rows of the mesh lie on the lines; an empty row lies between two sweeps.
+        # Mesh rows lie on the scan lines, with an empty row between two sweeps.
         middles = corners[:-1, :-1] + corners[:-1, 1:] + corners[1:, :-1] + corners[1:, 1:]
-        values = np.ma.getdata(drawn(axes).get_array())
+        values = np.ma.getdata(drawn_artist(axes).get_array())
         empty = values[..., -1] == 0 if values.ndim > 2 else np.isnan(values)
         between = np.flatnonzero(np.diff(image["sweep"])) + np.arange(1, sweeps)
         assert empty[between].all() and not empty.all(axis=1)[between - 1].any()
@@ -107,15 +107,15 @@ def test_a_scan_is_drawn_where_its_pixels_lie(site):
             np.testing.assert_allclose(lines, image[name], rtol=0, atol=0.02)
 
 
-def test_a_scan_that_knows_degrees_alone_is_drawn_in_them():
+def test_scan_with_only_latitude_and_longitude_is_drawn_in_degrees():
     line, sample = np.mgrid[0:4, 0:5]
     places = {"latitude": (("line", "sample"), 60 - line * 0.01), "longitude": (("line", "sample"), 9 + sample * 0.02)}
     axes = xr.DataArray(line + 0.0, dims=("line", "sample"), coords=places, name="ndvi").fifesim.plot()
     assert axes.get_ylabel() == "Latitude [°]" and axes.get_aspect() == pytest.approx(2, rel=1e-2)
-    np.testing.assert_allclose(drawn(axes).get_coordinates()[0, 0], [8.99, 60.005])
+    np.testing.assert_allclose(drawn_artist(axes).get_coordinates()[0, 0], [8.99, 60.005])
 
 
-def test_what_is_no_map_is_named(whole):
+def test_rasters_that_are_no_maps_are_rejected(whole):
     with pytest.raises(ValueError, match=r"there is no band 'TM1': the raster has TM3, TM4"):
         whole["image"].fifesim.plot(band="TM1")
     with pytest.raises(ValueError, match=r"a map has dimensions \(\[band\], y, x\)"):
@@ -124,7 +124,7 @@ def test_what_is_no_map_is_named(whole):
         fifesim.plot(whole["image"].to_dataset())
 
 
-def test_a_fit_is_drawn_with_its_pixels(whole):
+def test_fit_is_drawn_with_its_pixels(whole):
     fit = fifesim.regress(whole["truth"], whole["ndvi"])
     axes = fit.plot(whole["truth"], whole["ndvi"])
     assert axes.get_xlabel() == "Normalized difference vegetation index"
@@ -138,7 +138,7 @@ def test_a_fit_is_drawn_with_its_pixels(whole):
     assert pixels.sum() == fit.n
 
 
-def test_a_fit_alone_is_a_line_about_the_mean(whole):
+def test_fit_without_rasters_is_a_line_centred_on_the_mean(whole):
     fit = fifesim.regress(whole["truth"], whole["ndvi"])
     axes = fit.plot(level=0.9)
     x, _ = axes.lines[0].get_data()
@@ -148,7 +148,7 @@ def test_a_fit_alone_is_a_line_about_the_mean(whole):
         fit.plot(whole["truth"])
 
 
-def test_instruments_stand_side_by_side_in_the_same_colours(lai):
+def test_instruments_are_compared_with_common_colours(lai):
     images = fifesim.compare(lai, ["MSI", "TM"])
     figure = images.fifesim.plot_comparison()
     panels = [axes for axes in figure.axes if axes.images]
@@ -160,8 +160,8 @@ def test_instruments_stand_side_by_side_in_the_same_colours(lai):
         xr.DataTree.from_dict({"/TM": images["TM/dn"].isel(band=[0]).to_dataset()}).fifesim.plot_comparison()
 
 
-def scores_of(spread, seed=3):
-    """Scores of estimates whose intervals are too narrow by a factor, by two classes."""
+def make_scores(spread, seed=3):
+    """Scores by class of estimates whose intervals are too narrow by the factor `spread`."""
     rng = np.random.default_rng(seed)
     truth = xr.DataArray(rng.normal(size=(8, 400)), dims=("landscape", "pixel"), name="lai")
     guess = truth + rng.normal(0, 0.5, truth.shape)
@@ -172,13 +172,13 @@ def scores_of(spread, seed=3):
     return fifesim.score(xr.Dataset(estimate, {"level": level}), truth, by=classes)
 
 
-def test_scores_are_drawn_with_their_errors_and_groups():
-    scores = scores_of(0.5)
+def test_scores_are_drawn_by_group_with_error_bars():
+    scores = make_scores(0.5)
     figure = fifesim.plot_score(scores)
     coverage, pit = figure.axes
-    drawn = [container[0] for container in coverage.containers]
-    assert len(drawn) == 2
-    for at, line in enumerate(drawn):
+    drawn_artist = [container[0] for container in coverage.containers]
+    assert len(drawn_artist) == 2
+    for at, line in enumerate(drawn_artist):
         assert np.array_equal(line.get_xdata(), [0.5, 0.9])
         assert np.array_equal(line.get_ydata(), scores.coverage.isel(cover=at))
     bars = coverage.containers[0][2][0].get_segments()
@@ -186,12 +186,12 @@ def test_scores_are_drawn_with_their_errors_and_groups():
     assert lengths == pytest.approx(4 * scores.coverage_se.isel(cover=0).values)
     assert [patch.get_data().values.tolist() for patch in pit.patches] == scores.pit.values.tolist()
     assert [text.get_text() for text in coverage.get_legend().get_texts()] == ["cover 0", "cover 1"]
-    # Intervals that are too narrow lie below the line of a calibrated estimate.
+    # The coverage of intervals that are too narrow lies below the nominal level.
     assert (scores.coverage < scores.level).all()
 
 
-def test_scores_that_cannot_be_drawn_are_refused():
+def test_scores_that_cannot_be_drawn_are_rejected():
     with pytest.raises(ValueError, match="neither coverage nor pit"):
-        fifesim.plot_score(scores_of(1.0)[["rmse"]])
+        fifesim.plot_score(make_scores(1.0)[["rmse"]])
     with pytest.raises(ValueError, match="select one"):
-        fifesim.plot_score(xr.concat([scores_of(1.0)] * 2, "product"))
+        fifesim.plot_score(xr.concat([make_scores(1.0)] * 2, "product"))

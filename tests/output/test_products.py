@@ -1,4 +1,4 @@
-"""What a run computes, and in which order."""
+"""Products of a run and the order of their computation."""
 
 import dask.array as da
 import numpy as np
@@ -22,21 +22,21 @@ from fifesim.scenario.simulation import simulate
 
 
 @pytest.fixture(scope="module")
-def tree():
+def simulated_tree():
     scenario = parse_scenario({"grid": {"width": 900, "height": 600}, "terrain": {"dem": "flat"}})
     return simulate(scenario.complete(), chunks={"y": 90, "x": 135})
 
 
-def test_every_block_is_wanted_once(tree):
-    found, lai = products_of(tree), tree["scene"]["lai"]
+def test_each_block_is_listed_once(simulated_tree):
+    found, lai = products_of(simulated_tree), simulated_tree["scene"]["lai"]
     wanted = wanted_blocks(found, lai)
     assert len(wanted) == len(set(wanted)) == sum(array.npartitions for array in found.arrays.values())
     assert {name for name, _ in wanted} == set(found.rasters) == {"image", "lai", "fpar", "detail"}
 
 
-def test_blocks_are_wanted_by_the_chunk_of_the_scene_below_them(tree):
-    """Chunk after chunk of the scene, each found by the coordinates of the middles of blocks and cells."""
-    found, lai = products_of(tree), tree["scene"]["lai"]
+def test_blocks_are_ordered_by_the_scene_chunk_below_them(simulated_tree):
+    """The scene chunk below a block is located by comparing the centres of blocks and cells."""
+    found, lai = products_of(simulated_tree), simulated_tree["scene"]["lai"]
     places = []
     for name, index in wanted_blocks(found, lai):
         raster, place = found.rasters[name], []
@@ -51,21 +51,21 @@ def test_blocks_are_wanted_by_the_chunk_of_the_scene_below_them(tree):
     assert len(set(places)) == lai.data.npartitions == 4
 
 
-def test_cells_of_the_detail_are_those_below_pixels_in_the_middle(tree):
-    detail, scene = products_of(tree).rasters["detail"], tree["scene"]["lai"]
+def test_detail_shows_the_cells_in_the_middle_of_the_scene(simulated_tree):
+    detail, scene = products_of(simulated_tree).rasters["detail"], simulated_tree["scene"]["lai"]
     assert detail.shape == (144, 144)
     assert abs(float(detail["x"].mean() - scene["x"].mean())) <= 15
 
 
-def test_scene_products_are_written_as_their_blocks_are_made(tree, tmp_path):
+def test_scene_blocks_are_written_during_the_computation(simulated_tree, tmp_path):
     path = tmp_path / "scene.zarr"
-    found = products_of(tree, path)
-    assert set(found.scene) == set(tree["scene"].data_vars)
+    found = products_of(simulated_tree, path)
+    assert set(found.scene) == set(simulated_tree["scene"].data_vars)
     make_scene_store(path, found.scene)
     (checksum,) = found.arrays["scene-lai"].compute().ravel()
     assert chunk_checksum(path, "lai", (0, 0)) == checksum
     written = xr.open_zarr(path, decode_coords="all")
-    assert written["lai"].values.tobytes() == tree["scene"]["lai"].values.tobytes()
+    assert written["lai"].values.tobytes() == simulated_tree["scene"]["lai"].values.tobytes()
     zarr.open_array(str(path), path="lai")[3, 4] = 9.0
     assert chunk_checksum(path, "lai", (0, 0)) != checksum
 
@@ -83,28 +83,28 @@ def save(folder, array, *indices):
         save_block(folder, "image", index, array.blocks[index].compute())
 
 
-def test_blocks_come_back_in_their_places(tmp_path, array):
+def test_saved_blocks_form_the_original_array(tmp_path, array):
     save(tmp_path, array, *np.ndindex(array.numblocks))
     found = saved_array(tmp_path, "image", array)
     assert found.chunks == ((2,), (4, 3), (9,)) and found.dtype == array.dtype
     np.testing.assert_array_equal(found.compute(), CELLS)
 
 
-def test_blocks_that_are_there_are_known(tmp_path, array):
+def test_saved_blocks_are_found(tmp_path, array):
     save(tmp_path, array, (0, 0, 1), (0, 1, 0))
     assert saved_blocks(tmp_path, "image", array) == {(0, 0, 1), (0, 1, 0)}
     assert saved_blocks(tmp_path, "truth", array) == set()
 
 
 @pytest.mark.parametrize("kept", [0, 60, -8])
-def test_a_cut_block_is_none(tmp_path, array, kept):
+def test_truncated_block_is_ignored(tmp_path, array, kept):
     save(tmp_path, array, (0, 0, 0))
     (path,) = (tmp_path / "image").iterdir()
     path.write_bytes(path.read_bytes()[:kept])
     assert saved_blocks(tmp_path, "image", array) == set()
 
 
-def test_a_changed_block_is_none_and_is_not_read(tmp_path, array):
+def test_changed_block_is_ignored_and_not_read(tmp_path, array):
     save(tmp_path, array, *np.ndindex(array.numblocks))
     path = tmp_path / "image" / "00000-00000-00000.npy"
     content = bytearray(path.read_bytes())
@@ -115,19 +115,19 @@ def test_a_changed_block_is_none_and_is_not_read(tmp_path, array):
         saved_array(tmp_path, "image", array).compute()
 
 
-def test_a_block_of_another_shape_or_type_is_none(tmp_path, array):
+def test_block_of_another_shape_or_type_is_ignored(tmp_path, array):
     save(tmp_path, array, (0, 0, 0))
     assert saved_blocks(tmp_path, "image", array.astype("float32")) == set()
     assert saved_blocks(tmp_path, "image", array.rechunk((2, 4, 4))) == set()
 
 
-def test_a_place_that_takes_nothing_is_named(tmp_path, array):
+def test_error_names_a_block_that_cannot_be_written(tmp_path, array):
     (tmp_path / "image" / "00000-00000-00000.npy").mkdir(parents=True)
     with pytest.raises(OSError, match=r"00000-00000-00000\.npy"):
         save(tmp_path, array, (0, 0, 0))
 
 
-def test_a_run_goes_on_where_it_has_blocks_and_can_end_well(tmp_path, array):
+def test_partial_run_is_kept_if_it_has_blocks_and_can_be_resumed(tmp_path, array):
     assert not has_blocks(tmp_path, OSError())
     save(tmp_path / "blocks", array, (0, 0, 0))
     assert has_blocks(tmp_path, OSError()) and has_blocks(tmp_path, KeyboardInterrupt())

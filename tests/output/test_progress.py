@@ -1,4 +1,4 @@
-"""Progress as lines of JSON, and nothing where nobody looks."""
+"""Progress as JSON lines, and no output without a terminal."""
 
 import json
 import logging
@@ -12,7 +12,7 @@ from fifesim.output import progress
 from fifesim.output.progress import Progress, doing, since_start, steps
 
 
-def test_lines_say_where_the_run_is(capsys):
+def test_json_lines_report_progress(capsys):
     with Progress("simulating", "cells", 100, done=40, as_json=True) as progress:
         progress.advance(60)
     first, last = map(json.loads, capsys.readouterr().out.splitlines())
@@ -21,7 +21,7 @@ def test_lines_say_where_the_run_is(capsys):
     assert last["cells_per_second"] > 0 and last["memory"] > 10e6
 
 
-def test_a_line_a_minute_says_where_the_run_is_without_a_terminal(capsys, monkeypatch):
+def test_progress_is_one_line_per_minute_without_a_terminal(capsys, monkeypatch):
     now = iter(range(0, 10**6, 25))
     monkeypatch.setattr(time, "monotonic", lambda: float(next(now)))
     with Progress("simulating", "cells", 8_000_000) as progress:
@@ -33,13 +33,13 @@ def test_a_line_a_minute_says_where_the_run_is_without_a_terminal(capsys, monkey
     assert re.match(line, err.splitlines()[0]), err
 
 
-def test_time_since_start_counts_from_the_start_of_the_process(monkeypatch):
+def test_elapsed_time_counts_from_the_start_of_the_process(monkeypatch):
     monkeypatch.setattr(progress.psutil.Process, "create_time", lambda process: 1000.0)
     monkeypatch.setattr(time, "time", lambda: 1030.0)
     assert since_start() == 30.0
 
 
-def test_nothing_is_printed_of_a_short_run_without_a_terminal(capsys):
+def test_short_run_without_a_terminal_prints_nothing(capsys):
     with Progress("simulating", "cells", 2) as progress:
         progress.advance(2)
     assert list(steps([1, 2], "counting")) == [1, 2]
@@ -49,8 +49,8 @@ def test_nothing_is_printed_of_a_short_run_without_a_terminal(capsys):
 
 
 @pytest.mark.parametrize(("widgets", "shown"), [(True, True), (False, False)])
-def test_a_notebook_shows_bars_where_it_has_widgets(monkeypatch, widgets, shown):
-    """A notebook's standard error is no terminal; what rich draws there are widgets."""
+def test_notebook_shows_bars_if_widgets_are_available(monkeypatch, widgets, shown):
+    """The standard error of a notebook is no terminal; rich draws widgets there."""
     monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
     monkeypatch.setattr(progress, "find_spec", lambda name: widgets or None)
     assert progress._shows_bars() == shown

@@ -1,4 +1,4 @@
-"""What a page says of a scenario."""
+"""Contents of a report page."""
 
 import base64
 import re
@@ -30,7 +30,7 @@ from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
 
-def test_title_has_the_names_of_files_and_not_their_folders():
+def test_title_names_files_without_their_folders():
     scenario = parse_scenario({"terrain": {"dem": "flat"}, "geometry": {"sza": 30.0, "saa": 120.0}})
     ground = scenario.ground.model_copy(update={"lai_file": "/somewhere/leaves.tif"})
     sensor = scenario.sensor.model_copy(update={"instrument": "/elsewhere/camera.toml"})
@@ -46,8 +46,8 @@ def engine_row(sza, **atmosphere):
     return rows[0][1]
 
 
-def test_report_says_where_5s_is_beyond_two_percent():
-    """Urban haze under a low sun; and in clear air over the near infrared alone."""
+def test_report_lists_bands_where_5s_errs_by_more_than_two_percent():
+    """Urban haze under a low sun exceeds 2 % in both bands; clear air stays within 2 %."""
     haze = engine_row(70.0, aerosol="urban", visibility=6)
     assert 'beyond 2 % in TM3, TM4: engine = "successive-orders"' in haze and "TM4 +" in haze
     clear = engine_row(25.0, aerosol="none", visibility=None)
@@ -60,15 +60,15 @@ GROUND = {"grid": {"width": 600, "height": 300}, "terrain": {"dem": "flat"}}
 
 
 @pytest.fixture(scope="module", params=[{}, {"interval": "native"}, {"offset": [0.5, 0.0]}], ids=["", "native", "off"])
-def run(request):
+def simulated_run(request):
     scenario = parse_scenario(GROUND | {"sensor": request.param}).complete()
     tree = fifesim.simulate(scenario)
     return scenario, tree["image"].to_dataset().compute(), tree["truth"].to_dataset().compute()
 
 
-def test_pairs_are_told_with_how_far_they_lie_apart(run):
-    """Nineteen intervals of 30.315 m, from the middle of the first pixel on, end 6.2 m beyond as many blocks."""
-    scenario, image, truth = run
+def test_pairing_reports_the_offset_between_pixels_and_blocks(simulated_run):
+    """Nineteen intervals of 30.315 m between the first and last pixel centre extend 6 m beyond as many 30 m blocks."""
+    scenario, image, truth = simulated_run
     text = pairing(scenario, image, truth)
     assert "9 x 9 cells of 3.33 m, a square of 30 m" in text
     native = scenario.sensor.interval == "native"
@@ -79,9 +79,9 @@ def test_pairs_are_told_with_how_far_they_lie_apart(run):
     assert ("0.5 pixels further south and 0 further east" in text) is (scenario.sensor.offset == [0.5, 0.0])
 
 
-def test_results_are_those_of_the_line(run):
-    """Residuals by numpy, paired by row and column as the regression is."""
-    _, image, truth = run
+def test_main_results_match_the_regression(simulated_run):
+    """Residuals are recomputed with numpy, paired by row and column like the regression."""
+    _, image, truth = simulated_run
     fit = regress(truth["lai"], image["ndvi"], pair="index")
     (value, name, text), (span, *_) = main_results(truth, image, truth, {"lai": fit})
     share = fit.residual_deviation / float(truth["lai"].mean())
@@ -94,7 +94,7 @@ def test_results_are_those_of_the_line(run):
     assert main_results(truth, image, truth, {}) == []
 
 
-def test_finding_without_a_line_says_why():
+def test_finding_without_a_regression_gives_the_reason():
     assert finding({}, {"lai": "NDVI does not vary", "fpar": "NDVI does not vary"}) == (
         "No line was fitted: NDVI does not vary"
     )
@@ -116,8 +116,8 @@ def test_headline_names_instrument_place_and_time():
     )
 
 
-def test_cautions_name_what_is_left_out(run):
-    scenario, image, _ = run
+def test_cautions_name_the_omitted_effects(simulated_run):
+    scenario, image, _ = simulated_run
     said = " ".join(cautions(scenario))
     assert ("perfectly registered" in said) is not any(scenario.sensor.offset)
     assert "No detector noise" in said
@@ -128,22 +128,22 @@ GRID = {"width": 1110, "height": 1110}
 
 
 class Fit:
-    """A line."""
+    """A stub of a regression."""
 
     r2 = 0.931
 
 
-def published(fits=None, **sections):
+def compare_with_paper(fits=None, **sections):
     values = {"grid": GRID, "ground": {"distribution": "burned-grazed", "arp": 0.15}}
     values |= {"sensor": {"response": "paper"}} | sections
     return pairing_rows(parse_scenario(values).complete(), {"lai": Fit} if fits is None else fits)
 
 
-def test_run_of_the_papers_ground_says_why_its_r2_is_another():
-    (_, why), (_, typed) = published()
+def test_report_explains_the_difference_from_the_published_r2():
+    (_, why), (_, typed) = compare_with_paper()
     assert why.startswith("0.61, and 0.93 here") and "30.315 m apart" in why
     assert 'interval = "native" in [sensor]' in typed and "fifesim reproduce" in typed
-    # What it says is what a run with that key gives, on level ground.
+    # The predicted R2 is reached by a run with that key, on level ground.
     sections = {"terrain": {"dem": "flat"}, "sensor": {"interval": "native", "response": "paper"}}
     ground = {"distribution": "burned-grazed", "arp": 0.15}
     run = simulate(parse_scenario({"grid": GRID, "ground": ground, **sections}), chunks=None)
@@ -166,20 +166,20 @@ def test_run_of_the_papers_ground_says_why_its_r2_is_another():
     ],
     ids=str,
 )
-def test_other_runs_are_not_compared(sections):
-    assert published(**sections) == []
+def test_other_runs_are_not_compared_with_the_paper(sections):
+    assert compare_with_paper(**sections) == []
 
 
 @pytest.fixture(scope="module")
-def level():
+def level_run():
     scenario = parse_scenario({"grid": {"width": 600, "height": 300}, "terrain": {"dem": "flat"}})
     tree = fifesim.simulate(scenario.complete()).compute()
     image = tree["image"].to_dataset()
     return image.assign(ndvi=image["dn"].fifesim.ndvi()), tree["truth"].to_dataset(), tree["scene"]["lai"]
 
 
-def test_regression_is_written_above_its_line(level):
-    image, truth, _ = level
+def test_figure_title_gives_the_regression_of_its_line(level_run):
+    image, truth, _ = level_run
     fit = regress(truth["lai"], image["ndvi"], pair="index")
     axis = fit_figure(image, truth, "lai", fit).axes[0]
     assert f"n = {fit.n}" in axis.get_title()
@@ -187,8 +187,8 @@ def test_regression_is_written_above_its_line(level):
     np.testing.assert_allclose(line.get_ydata(), fit.intercept + fit.slope * line.get_xdata())
 
 
-def test_every_pixel_is_counted_where_it_lies(level):
-    image, truth, _ = level
+def test_density_counts_every_pixel_at_its_values(level_run):
+    image, truth, _ = level_run
     axis = fit_figure(image, truth, "lai", regress(truth["lai"], image["ndvi"], pair="index")).axes[0]
     (density,) = axis.images
     counts = 10.0 ** density.get_array()
@@ -200,8 +200,8 @@ def test_every_pixel_is_counted_where_it_lies(level):
     assert (counts.filled(0).sum(axis=0) @ centres) / ndvi.size == pytest.approx(float(ndvi.mean()), abs=step / 2)
 
 
-def test_frequencies_are_of_all_pixels(level):
-    image, truth, detail = level
+def test_frequencies_of_each_band_sum_to_one(level_run):
+    image, truth, detail = level_run
     axis = histogram_figures(image, truth, detail)[2].axes[0]
     shares = {line.get_label(): line.get_ydata().sum() for line in axis.lines}
     assert shares == pytest.approx(dict.fromkeys(map(str, image["band"].values), 1.0))
@@ -218,22 +218,24 @@ def template(tmp_path):
     return write
 
 
-def drawn():
+def drawn_png():
     figure = Figure(figsize=(2, 1))
     figure.subplots().plot([0, 1])
     return report.png(figure, 50)
 
 
-def test_a_picture_is_in_the_page_as_it_is(template):
-    page = report.page_html(template('<img src="{{ picture | embedded }}">{{ text }}'), picture=drawn(), text="a < b")
+def test_picture_is_embedded_unchanged(template):
+    page = report.page_html(
+        template('<img src="{{ picture | embedded }}">{{ text }}'), picture=drawn_png(), text="a < b"
+    )
     (content,) = re.findall(r'src="data:image/png;base64,([^"]*)"', page)
-    assert base64.b64decode(content) == drawn()
-    # Width and height are at bytes 16 to 24 of a PNG.
-    assert [int.from_bytes(drawn()[start : start + 4]) for start in (16, 20)] == [100, 50]
+    assert base64.b64decode(content) == drawn_png()
+    # A PNG holds its width and height in bytes 16 to 24.
+    assert [int.from_bytes(drawn_png()[start : start + 4]) for start in (16, 20)] == [100, 50]
     assert "a &lt; b" in page and f"matplotlib {matplotlib.__version__}" in page
 
 
-def test_a_name_without_a_value_is_an_error(template):
+def test_undefined_template_name_is_an_error(template):
     with pytest.raises(jinja2.UndefinedError, match="forgotten"):
         report.page_html(template("{{ forgotten }}"))
 

@@ -1,4 +1,4 @@
-"""A file made again from its tags has the same bits, and where it has not, that is said."""
+"""A file recomputed from its tags has the same bits, and differences are reported."""
 
 import json
 import shutil
@@ -21,17 +21,17 @@ def no_pictures(monkeypatch):
     monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
 
 
-def test_an_image_alone_is_made_again_to_the_byte(travelled, tmp_path):
-    alone = shutil.copy(travelled / "image.tif", tmp_path / "sent.tif")
+def test_image_alone_is_reproduced_to_the_byte(small_run, tmp_path):
+    alone = shutil.copy(small_run / "image.tif", tmp_path / "sent.tif")
     found = rerun(alone, tmp_path / "again.tif")
     assert found == Rerun(3 * 20 * 30, 0, 0.0, {})
-    assert (tmp_path / "again.tif").read_bytes() == (travelled / "image.tif").read_bytes()
+    assert (tmp_path / "again.tif").read_bytes() == (small_run / "image.tif").read_bytes()
     assert outcome_in_words("sent.tif", found) == "sent.tif made again: the same bits in all of 1800 values"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["again.tif", "sent.tif"]
 
 
-def test_what_differs_is_counted_and_versions_are_named(travelled, tmp_path):
-    path = shutil.copy(travelled / "truth.tif", tmp_path / "truth.tif")
+def test_differences_are_counted_and_versions_named(small_run, tmp_path):
+    path = shutil.copy(small_run / "truth.tif", tmp_path / "truth.tif")
     with rasterio.open(path, "r+", IGNORE_COG_LAYOUT_BREAK="YES") as sink:
         values = sink.read()
         values[1, 4, 5] += 0.25
@@ -46,7 +46,7 @@ def test_what_differs_is_counted_and_versions_are_named(travelled, tmp_path):
     assert [each.name for each in tmp_path.iterdir()] == ["truth.tif"]
 
 
-def test_inputs_move_with_the_file(tmp_path):
+def test_inputs_may_be_moved_together_with_the_file(tmp_path):
     (tmp_path / "one").mkdir()
     place = rasterio.transform.from_origin(704970, 4334220, 30, 30)
     write(tmp_path / "one" / "lai.tif", np.random.default_rng(1).uniform(1, 3, (12, 12)), place)
@@ -59,8 +59,8 @@ def test_inputs_move_with_the_file(tmp_path):
         rerun(moved / "out" / "image.tif")
 
 
-def test_a_file_without_the_tags_is_refused_with_what_to_do(travelled, tmp_path):
-    other = fifesim.to_geotiff(fifesim.open_image(travelled / "image.tif"), tmp_path / "other.tif")
+def test_file_without_tags_is_rejected_with_a_remedy(small_run, tmp_path):
+    other = fifesim.to_geotiff(fifesim.open_image(small_run / "image.tif"), tmp_path / "other.tif")
     with pytest.raises(ValueError, match=r"has no provenance.*scenario\.toml"):
         rerun(other)
 
@@ -73,27 +73,27 @@ def test_a_file_without_the_tags_is_refused_with_what_to_do(travelled, tmp_path)
         ("FIFESIM_SCENARIO", "[ground", "fifesim did not write"),
     ],
 )
-def test_tags_of_another_hand_are_refused(travelled, tmp_path, tag, text, said):
-    image = fifesim.open_image(travelled / "image.tif")
-    with rasterio.open(travelled / "image.tif") as source:
+def test_invalid_tags_are_rejected(small_run, tmp_path, tag, text, said):
+    image = fifesim.open_image(small_run / "image.tif")
+    with rasterio.open(small_run / "image.tif") as source:
         tags = {name: value for name, value in source.tags().items() if name.startswith("FIFESIM_")}
     path = fifesim.to_geotiff(image, tmp_path / "image.tif", tags=tags | {tag: text})
     with pytest.raises(ValueError, match=said):
         read_origin(path)
 
 
-def test_a_file_that_is_there_is_kept(travelled, tmp_path):
+def test_existing_file_is_kept(small_run, tmp_path):
     (tmp_path / "mine.tif").write_text("mine")
     with pytest.raises(ValueError, match="--overwrite"):
-        rerun(travelled / "image.tif", tmp_path / "mine.tif")
+        rerun(small_run / "image.tif", tmp_path / "mine.tif")
     assert (tmp_path / "mine.tif").read_text() == "mine"
 
 
-def test_a_scenario_that_only_another_version_knows_names_both(travelled, tmp_path):
-    with rasterio.open(travelled / "image.tif") as source:
+def test_error_for_a_scenario_of_another_version_names_both_versions(small_run, tmp_path):
+    with rasterio.open(small_run / "image.tif") as source:
         tags = {name: value for name, value in source.tags().items() if name.startswith("FIFESIM_")}
     tags["FIFESIM_SCENARIO"] = "[ground]\nmood = 1\n"
-    image = fifesim.open_image(travelled / "image.tif")
+    image = fifesim.open_image(small_run / "image.tif")
     path = fifesim.to_geotiff(image, tmp_path / "image.tif", tags=tags | {VERSIONS: '{"fifesim": "9.9"}'})
     with pytest.raises(ValueError, match=r"made by fifesim 9\.9, here is .*unknown key ground\.mood"):
         rerun(path)

@@ -1,4 +1,4 @@
-"""The report of a run says what its rasters say."""
+"""A run folder: its rasters, its report and resuming it."""
 
 import html
 import json
@@ -38,7 +38,7 @@ def folder(tmp_path_factory):
     return folder
 
 
-def test_image_and_truth_are_those_of_the_chain(folder):
+def test_image_and_truth_match_the_chain(folder):
     grid = fifesim.fife_site(30 / 9, window=((0, 180), (0, 270)))
     lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.24, seed=3)
     image = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa().fifesim.sense("TM")
@@ -48,7 +48,7 @@ def test_image_and_truth_are_those_of_the_chain(folder):
         np.testing.assert_array_equal(truth.sel(band=name), cells.fifesim.aggregate(30).values.astype(np.float32))
 
 
-def test_report_gives_the_regressions_means_and_deviations_of_its_files(folder):
+def test_report_matches_regressions_and_statistics_of_its_files(folder):
     page = (folder / "report.html").read_text(encoding="utf-8")
     truth, ndvi = (fifesim.open_image(folder / name) for name in ("truth.tif", "image.tif"))
     found = {name: truth.sel(band=name, drop=True).astype(float) for name in ("lai", "fpar")}
@@ -64,16 +64,16 @@ def test_report_gives_the_regressions_means_and_deviations_of_its_files(folder):
 BLUR = '<th>Blur</th><td class="number">modulation transfer at the Nyquist frequency {}'
 
 
-def heading(folder):
-    """Title of a report, its tag of the browser's window, and the lines below the title."""
+def report_heading(folder):
+    """Title of a report, its HTML title element, and the lines below the title."""
     page = html.unescape((folder / "report.html").read_text(encoding="utf-8"))
     header = page[page.index("<header>") : page.index("</header>")]
     (title,), (tag,) = re.findall(r"<h1>(.*?)</h1>", header), re.findall(r"<title>(.*?)</title>", page)
     return title, tag, re.findall(r"<p[^>]*>(.*?)</p>", header)
 
 
-def test_report_and_its_title_begin_with_what_is_synthetic(folder):
-    title, tag, lines = heading(folder)
+def test_report_title_and_first_line_name_the_synthetic_parts(folder):
+    title, tag, lines = report_heading(folder)
     seen = "Simulated Landsat-5 Thematic Mapper image, FIFE site, 6 June 1987 16:35 UTC"
     assert title == tag == f"{seen} (synthetic landscape, hypothetical overpass)"
     said = (folder / "scenario.toml").read_text(encoding="utf-8").splitlines()[0]
@@ -89,7 +89,7 @@ def test_report_is_self_contained(folder):
     *local, doi = re.findall(r'href="([^"]*)"', page)
     assert doi.startswith("https://doi.org/") and all((folder / name).is_file() for name in local)
     assert {"image.tif", "truth.tif", "scenario.toml"} <= set(local)
-    # Image and cells, two lines, three maps, three histograms.
+    # Pictures of the image, the cells, two regressions, three maps and three histograms.
     assert len(re.findall("data:image/(?:png|webp);base64,", page)) == 11
 
 
@@ -99,8 +99,8 @@ def test_report_names_every_parameter_with_its_unit(folder):
         assert re.search(rf"<code>{key}</code>.*?<td>{unit}</td>", page)
 
 
-def test_a_single_band_through_its_detector_alone_has_no_ndvi_and_still_a_report(tmp_path):
-    """A detector as wide as the interval passes 2 / pi."""
+def test_single_band_has_a_report_without_ndvi(tmp_path):
+    """The MTF of a detector as wide as the sampling interval is 2 / pi at the Nyquist frequency."""
     scenario = parse_scenario(SMALL | {"sensor": {"bands": ["TM5"], "response": "detector"}})
     simulate_to_folder(scenario, tmp_path / "one")
     page = html.unescape((tmp_path / "one" / "report.html").read_text(encoding="utf-8"))
@@ -110,7 +110,7 @@ def test_a_single_band_through_its_detector_alone_has_no_ndvi_and_still_a_report
     assert read_scenario(tmp_path / "one" / "scenario.toml").sensor.response == "detector"
 
 
-def test_a_report_with_terrain_shows_it_and_says_how_far_it_is_known(tmp_path):
+def test_report_with_terrain_shows_it_and_its_extent(tmp_path):
     simulate_to_folder(parse_scenario(SMALL | {"terrain": {"horizon_reach": 900}}), tmp_path / "hills")
     page = (tmp_path / "hills" / "report.html").read_text(encoding="utf-8")
     assert len(re.findall("data:image/(?:png|webp);base64,", page)) == 15
@@ -123,7 +123,7 @@ HILLS = {"grid": {"width": 4500, "height": 3900}, "ground": {"seed": 3}, "terrai
 
 @pytest.fixture(scope="module")
 def hills(tmp_path_factory):
-    """A scene of several chunks on terrain, with its cells; nobody looks at its pictures."""
+    """A multi-chunk scene on terrain with its cells, written without pictures."""
     folder = tmp_path_factory.mktemp("hills") / "out"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(report, "png", lambda figure, dpi: b"")
@@ -132,7 +132,7 @@ def hills(tmp_path_factory):
 
 
 @pytest.mark.parametrize("chunks", [None, 512, 1500, {"y": 333, "x": 1170}])
-def test_a_run_gives_the_bits_of_the_chain_under_any_chunks(hills, chunks):
+def test_run_equals_the_chain_under_any_chunks(hills, chunks):
     whole = -1 if chunks is None else chunks
     tree = fifesim.simulate(parse_scenario(HILLS).complete(), chunks=whole)
     np.testing.assert_array_equal(fifesim.open_image(hills / "image.tif").values, tree["image"]["dn"].values)
@@ -141,7 +141,7 @@ def test_a_run_gives_the_bits_of_the_chain_under_any_chunks(hills, chunks):
         np.testing.assert_array_equal(truth.sel(band=name), tree["truth"][name].values.astype(np.float32))
 
 
-def test_the_scene_holds_the_cells(hills):
+def test_scene_file_holds_the_cells(hills):
     assert sorted(path.name for path in hills.iterdir()) == sorted([*FILES, "scene.zarr"])
     tree = fifesim.simulate(parse_scenario(HILLS).complete())
     with xr.open_zarr(hills / "scene.zarr", decode_coords="all") as scene:
@@ -153,30 +153,30 @@ def test_the_scene_holds_the_cells(hills):
         np.testing.assert_array_equal(scene["x"], tree["scene"]["x"])
 
 
-def lai_map(path, values):
+def write_lai_map(path, values):
     place = rasterio.transform.from_origin(704970, 4334220, 30, 30)
     return {"ground": {"lai_file": str(write(path, np.full((20, 30), values), place))}}
 
 
 def test_report_of_a_map_calls_nothing_synthetic(tmp_path):
-    own = lai_map(tmp_path / "lai.tif", np.linspace(1, 3, 30)) | {"geometry": {"time": "1987-08-15T16:40Z"}}
+    own = write_lai_map(tmp_path / "lai.tif", np.linspace(1, 3, 30)) | {"geometry": {"time": "1987-08-15T16:40Z"}}
     simulate_to_folder(parse_scenario(own), tmp_path / "out")
-    title, tag, lines = heading(tmp_path / "out")
+    title, tag, lines = report_heading(tmp_path / "out")
     assert title == tag == "Simulated Landsat-5 Thematic Mapper image, FIFE site, 15 August 1987 16:40 UTC"
     said = "Leaf area is from a file; the ground is level. Time as given, 15 August 1987 16:40 UTC."
     assert lines[0] == f"lai.tif. {said}"
 
 
-def test_a_uniform_map_has_no_line_and_still_a_report(tmp_path):
-    files = simulate_to_folder(parse_scenario(lai_map(tmp_path / "lai.tif", 2.0)), tmp_path / "out")
+def test_uniform_map_has_a_report_without_regression(tmp_path):
+    files = simulate_to_folder(parse_scenario(write_lai_map(tmp_path / "lai.tif", 2.0)), tmp_path / "out")
     assert all(path.stat().st_size > 0 for path in files)
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "Leaf area and FPAR from NDVI" not in page and re.search("R² of .*none, all", page, re.DOTALL)
 
 
 @pytest.mark.parametrize(("values", "offset"), [(2.0, [9.5, 0.0]), (np.nan, [0.0, 0.0])])
-def test_an_image_without_a_valid_pixel_is_an_error_that_says_why(tmp_path, values, offset):
-    scenario = lai_map(tmp_path / "lai.tif", values) | {
+def test_image_without_valid_pixels_is_an_error_with_the_reason(tmp_path, values, offset):
+    scenario = write_lai_map(tmp_path / "lai.tif", values) | {
         "grid": {"width": 300, "height": 300},
         "sensor": {"offset": offset},
     }
@@ -185,14 +185,14 @@ def test_an_image_without_a_valid_pixel_is_an_error_that_says_why(tmp_path, valu
     assert not (tmp_path / "out").exists()
 
 
-def test_an_input_that_changes_during_a_run_ends_it(tmp_path, monkeypatch):
+def test_input_that_changes_during_a_run_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
-    scenario = parse_scenario(lai_map(tmp_path / "lai.tif", 2.0))
+    scenario = parse_scenario(write_lai_map(tmp_path / "lai.tif", 2.0))
     write_files = run_folder._write_files
 
     def while_another_writes(*given):
         write_files(*given)
-        lai_map(tmp_path / "lai.tif", 3.0)
+        write_lai_map(tmp_path / "lai.tif", 3.0)
 
     monkeypatch.setattr(run_folder, "_write_files", while_another_writes)
     with pytest.raises(ValueError, match=r"lai\.tif changed while it was read"):
@@ -200,7 +200,7 @@ def test_an_input_that_changes_during_a_run_ends_it(tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
-def test_cells_of_an_earlier_run_do_not_stay_beside_a_new_image(tmp_path, monkeypatch):
+def test_overwriting_removes_the_cells_of_an_earlier_run(tmp_path, monkeypatch):
     monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True)
     (tmp_path / "out" / "notes.txt").touch()
@@ -208,7 +208,7 @@ def test_cells_of_an_earlier_run_do_not_stay_beside_a_new_image(tmp_path, monkey
     assert {path.name for path in (tmp_path / "out").iterdir()} == {*FILES, "notes.txt"}
 
 
-def test_a_finished_run_is_resumed_without_work(folder, tmp_path, monkeypatch):
+def test_resuming_a_finished_run_computes_nothing(folder, tmp_path, monkeypatch):
     shutil.copytree(folder, tmp_path / "out")
     monkeypatch.setattr(run_folder, "simulate", None)
     scenario = parse_scenario(SMALL)
@@ -219,17 +219,17 @@ def test_a_finished_run_is_resumed_without_work(folder, tmp_path, monkeypatch):
         simulate_to_folder(scenario, tmp_path / "out", resume=True, scene=True)
 
 
-def test_a_finished_run_with_a_newer_input_is_not_taken_for_the_same(tmp_path, monkeypatch):
+def test_finished_run_with_a_newer_input_is_not_resumed(tmp_path, monkeypatch):
     monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
-    scenario = parse_scenario(lai_map(tmp_path / "lai.tif", 2.0))
+    scenario = parse_scenario(write_lai_map(tmp_path / "lai.tif", 2.0))
     simulate_to_folder(scenario, tmp_path / "out")
     simulate_to_folder(scenario, tmp_path / "out", resume=True)
-    lai_map(tmp_path / "lai.tif", 3.0)
+    write_lai_map(tmp_path / "lai.tif", 3.0)
     with pytest.raises(ValueError, match=r"older than its input .*lai\.tif.*--overwrite"):
         simulate_to_folder(scenario, tmp_path / "out", resume=True)
 
 
-def test_a_chunk_that_changed_is_made_again(tmp_path, monkeypatch):
+def test_changed_chunk_is_recomputed_on_resume(tmp_path, monkeypatch):
     monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     simulate_to_folder(parse_scenario(SMALL), tmp_path / "whole", scene=True)
 
@@ -248,7 +248,7 @@ def test_a_chunk_that_changed_is_made_again(tmp_path, monkeypatch):
 TINY = {"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}}
 
 
-def test_all_that_a_simulation_asks_of_the_engine_is_known_before(monkeypatch):
+def test_engine_runs_in_advance_cover_the_simulation(monkeypatch):
     scenario = parse_scenario(TINY | {"atmosphere": {"visibility": 17.0}}).complete()
     run_engine(scenario)
     monkeypatch.setitem(engines.SCATTERING, "5S", None)
@@ -256,7 +256,7 @@ def test_all_that_a_simulation_asks_of_the_engine_is_known_before(monkeypatch):
 
 
 @pytest.mark.parametrize("command", ["simulate", "budget"])
-def test_missing_engine_is_one_line_with_exit_code_1(command, monkeypatch, tmp_path):
+def test_missing_engine_gives_one_line_and_exit_code_1(command, monkeypatch, tmp_path):
     monkeypatch.setattr(six_s, "Py6S", None)
     (tmp_path / "6s.toml").write_text('[atmosphere]\nengine = "6S"\n[grid]\nwidth = 300\nheight = 300\n')
     result = CliRunner().invoke(app, [command, str(tmp_path / "6s.toml"), "-o", str(tmp_path / "out")])
@@ -271,7 +271,7 @@ def test_missing_engine_is_one_line_with_exit_code_1(command, monkeypatch, tmp_p
 FOUND = {"cells": 72900, "pixels": 900, "tasks": 12, "threads": 2, "memory": 2**30, "disk": 2**20, "seconds": 90.0}
 
 
-def test_cells_and_pixels_are_those_of_the_scenario(monkeypatch):
+def test_estimate_counts_cells_and_pixels_of_the_scenario(monkeypatch):
     monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     scenario = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}})
     found, with_scene = estimate(scenario, threads=1), estimate(scenario, threads=1, scene=True)
@@ -280,8 +280,8 @@ def test_cells_and_pixels_are_those_of_the_scenario(monkeypatch):
     assert found["threads"] == 1 and found["seconds"] > 0 and found["memory"] > 0
 
 
-def test_piece_that_is_timed_is_part_of_the_scene():
-    """Of whole pixels in its middle, and no more cells than a tile has."""
+def test_timed_piece_lies_in_the_middle_of_the_scene():
+    """It consists of whole pixels and is no larger than a tile."""
     scenario = parse_scenario({"grid": {"width": 24000, "height": 300}, "terrain": {"dem": "flat"}}).complete()
     piece, whole = estimates._piece(scenario), scenario.geobox()
     box = piece.geobox()
@@ -302,7 +302,7 @@ finally:
 """
 
 
-def last_line(folder, *arguments, line=-1):
+def run_json(folder, *arguments, line=-1):
     command = [sys.executable, "-c", PEAK, "simulate", "scenario.toml", "--threads", "2", "--json", *arguments]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     return json.loads(done.stdout.splitlines()[line])
@@ -312,17 +312,17 @@ def last_line(folder, *arguments, line=-1):
 @pytest.mark.parametrize(
     ("size", "dem"), [(300, "flat"), (15_000, "flat"), pytest.param(15_000, "flint-hills", marks=pytest.mark.slow)]
 )
-def test_memory_that_is_promised_suffices(tmp_path, size, dem):
-    """And it is not more than half as much again as a run takes."""
+def test_estimated_memory_suffices(tmp_path, size, dem):
+    """The estimate exceeds the memory of a run by at most 50 %."""
     text = f'[grid]\nwidth = {size}\nheight = {size}\n[terrain]\ndem = "{dem}"\n'
     (tmp_path / "scenario.toml").write_text(text)
-    # Kernels that are compiled in the run would count.
-    last_line(tmp_path, "--dry-run")
-    promised, taken = last_line(tmp_path, "--dry-run", line=-2)["memory"], last_line(tmp_path, "-o", "out")
+    # Compile the kernels first, because compilation would count as memory of the run.
+    run_json(tmp_path, "--dry-run")
+    promised, taken = run_json(tmp_path, "--dry-run", line=-2)["memory"], run_json(tmp_path, "-o", "out")
     assert taken <= promised <= 1.5 * taken
 
 
-def test_an_estimate_in_words_has_units_and_its_json_is_the_estimate():
+def test_estimate_in_words_has_units_and_json_keeps_the_values():
     text = estimate_in_words(FOUND)
     assert "0.1 million" in text and "1.00 GiB with 2 threads" in text and "1.00 MiB" in text
     assert json.loads(estimate_in_words(FOUND, as_json=True)) == {"event": "estimate", **FOUND}

@@ -1,4 +1,4 @@
-"""STAC items and collections: valid, and saying what the files say."""
+"""STAC items and collections are valid and agree with the files."""
 
 import json
 
@@ -12,8 +12,8 @@ from fifesim.scenario.scenario import parse_scenario
 
 
 @pytest.fixture(scope="module")
-def item(travelled):
-    return json.loads((travelled / "item.json").read_text(encoding="utf-8"))
+def item(small_run):
+    return json.loads((small_run / "item.json").read_text(encoding="utf-8"))
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def pystac():
 
 
 def test_an_item_is_valid(item, pystac):
-    """By the schemas of the core, which pystac brings; those of extensions lie on servers."""
+    """Validation uses the core schemas bundled with pystac; extension schemas are online only."""
     pytest.importorskip("jsonschema")
     assert {asset["href"][2:] for asset in item["assets"].values()} == {
         "image.tif", "truth.tif", "scene.zarr", "quicklook.png", "report.html", "scenario.toml",
@@ -32,7 +32,7 @@ def test_an_item_is_valid(item, pystac):
     assert schema.endswith("item.json")
 
 
-def test_its_extensions_are_read_and_declared(item, travelled, pystac):
+def test_extensions_of_an_item_are_readable_and_declared(item, small_run, pystac):
     from pystac.extensions.projection import ProjectionExtension
     from pystac.extensions.view import ViewExtension
 
@@ -41,12 +41,12 @@ def test_its_extensions_are_read_and_declared(item, travelled, pystac):
     assert (image.code, image.shape) == ("EPSG:26914", [20, 30])
     assert image.transform == [30.0, 0.0, 704970.0, 0.0, -30.0, 4334220.0]
     view = ViewExtension.ext(found)
-    with rasterio.open(travelled / "image.tif") as source:
+    with rasterio.open(small_run / "image.tif") as source:
         tags = source.tags()
     assert view.incidence_angle == 20.0
     assert view.sun_elevation == pytest.approx(90 - float(tags["sza"]), abs=1e-8)
     assert view.sun_azimuth == pytest.approx(float(tags["saa"]), abs=1e-8)
-    # From below the sensor, which stands in the east, to the scene.
+    # Azimuth from the nadir point of the sensor, which lies in the east, to the scene.
     assert view.azimuth == 280.0
     for prefix, name in (("proj", "projection"), ("eo", "eo"), ("raster", "raster"), ("processing", "processing")):
         assert f'"{prefix}:' in json.dumps(item) and any(f"/{name}/v" in each for each in item["stac_extensions"])
@@ -54,16 +54,16 @@ def test_its_extensions_are_read_and_declared(item, travelled, pystac):
 
 
 def test_off_nadir_is_the_angle_at_the_satellite(item):
-    """By the law of sines: the pixel, the satellite 705 km above the ground, and the middle of the Earth."""
+    """Law of sines for pixel, satellite 705 km above the ground, and centre of the Earth."""
     earth, angle = 6371.0, np.radians(item["properties"]["view:off_nadir"])
     at_pixel = np.pi - np.radians(20.0)
     assert np.sin(angle) / earth == pytest.approx(np.sin(at_pixel) / (earth + 705), rel=1e-9)
     assert angle < np.radians(20.0)
 
 
-def test_bands_say_what_the_file_says(item, travelled):
+def test_bands_of_the_item_match_the_file(item, small_run):
     bands = item["assets"]["image"]["bands"]
-    with rasterio.open(travelled / "image.tif") as image:
+    with rasterio.open(small_run / "image.tif") as image:
         assert [band["name"] for band in bands] == list(image.descriptions)
         assert [band["raster:scale"] for band in bands] == list(image.scales)
         assert [band["raster:offset"] for band in bands] == list(image.offsets)
@@ -73,8 +73,8 @@ def test_bands_say_what_the_file_says(item, travelled):
     assert {band["nodata"] for band in item["assets"]["truth"]["bands"]} == {"nan"}
 
 
-def test_bands_of_the_extension_are_those_of_the_core(item, pystac):
-    """Version 1.1.0 of the extension has eo:bands, by which odc-stac finds names; version 2 has none."""
+def test_bands_of_the_eo_extension_match_the_core_bands(item, pystac):
+    """Version 1.1.0 of the extension has eo:bands, which odc-stac uses to find names; version 2 does not."""
     from pystac.extensions.eo import EOExtension
 
     found = pystac.Item.from_dict(item)
@@ -89,8 +89,8 @@ def test_bands_of_the_extension_are_those_of_the_core(item, pystac):
     assert all(set(band) <= allowed for asset in item["assets"].values() for band in asset.get("eo:bands", []))
 
 
-def test_the_footprint_is_that_of_the_pixels(item):
-    """Quarters of the edges by GDAL's own transformation, to 0.1 m, counterclockwise from the southwest."""
+def test_footprint_encloses_the_pixels(item):
+    """Quarter points of the edges, transformed by GDAL, agree to 0.1 m, counterclockwise from the southwest."""
     (ring,) = item["geometry"]["coordinates"]
     west, south, east, north = 704970, 4333620, 705870, 4334220
     share = np.arange(4) / 4
@@ -103,18 +103,18 @@ def test_the_footprint_is_that_of_the_pixels(item):
     np.testing.assert_allclose(item["bbox"], bounds, rtol=0, atol=1e-6)
 
 
-def test_a_scenario_without_a_date_has_a_range_instead(travelled, pystac):
+def test_scenario_without_a_date_has_a_date_range(small_run, pystac):
     given = {"sza": 30.0, "saa": 120.0}
     place = {"grid": {"crs": "EPSG:32735", "west": 601020, "north": 7220040, "width": 900, "height": 600}}
     scenario = parse_scenario(place | {"geometry": given, "terrain": {"dem": "flat"}, "atmosphere": {"altitude": 1.2}})
-    found = pystac.Item.from_dict(stac.item(scenario.complete(), travelled, "no date"))
+    found = pystac.Item.from_dict(stac.item(scenario.complete(), small_run, "no date"))
     assert found.datetime is None
     assert found.properties["start_datetime"] < found.properties["end_datetime"]
     found.stac_extensions = []
     assert found.validate()
 
 
-def test_a_collection_is_valid_and_leads_to_its_items(item, tmp_path, pystac):
+def test_collection_is_valid_and_links_to_its_items(item, tmp_path, pystac):
     moved = item | {"id": "moved", "bbox": [-96.0, 39.0, -95.9, 39.1]}
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
@@ -128,8 +128,8 @@ def test_a_collection_is_valid_and_leads_to_its_items(item, tmp_path, pystac):
     assert [str(each.date()) for each in found.extent.temporal.intervals[0]] == ["1987-06-06", "1987-06-06"]
 
 
-def test_a_band_has_the_common_name_whose_middle_is_nearest():
-    """Bands 5 of OLI, 8 and 9 of MSI: all three lie in the range of the name nir."""
+def test_band_has_the_common_name_with_the_nearest_centre():
+    """Band 5 of OLI and bands 8 and 9 of MSI all lie in the range of the common name nir."""
     coords = {"wavelength": [0.865, 0.842, 0.945], "solar_irradiance": [951.0, 1037.0, 817.0]}
     found = [stac._spectral(coords, number) for number in (1, 2, 3)]
     assert [band["eo:common_name"] for band in found] == ["nir08", "nir", "nir09"]

@@ -1,4 +1,4 @@
-"""How commands speak."""
+"""Terminal output of commands."""
 
 import logging
 import os
@@ -10,7 +10,7 @@ from fifesim.base.messages import LOG, quiet
 from fifesim.output.terminal import Exit, in_time, interrupts_blocked, listening, print_lines, report, stop
 
 
-def test_the_last_line_says_how_long_it_took_and_what_to_open(capsys):
+def test_last_line_gives_the_duration_and_the_file_to_open(capsys):
     report(["out/image.tif"], 75.2, "out/report.html in a browser")
     assert capsys.readouterr().out.splitlines() == [
         "out/image.tif",
@@ -24,11 +24,11 @@ def test_the_last_line_says_how_long_it_took_and_what_to_open(capsys):
 @pytest.mark.parametrize(
     ("seconds", "said"), [(0.04, "0.0 s"), (59.94, "59.9 s"), (59.96, "1 min 0 s"), (3599.6, "1 h 0 min")]
 )
-def test_a_time_has_no_sixty_seconds_or_minutes(seconds, said):
+def test_durations_never_show_60_seconds_or_60_minutes(seconds, said):
     assert in_time(seconds) == said
 
 
-def test_the_logger_is_heard_within_a_context_only(capsys):
+def test_log_is_printed_only_inside_the_context(capsys):
     before = LOG.level
     with listening(logging.INFO):
         LOG.info("a name \x1b[31m")
@@ -39,13 +39,13 @@ def test_the_logger_is_heard_within_a_context_only(capsys):
     assert not LOG.handlers and LOG.level == before
 
 
-def test_names_from_elsewhere_cannot_steer_a_terminal(capsys):
+def test_control_characters_are_escaped(capsys):
     print_lines("one\x1b[31m", "two\nthree")
     assert capsys.readouterr().out == "one\\x1b[31m\ntwo\nthree\n"
 
 
 @pytest.mark.parametrize("code", Exit)
-def test_a_mistake_ends_with_its_code_and_at_most_500_characters(code, capsys):
+def test_error_gives_its_exit_code_and_at_most_500_characters(code, capsys):
     with pytest.raises(SystemExit) as caught:
         stop(ValueError("x" * 2000), code)
     assert caught.value.code == code
@@ -54,7 +54,7 @@ def test_a_mistake_ends_with_its_code_and_at_most_500_characters(code, capsys):
 
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals cannot be blocked on Windows")
-def test_ctrl_c_waits_for_the_end_of_the_context():
+def test_interrupt_is_delayed_until_the_context_ends():
     done, before = [], signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt), interrupts_blocked():

@@ -1,4 +1,4 @@
-"""Workers of a cluster are other processes: what goes to them must pickle, and what they write must be whole."""
+"""Workers are separate processes: their tasks must be picklable and their files complete."""
 
 import re
 import socket
@@ -63,22 +63,22 @@ def scene(path, chunks):
     return fifesim.open_lai(path, grid, chunks=chunks)
 
 
-def image_of(lai):
+def make_image(lai):
     known = {"atmosphere": fifesim.Atmosphere(), "geometry": fifesim.fife_geometry()}
     rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **known)
     return rho.fifesim.to_toa().fifesim.sense("TM")
 
 
-def test_workers_give_the_bits_of_one_process(client, lai_file):
-    xr.testing.assert_identical(image_of(scene(lai_file, CHUNKS)).compute(), image_of(scene(lai_file, None)))
+def test_workers_give_the_same_bits_as_one_process(client, lai_file):
+    xr.testing.assert_identical(make_image(scene(lai_file, CHUNKS)).compute(), make_image(scene(lai_file, None)))
 
 
-def test_workers_write_a_file_together(client, lai_file, tmp_path):
-    fifesim.to_geotiff(image_of(scene(lai_file, CHUNKS)), tmp_path / "image.tif")
-    xr.testing.assert_identical(fifesim.open_image(tmp_path / "image.tif"), image_of(scene(lai_file, None)))
+def test_workers_write_one_file_together(client, lai_file, tmp_path):
+    fifesim.to_geotiff(make_image(scene(lai_file, CHUNKS)), tmp_path / "image.tif")
+    xr.testing.assert_identical(fifesim.open_image(tmp_path / "image.tif"), make_image(scene(lai_file, None)))
 
 
-def test_a_run_on_workers_gives_the_same_files(client, tmp_path, monkeypatch):
+def test_run_on_workers_gives_the_same_files(client, tmp_path, monkeypatch):
     monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     scenario = parse_scenario({"grid": {"width": 900, "height": 600}, "ground": {"seed": 3}})
     simulate_to_folder(scenario, tmp_path / "workers")
@@ -86,15 +86,15 @@ def test_a_run_on_workers_gives_the_same_files(client, tmp_path, monkeypatch):
     np.testing.assert_array_equal(fifesim.open_image(tmp_path / "workers" / "image.tif").values, expected.values)
 
 
-def listening():
-    """Addresses on which this process and those that it started take connections."""
+def listening_addresses():
+    """Addresses on which this process and its children accept connections."""
     processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
     found = [connection for process in processes for connection in process.net_connections(kind="inet")]
     return {connection.laddr for connection in found if connection.status == psutil.CONN_LISTEN}
 
 
-def answer(place):
-    """What somebody without a certificate is told."""
+def answer_without_certificate(place):
+    """Response to a client without a certificate."""
     try:
         with socket.create_connection(place, timeout=5) as plain:
             plain.sendall(b"GET /info/main/workers.html HTTP/1.0\r\n\r\n")
@@ -116,14 +116,14 @@ for address, security in ((tls, Security()), (tls.replace("tls", "tcp"), Securit
 """
 
 
-def test_workers_listen_to_nobody_without_their_certificate():
-    before = listening()
+def test_workers_reject_clients_without_their_certificate():
+    before = listening_addresses()
     with cluster(workers=1) as guarded:
         assert guarded.submit(abs, -2).result() == 2
-        address, places = guarded.scheduler.address, listening() - before
+        address, places = guarded.scheduler.address, listening_addresses() - before
         assert address.startswith("tls://127.0.0.1:") and len(places) >= 3
         for place in places:
-            assert place.ip == "127.0.0.1" and b"HTTP" not in answer(place)
+            assert place.ip == "127.0.0.1" and b"HTTP" not in answer_without_certificate(place)
         stranger = [sys.executable, "-c", STRANGER, address]
         told = subprocess.run(stranger, stdout=subprocess.PIPE, text=True, timeout=120, check=True)
         assert told.stdout.split() == ["refused"] * 3
@@ -135,7 +135,7 @@ class Future:
 
 
 class Stub:
-    """A cluster that gives one result, and then ends with an error."""
+    """A cluster that returns one result and then raises an error."""
 
     loop = None
 
@@ -156,7 +156,7 @@ class Stub:
         self.cancelled += futures
 
 
-def test_a_task_that_ends_its_workers_is_told_and_the_others_are_cancelled(monkeypatch):
+def test_task_that_kills_workers_is_reported_and_other_tasks_cancelled(monkeypatch):
     error = KilledWorker("task", SimpleNamespace(address="tcp://here"), 3)
     stub, found = Stub(monkeypatch, error), []
     tasks, outputs = tasks_of({"ones": da.ones(3, chunks=1)}, [("ones", (n,)) for n in range(3)])
@@ -169,30 +169,30 @@ def test_a_task_that_ends_its_workers_is_told_and_the_others_are_cancelled(monke
 FLAT = {"terrain": {"dem": "flat"}}
 
 
-def complete(**sections):
+def complete_flat_scenario(**sections):
     return parse_scenario(FLAT | sections).complete()
 
 
 @pytest.mark.parametrize(
     "sections", [{"grid": {"cell": 0.01}}, {"grid": {"cell": 0.3}, "ground": {"method": "periodic"}}]
 )
-def test_what_cannot_fit_is_refused_at_once_with_what_fits(tmp_path, sections):
-    """The edge that the message names is accepted, and a fifth more is not."""
+def test_scene_too_large_for_memory_is_rejected_with_a_size_that_fits(tmp_path, sections):
+    """A scene with 0.9 of the edge in the message is accepted; one with 1.2 of the edge is not."""
     with pytest.raises(ValueError, match=r"memory.*grid\.width = grid\.height") as caught:
-        check_size(complete(**sections), tmp_path / "a" / "b")
+        check_size(complete_flat_scenario(**sections), tmp_path / "a" / "b")
     edge = float(re.search(r"grid\.height = (\S+) fits", str(caught.value))[1])
 
     def square(edge):
-        return complete(**sections | {"grid": sections["grid"] | {"width": edge, "height": edge}})
+        return complete_flat_scenario(**sections | {"grid": sections["grid"] | {"width": edge, "height": edge}})
 
     check_size(square(0.9 * edge), tmp_path)
     with pytest.raises(ValueError, match="fits"):
         check_size(square(1.2 * edge), tmp_path)
 
 
-def test_a_disk_that_is_too_small_is_named(tmp_path, monkeypatch):
-    """Without any space no scene fits, however small."""
-    scenario = complete()
+def test_disk_that_is_too_small_is_named(tmp_path, monkeypatch):
+    """On a full disk no scene fits, so the message suggests another folder."""
+    scenario = complete_flat_scenario()
     least, most = disk_of(scenario)
     assert least == pytest.approx(500**2 * (2 + 16), rel=0.01) and most == 3.4 * least
     free = {"now": 10**9}
@@ -206,20 +206,22 @@ def test_a_disk_that_is_too_small_is_named(tmp_path, monkeypatch):
             check_size(scenario, tmp_path)
 
 
-def test_scenes_in_memory_are_judged_by_their_edge():
+def test_memory_check_uses_the_number_of_cells_per_edge():
     check_memory_of_cells(333)
     with pytest.raises(ValueError, match=r"cells = 1000000: .* cells = \S+ fits"):
         check_memory_of_cells(1_000_000)
 
 
-def places(row, column, shape):
+def position_values(row, column, shape):
     return np.arange(row, row + shape[0])[:, None] * 1000.0 + np.arange(column, column + shape[1])
 
 
-def means(side, chunk):
-    """Smoothed places, averaged over pixels of 3.1 cells."""
+def resampled_means(side, chunk):
+    """Position values, smoothed and averaged over pixels of 3.1 cells."""
     grid = fife_site(30 / 9, window=((0, side), (0, side)))
-    array = neighbourhood(lambda block: block[1:-1, 1:-1] + block[:-2, 2:], tiles(places, grid, chunk, tile=8), 1)
+    array = neighbourhood(
+        lambda block: block[1:-1, 1:-1] + block[:-2, 2:], tiles(position_values, grid, chunk, tile=8), 1
+    )
     array = grids.place(array, grid)
     cell = 30 / 9
     axis = axis_operator(
@@ -229,15 +231,15 @@ def means(side, chunk):
     return resample(axis, axis, array, grids.aligned_grid(grid, 4 * cell)).data
 
 
-def wanted(array, name="means"):
+def block_keys(array, name="means"):
     return [(name, index) for index in np.ndindex(array.numblocks)]
 
 
 @pytest.mark.parametrize("threads", [1, 3])
-def test_blocks_are_those_of_dask(threads):
-    """And they are delivered in the order in which they are wanted."""
-    array, found = means(96, 17), {}
-    backwards = wanted(array)[::-1]
+def test_blocks_equal_dask_and_arrive_in_the_given_order(threads):
+    """Blocks are delivered in the order of the list of outputs."""
+    array, found = resampled_means(96, 17), {}
+    backwards = block_keys(array)[::-1]
     tasks = tasks_of({"means": array}, backwards)
     run_on_threads(*tasks, lambda name, index, block: found.update({(name, index): block}), threads)
     assert list(found) == backwards
@@ -246,13 +248,13 @@ def test_blocks_are_those_of_dask(threads):
 
 
 @pytest.mark.parametrize("piece", [1, 5])
-def test_what_waits_for_later_pieces_is_made_once(monkeypatch, piece):
+def test_blocks_needed_by_later_pieces_are_computed_once(monkeypatch, piece):
     monkeypatch.setattr(workers, "_PIECE", piece)
     made, found = [], {}
 
     def source(row, column, shape):
         made.append((row, column))
-        return places(row, column, shape)
+        return position_values(row, column, shape)
 
     grid = fife_site(30 / 9, window=((0, 60), (0, 40)))
     cells = tiles(source, grid, 10, tile=10)
@@ -270,7 +272,7 @@ def test_what_waits_for_later_pieces_is_made_once(monkeypatch, piece):
 
 
 class Watch:
-    """Makes chunks, and sees how many of them are in memory together at most."""
+    """Compute chunks and count the largest number of them in memory at the same time."""
 
     def __init__(self):
         self.alive, self.most = set(), 0
@@ -284,8 +286,8 @@ class Watch:
 
 
 @pytest.mark.parametrize("piece", [7, 600])
-def test_no_chunk_waits_for_those_that_need_its_rims_only(monkeypatch, piece):
-    """Blocks that read a row and a column before them too: the row of blocks above waits as rims."""
+def test_only_the_margins_of_chunks_are_kept_for_later_blocks(monkeypatch, piece):
+    """Each block also reads the row and the column before it, so the previous row of blocks is kept as margins."""
     monkeypatch.setattr(workers, "_PIECE", piece)
 
     def ask(*place):
@@ -294,5 +296,5 @@ def test_no_chunk_waits_for_those_that_need_its_rims_only(monkeypatch, piece):
     watched, sizes = Watch(), ((10,) * 4, (10,) * 20)
     cells = da.ones((40, 200), chunks=10).map_blocks(watched, dtype=float, meta=np.empty((0, 0)))
     blocks = array_from_windows(lambda window: window[1:, 1:] + window[:-1, :-1], [cells], sizes, ask, token="before")
-    run_on_threads(*tasks_of({"blocks": blocks}, wanted(blocks, "blocks")), lambda *block: None, 1)
+    run_on_threads(*tasks_of({"blocks": blocks}, block_keys(blocks, "blocks")), lambda *block: None, 1)
     assert watched.most <= 3
