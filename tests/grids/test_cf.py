@@ -12,12 +12,12 @@ def raster(**attrs):
     return xr.DataArray(np.ones((2, 3)), dims=("y", "x"), name="mine", attrs=attrs)
 
 
-# Names of version 85 of the CF standard name table, with its canonical units as they are written here.
+# Names in version 85 of the CF standard name table, with their canonical units in the notation used here.
 STANDARD_NAMES = {
     "area_fraction": "1",
     "atmosphere_optical_thickness_due_to_cloud": "1",
     "fraction_of_surface_downwelling_photosynthetic_radiative_flux_absorbed_by_vegetation": "1",
-    # Convertible to the canonical kg m-2 s-1.
+    # The canonical unit is kg m-2 s-1, to which this unit is convertible.
     "gross_primary_productivity_of_biomass_expressed_as_carbon": "g m-2 d-1",
     "ground_slope_angle": "degree",
     "ground_slope_direction": "degree",
@@ -57,7 +57,7 @@ def test_label_replaces_attributes():
     assert before.name == "mine" and before.attrs["units"] == "percent"
 
 
-def test_provenance_and_history_carry_on():
+def test_provenance_and_history_are_propagated():
     source = raster(history="one", arp=0.15, references="Friedl", units="1", something="else")
     after = cf.label(raster(), "fpar", source=source, history="two", references="Tanre", arp=0.2)
     assert after.attrs["history"] == "one\ntwo"
@@ -68,7 +68,7 @@ def test_provenance_and_history_carry_on():
     assert "something" not in after.attrs
 
 
-def test_wrong_units_are_named_with_the_right_ones():
+def test_wrong_units_are_named_with_the_expected_units():
     for units in ("1", "", "m2 m-2", " 1 ", "dimensionless"):
         cf.check_units(raster(units=units), "lai")
     cf.check_units(raster(), "lai")
@@ -90,7 +90,7 @@ def test_wrong_units_are_named_with_the_right_ones():
             cf.check_units(given, *names)
 
 
-def test_numbers_along_band_have_units():
+def test_band_coordinates_have_units():
     coordinates = cf.band_coordinates(band=["TM3", "TM4"], wavelength=[0.66, 0.83], gain=[1, 2])
     assert coordinates["band"].values.tolist() == ["TM3", "TM4"]
     assert coordinates["wavelength"].attrs["units"] == "um"
@@ -119,8 +119,8 @@ def test_numbers_along_band_have_units():
         ),
     ],
 )
-def test_a_raster_of_another_quantity_is_refused(step, said, cure):
-    """All have units of 1: only the standard name tells that a step was left out or taken twice."""
+def test_raster_of_another_quantity_is_rejected(step, said, cure):
+    """All have units of 1; only the standard name shows that a step was omitted or repeated."""
     lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 45), (0, 45))))
     with pytest.raises(ValueError, match=f"{said}.*{cure}") as caught:
         step(lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]))

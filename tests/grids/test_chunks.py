@@ -1,4 +1,4 @@
-"""How a kernel meets dask: the same bits, nothing early, and only rasters on the same grid."""
+"""Kernels on dask arrays: the same bits, nothing computed early, and only rasters on the same grid."""
 
 import subprocess
 import sys
@@ -27,7 +27,7 @@ def raster(grid=GRID, seed=0, bands=None):
     return grids.place(xr.DataArray(values, dims=("band", "y", "x")[-len(shape) :], name=f"raster{seed}"), grid)
 
 
-def test_kernel_sees_numbers_and_the_result_keeps_the_grid(array_type):
+def test_kernel_gets_arrays_and_the_result_keeps_the_grid(array_type):
     one, two = array_type(raster(seed=1)), array_type(raster(seed=2))
     with no_compute():
         out = chunks.pointwise(lambda a, b, power: a + b**power, one, two, power=2)
@@ -39,8 +39,8 @@ def test_kernel_sees_numbers_and_the_result_keeps_the_grid(array_type):
 
 @pytest.mark.parametrize("pieces", [{}, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}])
 @pytest.mark.parametrize("plain_pieces", [{}, ODD_CHUNKS])
-def test_kernels_meet_bands_and_make_them(pieces, plain_pieces):
-    """In memory or lazy; a file opened lazily has one band a chunk."""
+def test_kernels_may_read_and_create_bands(pieces, plain_pieces):
+    """Rasters are in memory or lazy; a file opened lazily has one band per chunk."""
     plain, cube = in_chunks(raster(), plain_pieces), in_chunks(raster(seed=1, bands=3), pieces)
     with no_compute():
         made = chunks.pointwise(lambda a: np.stack([a, 2 * a]), plain, bands=2)
@@ -53,7 +53,7 @@ def test_kernels_meet_bands_and_make_them(pieces, plain_pieces):
 
 
 def test_blocks_along_bands_are_not_copied():
-    """Blocks that dask puts together along an axis are copied, one too."""
+    """dask copies blocks that it concatenates along an axis, even a single block."""
     made, seen = [], []
 
     def source(block):
@@ -74,20 +74,20 @@ def test_blocks_along_bands_are_not_copied():
     assert all(any(np.shares_memory(block, each) for each in made) for block in seen)
 
 
-def test_rasters_on_other_grids_are_refused():
+def test_rasters_on_different_grids_are_rejected():
     other = raster(fifesim.fife_site(30 / 9, window=((0, 36), (6, 51))), seed=1)
     with pytest.raises(ValueError, match="'raster0' and 'raster1' have different grids"):
         chunks.pointwise(np.add, raster(), other)
 
 
 def test_rasters_whose_coordinates_differ_by_rounding_are_combined():
-    """xarray's own sum of these is empty, and silent."""
+    """xarray's own sum of these rasters is empty, without a warning."""
     one, two = raster(), raster(seed=1)
     shifted = two.assign_coords(x=two["x"].values + 1e-7)
     np.testing.assert_array_equal(chunks.pointwise(np.add, one, shifted), one.values + two.values)
 
 
-def test_rasters_seen_under_other_suns_are_refused():
+def test_rasters_with_different_sun_angles_are_rejected():
     suns = [raster(seed=seed).assign_coords(sza=float(sza)) for seed, sza in enumerate((20, 20, 30))]
     chunks.pointwise(np.add, *suns[:2])
     with pytest.raises(ValueError, match="sza is 20 in 'raster0' and 30 in 'raster2'"):
@@ -110,8 +110,8 @@ def test_entries_along_the_first_axis_are_views(lazy):
         assert np.shares_memory(found[1], whole)
 
 
-def test_second_pass_begins_when_the_first_is_over():
-    """The one is made of all chunks; without a barrier, each of these would be held until then."""
+def test_second_pass_starts_after_the_first_has_finished():
+    """The mean needs all chunks; without a barrier, every chunk would stay in memory until the mean is known."""
     order = []
 
     def made(block_info=None):
@@ -126,8 +126,8 @@ def test_second_pass_begins_when_the_first_is_over():
     assert sorted(order[:2]) == sorted(order[2:]) == [(0, 0), (1, 0)]
 
 
-def counted(calls):
-    """A lazy array that notes each of its blocks when it is made."""
+def counting_array(calls):
+    """A lazy array that records each block when it is computed."""
 
     def make(zeros, block_info):
         calls.append(tuple(block_info[None]["chunk-location"]))
@@ -137,17 +137,17 @@ def counted(calls):
     return da.zeros((60, 80), chunks=(20, 30)).map_blocks(make, dtype=float, meta=np.empty((0, 0)))
 
 
-def rechunked():
-    """What dask's own copy of a graph loses tasks of: an array of another's chunks, sampled by slices and lists."""
+def rechunked_array():
+    """An array rechunked and sampled by slices and lists; dask's own copy of its graph loses tasks."""
     source = da.from_array(np.arange(4800.0).reshape(60, 80), chunks=(20, 30)) + 1
     return source.rechunk((7, 80))[::3, [5, 2, 2, 70]].rechunk((4, 3))
 
 
 @pytest.mark.parametrize("scheduler", ["synchronous", "threads", "processes"])
 @pytest.mark.parametrize("dtype", [float, np.float32, np.int16])
-def test_values_are_those_of_the_array(scheduler, dtype):
-    """And no task is shared with it."""
-    array = rechunked().astype(dtype)
+def test_separate_copy_has_the_values_of_the_array(scheduler, dtype):
+    """The copy shares no task with the array."""
+    array = rechunked_array().astype(dtype)
     with no_compute():
         found = apart(array)
     assert (found.shape, found.dtype, found.numblocks) == (array.shape, dtype, (1, 1))
@@ -156,8 +156,8 @@ def test_values_are_those_of_the_array(scheduler, dtype):
     np.testing.assert_array_equal(found.compute(scheduler=scheduler, **workers), array.compute())
 
 
-def test_one_task_keeps_to_its_thread():
-    """It waits for no other: a pool of one thread, and a cluster of one worker, come to an end."""
+def test_separate_copy_is_computed_in_one_thread():
+    """The task waits for no other task, so it also finishes in a pool of one thread or a cluster of one worker."""
     threads = set()
 
     def note(block):
@@ -173,10 +173,10 @@ def test_one_task_keeps_to_its_thread():
         assert client.compute(apart(blocks).sum()).result(timeout=20) == 4800
 
 
-def test_blocks_are_made_for_the_sample_and_again_for_what_uses_them():
-    """Else each would wait in memory for the last: the sample is of all, and what uses it has them one by one."""
+def test_blocks_are_computed_once_for_the_sample_and_once_for_its_use():
+    """Otherwise every block would wait in memory, because the sample needs all blocks."""
     calls = []
-    array = counted(calls)
+    array = counting_array(calls)
     total = apart(array[::4, ::4]).sum()
     found = (array - total).sum(axis=1).compute(scheduler="synchronous")
     assert sorted(calls) == sorted(2 * [(row, column) for row in range(3) for column in range(3)])
@@ -184,13 +184,13 @@ def test_blocks_are_made_for_the_sample_and_again_for_what_uses_them():
     np.testing.assert_allclose(found, (whole - whole[::4, ::4].sum()).sum(axis=1), rtol=1e-12)
 
 
-def test_the_same_array_has_the_same_key_and_shared_parts_are_computed_once():
-    """Bits of a graph that are the same are one task, and other arrays are others."""
+def test_equal_arrays_have_equal_keys_and_shared_parts_are_computed_once():
+    """Identical graphs become one task; different arrays have different keys."""
     calls = []
-    array = counted(calls)
+    array = counting_array(calls)
     one, other = apart(array), apart(array)
     assert one.name == other.name and one.name != apart(array + 1).name
-    assert apart(rechunked()).name == apart(rechunked()).name
+    assert apart(rechunked_array()).name == apart(rechunked_array()).name
     dask.compute(one, other, scheduler="synchronous")
     assert len(calls) == 9
     found = dask.compute(*all_apart([array[::4, ::4], array.sum(axis=0)]), scheduler="synchronous")
@@ -199,10 +199,10 @@ def test_the_same_array_has_the_same_key_and_shared_parts_are_computed_once():
     np.testing.assert_array_equal(found[1], array.compute().sum(axis=0))
 
 
-def test_samples_of_samples_are_made_once_by_all_threads():
-    """And each who asks has values of its own."""
+def test_nested_samples_are_computed_once_with_several_threads():
+    """Each consumer gets a separate copy of the values."""
     calls = []
-    few = apart(counted(calls)[::3, ::3])
+    few = apart(counting_array(calls)[::3, ::3])
     many = [apart(few + number) for number in range(6)]
     with dask.config.set(scheduler="threads", num_workers=3):
         dask.compute(few, *many)
@@ -212,7 +212,7 @@ def test_samples_of_samples_are_made_once_by_all_threads():
     np.testing.assert_array_equal(few.compute(scheduler="synchronous"), first - 1)
 
 
-def test_numbers_fill_layers_and_order_stays(lai):
+def test_numbers_fill_layers_and_order_is_kept(lai):
     out = by_band({"b": 0.5, "a": lai.transpose("x", "y")}, lai)
     assert out.dims == ("band", "y", "x") and out["band"].values.tolist() == ["b", "a"]
     np.testing.assert_array_equal(out[0], np.full(lai.shape, 0.5))
@@ -223,7 +223,7 @@ def test_numbers_fill_layers_and_order_stays(lai):
     xr.testing.assert_equal(lazy.compute(), out)
 
 
-def test_layers_by_name_or_one_for_all(lai):
+def test_layers_are_selected_by_name_or_shared(lai):
     both = by_band({"b": lai + 1, "a": lai}, lai)
     assert [float(each[0, 0] - lai[0, 0]) for each in layers_of(both, ["a", "b"], "soil")] == [0, 1]
     assert all(each.identical(lai) for each in layers_of(lai, ["a", "b"], "soil"))
@@ -235,7 +235,7 @@ def test_layers_by_name_or_one_for_all(lai):
         by_band({"a": both}, lai)
 
 
-def test_client_is_found_while_there_is_one():
+def test_client_is_found_while_it_exists():
     assert found_client() is None
     with LocalCluster(n_workers=1, processes=False, dashboard_address=None) as cluster, Client(cluster) as client:
         assert found_client() is client

@@ -1,4 +1,4 @@
-"""A stack of dates is each date by itself."""
+"""Processing a stack of dates equals processing each date alone."""
 
 import numpy as np
 import pytest
@@ -14,12 +14,12 @@ NOISE = {"noise": "thermal", "noise_models": fifesim.NoiseModel(shot=0.0, therma
 
 @pytest.fixture(scope="module")
 def season(lai_values):
-    """Leaf area of three dates on the same cells."""
+    """Leaf area at three dates on the same cells."""
     dates = [(lai_values * share).assign_coords(time=time) for share, time in zip((0.4, 1.0, 1.4), TIMES, strict=True)]
     return joined(dates)
 
 
-def chain(lai):
+def run_chain(lai):
     toa = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa()
     image = toa.fifesim.sense()
     noisy = toa.fifesim.sense(seed=3, **NOISE)
@@ -34,16 +34,16 @@ def chain(lai):
     return toa, *rasters
 
 
-def test_each_date_is_what_it_is_by_itself(season):
-    together = chain(season)
+def test_each_date_equals_the_date_processed_alone(season):
+    together = run_chain(season)
     for number in range(3):
-        for stack, alone in zip(together, chain(season.isel(time=number)), strict=True):
+        for stack, alone in zip(together, run_chain(season.isel(time=number)), strict=True):
             assert stack.dims[0] == "time"
             xr.testing.assert_equal(stack.isel(time=number), alone)
 
 
-def test_the_sun_is_that_of_each_date(season):
-    toa = chain(season)[0]
+def test_each_date_has_its_sun_position(season):
+    toa = run_chain(season)[0]
     assert toa["sza"].dims == ("time",) and toa["vza"].dims == ()
     for number, time in enumerate(TIMES):
         sun = fifesim.grids.directions.sun_over(season.odc.geobox, time)
@@ -51,7 +51,7 @@ def test_the_sun_is_that_of_each_date(season):
     assert toa.odc.crs == season.odc.crs
 
 
-def test_noise_is_another_at_each_date_and_the_fixed_pattern_the_same(season):
+def test_noise_differs_between_dates_and_the_fixed_pattern_does_not(season):
     toa = joined([season.isel(time=0).assign_coords(time=time) for time in TIMES[:2]])
     toa = toa.fifesim.surface_reflectance("TM", bands=["TM3"], geometry=fifesim.fife_geometry()).fifesim.to_toa()
     one, other = toa.fifesim.sense(**NOISE)
@@ -61,15 +61,15 @@ def test_noise_is_another_at_each_date_and_the_fixed_pattern_the_same(season):
     np.testing.assert_array_equal(one, other)
 
 
-def test_a_stack_stays_lazy(season):
+def test_stack_of_dates_stays_lazy(season):
     lazy = in_chunks(season, {"y": 20, "x": 27})
     with no_compute():
-        results = chain(lazy)
-    for made, known in zip(results, chain(season), strict=True):
+        results = run_chain(lazy)
+    for made, known in zip(results, run_chain(season), strict=True):
         np.testing.assert_array_equal(made.compute(), known)
 
 
-def test_other_rasters_of_the_same_dates_go_along(season):
+def test_other_rasters_may_have_the_same_dates(season):
     background = xr.zeros_like(season) + xr.DataArray([0.1, 0.2, 0.3], dims="time")
     rho = season.fifesim.surface_reflectance("TM", bands=["TM3"], canopy=fifesim.Canopy(background=background))
     alone = season[2].fifesim.surface_reflectance("TM", bands=["TM3"], canopy=fifesim.Canopy(background=background[2]))
@@ -79,7 +79,7 @@ def test_other_rasters_of_the_same_dates_go_along(season):
 
 
 def test_epochs_are_seconds():
-    """Two images a second apart draw other noise; an image without a time has the draw that it always had."""
+    """Images one second apart draw different noise; an image without a time uses epoch 0."""
     at = [xr.DataArray(1.0, coords={"time": np.datetime64(f"2022-05-01T17:00:0{s}")}) for s in (0, 1)]
     assert epoch(at[1]) - epoch(at[0]) == 1 and epoch(at[0]) > 0
     assert epoch(xr.DataArray(1.0)) == 0
@@ -91,7 +91,7 @@ def test_epochs_are_seconds():
     assert len(others) == 3 and 0 not in others
 
 
-def test_dates_may_lie_within_what_is_given(season):
+def test_nested_arguments_may_have_dates(season):
     season = season[:, :9, :9]
     background = xr.zeros_like(season) + xr.DataArray([0.1, 0.2, 0.3], dims="time")
     leaf = fifesim.Leaf(chlorophyll=background.drop_attrs(deep=False) * 200)
@@ -103,7 +103,7 @@ def test_dates_may_lie_within_what_is_given(season):
     np.testing.assert_array_equal(rho[1], expected)
 
 
-def test_dates_that_do_not_fit_are_told(season):
+def test_inconsistent_dates_are_rejected(season):
     with pytest.raises(ValueError, match=r"dimension time has no coordinate.*assign_coords\(time="):
         season.drop_vars("time").fifesim.surface_reflectance("TM")
     with pytest.raises(ValueError, match="the raster has a dimension time: leave time= out"):

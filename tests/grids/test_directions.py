@@ -1,4 +1,4 @@
-"""Directions travel as coordinates: numbers, or rasters on the cells."""
+"""Directions are carried as coordinates, either numbers or rasters on the cells."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def raster(**attrs):
     return xr.DataArray(np.ones((2, 3)), dims=("y", "x"), name="mine", attrs=attrs)
 
 
-def test_directions_travel_as_scalar_coordinates():
+def test_uniform_directions_are_scalar_coordinates():
     with no_compute():
         carried = directions.with_geometry(in_chunks(raster(), {"y": 1}), SUN)
     assert directions.geometry_of(carried) == SUN
@@ -25,8 +25,8 @@ def test_directions_travel_as_scalar_coordinates():
     assert directions.geometry_of(raster()) is None
 
 
-def test_azimuths_count_from_the_north_of_a_grid():
-    """East of the central meridian grid north lies east of true north, and toward the north pole more so."""
+def test_azimuths_count_from_grid_north():
+    """East of the central meridian, grid north lies east of true north, increasingly so toward the pole."""
     east, west = (grids.grid_at("EPSG:26914", x, 4.33e6, 900, 900, 30) for x in (708000, 292000))
     turned = [directions.from_grid_north(SUN, grid) for grid in (east, west)]
     assert 1 < SUN.saa - turned[0].saa < 2 and 1 < turned[1].saa - SUN.saa < 2
@@ -34,15 +34,15 @@ def test_azimuths_count_from_the_north_of_a_grid():
     assert (turned[0].sza, turned[0].vza, turned[0].earth_sun_distance) == (28.5, 3.0, 1.0147)
 
 
-def test_a_sun_without_azimuth_is_refused():
-    """It would light the slopes from the north."""
+def test_sun_without_azimuth_is_rejected():
+    """A default azimuth would light the slopes from the north."""
     for given in (raster().assign_coords(sza=30.0), raster().assign_coords(sza=(("y", "x"), np.full((2, 3), 30.0)))):
         with pytest.raises(ValueError, match=r"zenith angle sza but no azimuth saa.*assign_coords\(saa="):
             directions.geometry_of(given)
 
 
 def ramp(low, high):
-    """A raster on the cells that grows to the east."""
+    """A raster on the cells that increases to the east."""
     return raster().copy(data=np.broadcast_to(np.linspace(low, high, 3), (2, 3)))
 
 
@@ -51,7 +51,7 @@ def scan():
     return xr.Dataset({"sza": 40.0, "saa": 120.0, "vza": ramp(0.0, 30.0), "vaa": 280.0})
 
 
-def test_angles_by_cell_are_a_dataset_and_travel(scan):
+def test_angles_by_cell_are_a_dataset_and_are_carried(scan):
     found = directions.checked_geometry(scan)
     assert directions.varying(found) == ("vza",) and float(found["earth_sun_distance"]) == 1.0
     again = directions.geometry_of(directions.with_geometry(raster(), found))
@@ -59,45 +59,45 @@ def test_angles_by_cell_are_a_dataset_and_travel(scan):
     assert again["vza"].attrs["standard_name"] == "sensor_zenith_angle"
 
 
-def test_given_wins_over_carried_and_that_over_the_papers(lai):
+def test_given_angles_override_carried_angles_and_the_papers(lai):
     carried = directions.with_geometry(lai, Geometry(30.0, 100.0))
     assert directions.given_geometry(Geometry(50.0, 90.0), carried) == Geometry(50.0, 90.0)
     assert directions.given_geometry(None, carried) == Geometry(30.0, 100.0)
     assert directions.given_geometry(None, lai) == fife_geometry()
 
 
-CAPE = fifesim.grid_at("EPSG:32734", 261000.0, 6244000.0, 300.0, 300.0, 30.0)  # beside Cape Town
+CAPE = fifesim.grid_at("EPSG:32734", 261000.0, 6244000.0, 300.0, 300.0, 30.0)  # near Cape Town
 NOON = "2022-12-21T10:45Z"
 
 
-def on_the_cape(**coordinates):
+def cape_raster(**coordinates):
     cells = xr.DataArray(np.ones(CAPE.shape), dims=("y", "x"), name="mine")
     return grids.place(cells.assign_coords(coordinates), CAPE)
 
 
-def test_the_sun_is_that_of_time_and_place():
-    """Near noon of the solstice the sun stands as far from the zenith as the latitude and the tilt of the Earth."""
-    of_data = directions.given_geometry(None, on_the_cape(time=np.datetime64("2022-12-21T10:45")))
+def test_sun_position_follows_time_and_location():
+    """Near noon at the solstice, the solar zenith angle is latitude plus obliquity of the ecliptic."""
+    of_data = directions.given_geometry(None, cape_raster(time=np.datetime64("2022-12-21T10:45")))
     assert of_data.sza == pytest.approx(33.92 - 23.44, abs=0.15)
     assert min(of_data.saa, 360 - of_data.saa) < 15, "the sun is in the north there"
     assert of_data.earth_sun_distance == pytest.approx(0.9838, abs=2e-4)
-    assert directions.given_geometry(None, on_the_cape(), NOON) == of_data
+    assert directions.given_geometry(None, cape_raster(), NOON) == of_data
     assert directions.sun_over(CAPE, NOON) == of_data
 
 
-def test_a_time_that_is_given_wins_over_what_is_carried():
-    carried = directions.with_geometry(on_the_cape(time=np.datetime64("2022-06-01T10:45")), Geometry(30.0, 100.0))
+def test_given_time_overrides_carried_angles():
+    carried = directions.with_geometry(cape_raster(time=np.datetime64("2022-06-01T10:45")), Geometry(30.0, 100.0))
     assert directions.given_geometry(None, carried) == Geometry(30.0, 100.0)
     assert directions.given_geometry(None, carried, NOON) == directions.sun_over(CAPE, NOON)
     with pytest.raises(ValueError, match="geometry and time both determine the sun"):
         directions.given_geometry(SUN, carried, NOON)
 
 
-def test_a_raster_of_ones_own_is_asked_for_its_sun():
+def test_raster_outside_fife_needs_a_sun_position():
     with pytest.raises(ValueError, match=r"the position of the sun over mine.*time='2022.*or geometry="):
-        directions.given_geometry(None, on_the_cape())
+        directions.given_geometry(None, cape_raster())
     with pytest.raises(ValueError, match="the sun is below the horizon"):
-        directions.given_geometry(None, on_the_cape(), "2022-12-21T22:00Z")
+        directions.given_geometry(None, cape_raster(), "2022-12-21T22:00Z")
 
 
 @pytest.mark.parametrize(
@@ -109,12 +109,12 @@ def test_a_raster_of_ones_own_is_asked_for_its_sun():
         (xr.Dataset({"sza": ramp(0.5, 0.6).assign_attrs(units="radian"), "saa": 1.0}), ValueError, "'radian'"),
     ],
 )
-def test_what_is_no_direction_is_refused(given, kind, said):
+def test_invalid_directions_are_rejected(given, kind, said):
     with pytest.raises(kind, match=said):
         directions.checked_geometry(given)
 
 
-def test_one_direction_is_asked_for_where_it_is_needed(scan):
+def test_rasters_of_angles_are_rejected_where_one_direction_is_needed(scan):
     with pytest.raises(ValueError, match="the test needs one direction of sun and sensor, got rasters of vza"):
         directions.uniform_geometry(directions.checked_geometry(scan), "the test")
     assert directions.uniform_geometry(Geometry(30.0, 0.0), "the test") == Geometry(30.0, 0.0)
@@ -126,8 +126,8 @@ def test_cosine_of_the_sun_is_a_number_or_by_cell():
     np.testing.assert_allclose(directions.mu_s(by_cell)[0, [0, -1]], [1.0, 0.5], atol=1e-15)
 
 
-def test_a_time_that_is_given_stays_with_the_raster(lai):
-    """Else a file would say one date and the sun of another."""
+def test_given_time_is_stored_on_the_raster(lai):
+    """Otherwise a file would hold one date and the sun of another."""
     then = np.datetime64("2022-07-03T17:00")
     made = lai.assign_coords(time=np.datetime64("2022-01-03T17:00"))
     rho = made.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], time="2022-07-03T17:00Z")
@@ -138,15 +138,15 @@ def test_a_time_that_is_given_stays_with_the_raster(lai):
     assert made["time"].values == np.datetime64("2022-01-03T17:00")
 
 
-def test_a_date_alone_is_no_time():
-    """Midnight in UTC is another sun."""
+def test_date_without_time_is_rejected():
+    """Midnight UTC would give a different sun position."""
     with pytest.raises(ValueError, match=r"'2022-12-21' is a date alone.*2022-12-21T17:10Z"):
-        directions.given_geometry(None, on_the_cape(), "2022-12-21")
+        directions.given_geometry(None, cape_raster(), "2022-12-21")
     with pytest.warns(UserWarning, match="midnight in UTC, 2022-12-21"), pytest.raises(ValueError, match="horizon"):
-        directions.given_geometry(None, on_the_cape(time=np.datetime64("2022-12-21T00:00")))
+        directions.given_geometry(None, cape_raster(time=np.datetime64("2022-12-21T00:00")))
 
 
-def test_a_carried_sun_has_the_distance_of_its_time():
-    known = on_the_cape(sza=20.0, saa=30.0, time=np.datetime64("2022-01-04T10:00"))
+def test_carried_sun_has_the_earth_sun_distance_of_its_time():
+    known = cape_raster(sza=20.0, saa=30.0, time=np.datetime64("2022-01-04T10:00"))
     assert directions.geometry_of(known).earth_sun_distance == pytest.approx(0.9833, abs=2e-4)
     assert directions.geometry_of(known.drop_vars("time")).earth_sun_distance == 1.0

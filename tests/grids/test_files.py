@@ -1,4 +1,4 @@
-"""GeoTIFF, netCDF and Zarr: other programs read what was written, and rasters come back unchanged."""
+"""GeoTIFF, netCDF and Zarr files are readable by other programs, and rasters are read back unchanged."""
 
 import json
 import math
@@ -19,7 +19,7 @@ from fifesim.sensor.description.instruments import instrument
 
 @pytest.fixture(scope="module")
 def image(lai_values):
-    """An image with a hole."""
+    """An image with a hole of missing data."""
     lai = lai_values.copy(deep=True)
     lai[18:27, 27:36] = np.nan
     return fifesim.surface_reflectance(lai, bands=["TM3", "TM4"]).fifesim.to_toa().fifesim.sense("TM")
@@ -35,7 +35,7 @@ def test_large_geotiff_has_overviews(tmp_path):
         assert source.dtypes == ("float32",)
 
 
-def test_gdal_reads_place_bands_and_calibration(image, tmp_path):
+def test_gdal_reads_location_bands_and_calibration(image, tmp_path):
     bands = instrument("TM").select(["TM3", "TM4"])
     with rasterio.open(fifesim.to_geotiff(image, tmp_path / "tm.tif", tags={"PROJECT": "trial"})) as source:
         structure = source.tags(ns="IMAGE_STRUCTURE")
@@ -64,7 +64,7 @@ def test_gdal_reads_place_bands_and_calibration(image, tmp_path):
 
 @pytest.mark.parametrize("name", ["image", "radiance", "reflectance", "ndvi", "lai", "one-band", "single-precision"])
 @pytest.mark.parametrize("chunks", [None, {"y": 2, "x": 4}], ids=["eager", "chunked"])
-def test_raster_comes_back_as_it_was(image, lai, tmp_path, name, chunks):
+def test_raster_survives_a_round_trip(image, lai, tmp_path, name, chunks):
     raster = {
         "image": image,
         "radiance": fifesim.to_radiance(image),
@@ -75,7 +75,7 @@ def test_raster_comes_back_as_it_was(image, lai, tmp_path, name, chunks):
         "single-precision": fifesim.ndvi(image).astype(np.float32),
     }[name]
     if chunks and name == "lai":
-        # Of cells there are more than of pixels.
+        # The LAI raster has more rows and columns than the image.
         chunks = {"y": 20, "x": 17}
     path = tmp_path / "raster.tif"
     fifesim.to_geotiff(raster if chunks is None else in_chunks(raster, ODD_CHUNKS | {"band": 1}), path)
@@ -87,13 +87,13 @@ def test_raster_comes_back_as_it_was(image, lai, tmp_path, name, chunks):
     assert grids.same_grid(grids.geobox(again), grids.geobox(raster))
 
 
-def test_image_from_a_file_goes_on_like_the_one_in_memory(image, tmp_path):
+def test_image_from_a_file_is_processed_like_the_one_in_memory(image, tmp_path):
     again = fifesim.open_image(fifesim.to_geotiff(image, tmp_path / "tm.tif"), chunks=3)
     xr.testing.assert_identical(again.fifesim.ndvi().compute(), image.fifesim.ndvi())
     xr.testing.assert_identical(again.fifesim.to_surface().compute(), image.fifesim.to_surface())
 
 
-def test_attributes_and_times_that_json_lacks_come_back(image, tmp_path):
+def test_attributes_and_times_unknown_to_json_survive_a_round_trip(image, tmp_path):
     odd = image.assign_coords(time=np.datetime64("1987-06-06T16:35:00", "ns"))
     odd.attrs |= {"text": 'quotes " and\nlines, \N{MICRO SIGN}', "number": np.float32(0.5), "count": np.int64(3)}
     again = fifesim.open_image(fifesim.to_geotiff(odd, tmp_path / "tm.tif", tags={"PROJECT": "trial"}))
@@ -112,8 +112,8 @@ def test_variables_of_a_dataset_become_bands(lai, tmp_path):
         np.testing.assert_array_equal(again.sel(band=name), truth[name])
 
 
-def failing(image):
-    """Data that cannot be computed past their first chunk."""
+def failing_image(image):
+    """Image whose chunks other than the first cannot be computed."""
 
     def refuse(block, block_info=None):
         if block_info[0]["chunk-location"] != (0, 0, 0):
@@ -125,23 +125,23 @@ def failing(image):
 
 
 @pytest.mark.parametrize("before", [None, "kept"])
-def test_write_that_fails_leaves_things_as_they_were(image, tmp_path, before):
+def test_failed_write_leaves_the_folder_unchanged(image, tmp_path, before):
     path = tmp_path / "tm.tif"
     if before:
         path.write_text(before)
     with pytest.raises(RuntimeError, match="disk on fire"):
-        fifesim.to_geotiff(failing(image), path, overwrite=True)
+        fifesim.to_geotiff(failing_image(image), path, overwrite=True)
     assert [each.name for each in tmp_path.iterdir()] == (["tm.tif"] if before else [])
     assert not before or path.read_text() == before
 
 
-def test_angles_that_a_geotiff_cannot_hold_are_said(image, tmp_path):
+def test_angles_omitted_from_a_geotiff_give_a_warning(image, tmp_path):
     swath = image.assign_coords(vza=(("y", "x"), np.full(image.shape[1:], 20.0)))
     with pytest.warns(UserWarning, match=r"swath.tif lacks vza, which vary by cell.* give geometry="):
         fifesim.to_geotiff(swath, tmp_path / "swath.tif")
 
 
-def test_what_is_no_raster_is_refused(image, lai, tmp_path):
+def test_objects_that_are_no_raster_are_rejected(image, lai, tmp_path):
     with pytest.raises(ValueError, match="no CRS"):
         fifesim.to_geotiff(lai.drop_vars("spatial_ref"), tmp_path / "lai.tif")
     with pytest.raises(ValueError, match=r"holds dimensions \(band, y, x\), got"):
@@ -157,7 +157,7 @@ def test_what_is_no_raster_is_refused(image, lai, tmp_path):
 
 
 def check_conventions(opened, raster):
-    """CRS and CF names as another program finds them."""
+    """Check CRS and CF names as another program finds them."""
     variable = opened[raster.name]
     assert variable.encoding["grid_mapping"] == "spatial_ref"
     assert variable.rio.crs == raster.rio.crs
@@ -186,7 +186,7 @@ def test_netcdf_and_zarr_keep_crs_and_names(image, lai, tmp_path, kind, name):
     if name == "image":
         np.testing.assert_array_equal(again.fifesim.ndvi(), image.fifesim.ndvi())
     if (name, kind) == ("image", "netcdf"):
-        # xarray's default masks the fill value, and makes the counts floating point.
+        # By default xarray masks the fill value and converts the counts to floating point.
         with xr.open_dataset(path, decode_coords="all") as masked:
             np.testing.assert_array_equal(masked["dn"].fifesim.ndvi(), image.fifesim.ndvi())
 
@@ -195,8 +195,8 @@ def test_netcdf_and_zarr_keep_crs_and_names(image, lai, tmp_path, kind, name):
     ("dtype", "stored", "nodata", "scale", "value"),
     [("float32", 0.25, -9999, 1.0, 0.25), ("uint16", 2500, 65535, 1e-4, 0.25), ("int16", 2500, None, 1e-4, 0.25)],
 )
-def test_values_of_others_are_masked_and_in_their_unit(tmp_path, dtype, stored, nodata, scale, value):
-    """Reflectance as agencies store it: taken as it is, -9999 or a count would go through the chain as reflectance."""
+def test_external_values_are_masked_and_scaled(tmp_path, dtype, stored, nodata, scale, value):
+    """Without masking and scaling, stored counts or -9999 would be processed as reflectance."""
     path = tmp_path / "theirs.tif"
     profile = {"driver": "GTiff", "width": 4, "height": 3, "count": 1, "dtype": dtype, "crs": "EPSG:26914"}
     transform = rasterio.transform.from_origin(705000, 4334100, 30, 30)
@@ -225,21 +225,21 @@ def test_values_of_others_are_masked_and_in_their_unit(tmp_path, dtype, stored, 
         (np.uint8, {}, None),
     ],
 )
-def test_what_stands_for_no_data_is_what_the_raster_says(tmp_path, dtype, attrs, nodata):
+def test_nodata_value_is_taken_from_the_raster(tmp_path, dtype, attrs, nodata):
     """A mask of zeros and ones has no cell without data."""
     grid = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 120.0, 90.0, 30.0)
     values = np.arange(-3, 9).reshape(3, 4).astype(dtype)
     raster = grids.place(xr.DataArray(values, dims=("y", "x"), name="own", attrs=attrs), grid)
     path = fifesim.to_geotiff(raster, tmp_path / "own.tif")
     with rasterio.open(path) as source:
-        # NaN is what fractions have without being asked.
+        # Floating-point rasters have NaN by default.
         assert source.nodata == nodata or np.isnan(attrs["_FillValue"])
     again = fifesim.open_image(path)
     assert again.equals(raster)
     assert again.attrs == {key: value for key, value in attrs.items() if value == value}
 
 
-def test_a_file_is_replaced_only_where_that_is_said(lai, tmp_path):
+def test_file_is_replaced_only_with_overwrite(lai, tmp_path):
     path = fifesim.to_geotiff(lai, tmp_path / "lai.tif")
     before = path.read_bytes()
     with pytest.raises(FileExistsError, match=r"there is a file .*lai.tif: type overwrite=True"):
@@ -249,8 +249,8 @@ def test_a_file_is_replaced_only_where_that_is_said(lai, tmp_path):
     np.testing.assert_array_equal(fifesim.open_image(path), lai + 1)
 
 
-def test_what_gdal_kept_of_a_replaced_file_goes_with_it(image, tmp_path):
-    """A GIS writes statistics and names of bands beside a file, which would hide those of the new one."""
+def test_gdal_sidecar_of_a_replaced_file_is_removed(image, tmp_path):
+    """A GIS writes statistics and band names to a sidecar file, which would hide the new ones."""
     path = fifesim.to_geotiff(image, tmp_path / "image.tif")
     kept = "<PAMDataset><PAMRasterBand band='1'><Description>stale</Description></PAMRasterBand></PAMDataset>"
     (tmp_path / "image.tif.aux.xml").write_text(kept)
@@ -261,7 +261,7 @@ def test_what_gdal_kept_of_a_replaced_file_goes_with_it(image, tmp_path):
         assert source.descriptions[0] == str(image["band"].values[0])
 
 
-def test_one_selected_band_keeps_its_calibration(image, tmp_path):
+def test_single_selected_band_keeps_its_calibration(image, tmp_path):
     name = str(image["band"].values[1])
     one = image.sel(band=name)
     again = fifesim.open_image(one.fifesim.to_geotiff(tmp_path / "one.tif"))
@@ -275,27 +275,27 @@ def toa(lai_values):
     return fifesim.surface_reflectance(lai_values, bands=["TM2", "TM3", "TM4", "TM1", "TM7"]).fifesim.to_toa()
 
 
-def written(raster, path):
+def colour_and_tags(raster, path):
     with rasterio.open(fifesim.to_geotiff(raster, path)) as source:
         return source.colorinterp, source.tags(), source.tags(ns="IMAGERY"), source.photometric
 
 
 @pytest.mark.parametrize("bands", [["TM2", "TM3", "TM4"], ["TM3", "TM2", "TM1"], ["TM4"], ["TM7"], ["TM7", "TM1"]])
 @pytest.mark.parametrize("dtype", ["uint8", "float64"])
-def test_bands_have_the_colour_of_their_wavelength(toa, tmp_path, bands, dtype):
-    """TM2, TM3 and TM4 are green, red and near infrared, wherever they stand."""
+def test_colour_interpretation_follows_the_wavelength(toa, tmp_path, bands, dtype):
+    """TM2, TM3 and TM4 are green, red and near infrared, in any order."""
     image = toa.sel(band=bands)
     image = image.fifesim.sense("TM") if dtype == "uint8" else image
     near = ColorInterp.nir if hasattr(ColorInterp, "nir") else ColorInterp.undefined
     known = {"TM1": ColorInterp.blue, "TM2": ColorInterp.green, "TM3": ColorInterp.red, "TM4": near}
     expected = [known.get(name, ColorInterp.undefined) for name in bands]
     expected = [ColorInterp.gray] if bands == ["TM7"] else expected
-    assert list(written(image, tmp_path / "image.tif")[0]) == expected
+    assert list(colour_and_tags(image, tmp_path / "image.tif")[0]) == expected
 
 
 def test_time_sun_and_view_are_tags(toa, tmp_path):
     image = toa.fifesim.sense("TM").assign_coords(time=np.datetime64("1987-06-06T16:35:00.25", "ns"))
-    _, tags, imagery, _ = written(image, tmp_path / "image.tif")
+    _, tags, imagery, _ = colour_and_tags(image, tmp_path / "image.tif")
     assert tags["TIFFTAG_DATETIME"] == "1987:06:06 16:35:00"
     assert imagery["ACQUISITIONDATETIME"] == "1987-06-06 16:35:00"
     assert float(tags["SUN_ELEVATION"]) == pytest.approx(90 - float(image.sza), abs=1e-6)
@@ -303,6 +303,6 @@ def test_time_sun_and_view_are_tags(toa, tmp_path):
     assert (tags["VIEW_ZENITH"], float(tags["sza"])) == ("0", float(image.sza))
 
 
-def test_without_a_time_there_is_none(toa, tmp_path):
-    _, tags, imagery, _ = written(toa.isel(band=0), tmp_path / "toa.tif")
+def test_image_without_a_time_has_no_time_tag(toa, tmp_path):
+    _, tags, imagery, _ = colour_and_tags(toa.isel(band=0), tmp_path / "toa.tif")
     assert "TIFFTAG_DATETIME" not in tags and "ACQUISITIONDATETIME" not in imagery

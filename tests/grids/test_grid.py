@@ -1,4 +1,4 @@
-"""Grids: their place, coordinates and CRS, how rasters carry them, and which are refused."""
+"""Grids: location, coordinates and CRS, how rasters carry them, and invalid grids."""
 
 import json
 from concurrent.futures import ThreadPoolExecutor
@@ -32,13 +32,13 @@ CELL = 30 / 9
 
 
 def ramp(grid):
-    """A raster on a grid, no two of whose cells are the same."""
+    """A raster on a grid in which all cells differ."""
     values = np.arange(grid.shape.y * grid.shape.x, dtype=float).reshape(tuple(grid.shape))
     return grids.place(xr.DataArray(values, dims=("y", "x")), grid)
 
 
 @pytest.mark.parametrize("cell", [CELL, 30 / 7, 1.1])
-def test_coordinates_of_a_window_are_those_of_the_whole_to_the_bit(cell):
+def test_window_coordinates_are_identical_to_the_whole_grid(cell):
     """xarray aligns exactly: a difference of 1e-10 m makes the sum of two rasters empty."""
     whole = grids.coordinates(fifesim.fife_site(cell, window=((0, 900), (0, 900))))
     part = grids.coordinates(fifesim.fife_site(cell, window=((123, 456), (789, 899))))
@@ -47,7 +47,7 @@ def test_coordinates_of_a_window_are_those_of_the_whole_to_the_bit(cell):
 
 
 def test_coordinates_are_cell_centres():
-    """Beside exact fractions: doubles of four million metres resolve 1e-9 m."""
+    """Reference values are exact fractions; doubles of four million metres resolve 1e-9 m."""
     coordinates = grids.coordinates(fifesim.fife_site(CELL))
     rows = [float(4334220 - (Fraction(i) + Fraction(1, 2)) * 10 / 3) for i in range(4500)]
     columns = [float(704970 + (Fraction(i) + Fraction(1, 2)) * 10 / 3) for i in range(4500)]
@@ -62,7 +62,7 @@ def box(crs, affine=CORNER):
     return GeoBox((4, 5), affine, crs)
 
 
-def test_what_is_no_grid_in_metres_is_refused():
+def test_grids_not_in_metres_are_rejected():
     turned = Affine(30, 0, 705000, 0, 30, 4334000), Affine(30, 1, 705000, 1, -30, 4334000)
     refused = {
         "geographic CRS .EPSG:4326.*reproject": box("EPSG:4326", Affine(0.1, 0, -96, 0, -0.1, 39)),
@@ -77,7 +77,7 @@ def test_what_is_no_grid_in_metres_is_refused():
             grids.check_grid(grid)
 
 
-def test_sizes_without_cells_or_with_too_many_are_refused():
+def test_sizes_with_no_or_too_many_cells_are_rejected():
     none, many = r"holds no cell of .* use a larger width and height", "holds over 2147483647 cells"
     sizes = {
         none: [(0.0, 90.0, 30.0), (90.0, -90.0, 30.0), (90.0, 90.0, 0.0), (20.0, 90.0, 30.0), (np.nan, 90.0, 30.0)],
@@ -112,7 +112,7 @@ def test_raster_keeps_its_grid(grid):
 
 
 def test_grid_is_right_after_slicing_and_coarsening():
-    """The GeoTransform that xarray carries on is stale then."""
+    """The GeoTransform that xarray keeps is stale after these operations."""
     grid = fifesim.fife_site(CELL, window=((0, 90), (0, 90)))
     raster = ramp(grid)
     assert grids.same_grid(grids.geobox(raster[9:18, 27:]), grid[9:18, 27:90])
@@ -120,7 +120,7 @@ def test_grid_is_right_after_slicing_and_coarsening():
     assert grids.same_grid(grids.geobox(coarse), fifesim.fife_site(30, window=((0, 10), (0, 10))))
 
 
-def test_rasters_without_a_usable_grid_are_refused():
+def test_rasters_without_a_usable_grid_are_rejected():
     raster = ramp(box("EPSG:26914"))
     refused = {
         "no CRS.*write_crs": raster.drop_vars("spatial_ref"),
@@ -137,21 +137,21 @@ def test_rasters_without_a_usable_grid_are_refused():
         check_axes(np.ones((2, 3)))
 
 
-def test_grid_of_rasters_of_others():
-    """Made with rioxarray, and with heights in the CRS."""
+def test_grid_of_external_rasters():
+    """Rasters made with rioxarray, and rasters whose CRS includes heights."""
     x, y = 705000 + 30 * (np.arange(5) + 0.5), 4334000 - 30 * (np.arange(4) + 0.5)
     raster = xr.DataArray(np.zeros((4, 5)), coords={"y": y, "x": x}, dims=("y", "x"))
     assert grids.same_grid(grids.geobox(raster.rio.write_crs("EPSG:26714")), box("EPSG:26714"))
     assert grids.same_grid(grids.geobox(raster.rio.write_crs("EPSG:26914+5703")), box("EPSG:26914"))
 
 
-def test_place_leaves_other_coordinates_and_the_input():
+def test_place_keeps_other_coordinates_and_the_input():
     grid = fifesim.fife_site(30, window=((0, 4), (0, 5)))
     raster = ramp(grid).assign_coords(sza=28.5, band_name=("y", list("abcd")))
     copy = raster.copy(deep=True)
     moved = grids.place(raster, fifesim.fife_site(30, window=((1, 5), (0, 5))))
     assert float(moved["sza"]) == 28.5 and "band_name" in moved.coords
-    # What is placed does not share metadata with the grid or the input.
+    # The result shares no metadata with the grid or the input.
     moved.attrs["units"] = "m"
     moved.coords["spatial_ref"].attrs["GeoTransform"] = ""
     xr.testing.assert_identical(raster, copy)
@@ -160,9 +160,9 @@ def test_place_leaves_other_coordinates_and_the_input():
 
 def test_lattice_counts_from_the_origin_of_the_crs():
     """
-    Rows count southward: a northing of 4334220 m is 1300266 cells north of it.
+    Rows count southward: a northing of 4334220 m lies 1300266 cells north of the origin.
 
-    At 20 m the site's corner is half a cell off the lattice, where rounding to even would move by two cells or none.
+    At 20 m the site corner is half a cell off the lattice, where rounding to even would shift by two cells or none.
     """
     assert grids.lattice_position(fifesim.fife_site(CELL)) == (-1300266, 211491)
     assert grids.lattice_position(GRIDS[-1]) == (-2, -3)
@@ -200,7 +200,7 @@ def test_coarser_grid_shares_the_corner():
         grids.aligned_grid(scene, 500)
 
 
-def test_a_part_of_one_cell_or_row_lies_where_it_was_cut(lai):
+def test_part_of_one_cell_or_row_keeps_its_location(lai):
     whole = grids.geobox(lai)
     for rows, columns in ((slice(5, 6), slice(7, 8)), (slice(5, 6), slice(3, 9)), (slice(2, 7), slice(7, 8))):
         assert grids.same_grid(grids.geobox(lai[rows, columns]), whole[rows, columns])
@@ -208,7 +208,7 @@ def test_a_part_of_one_cell_or_row_lies_where_it_was_cut(lai):
 
 
 def test_netcdf_coordinates_have_no_fill_value(lai, tmp_path):
-    """CF section 2.5.1 forbids it; xarray gives one to all floating point variables."""
+    """CF section 2.5.1 forbids a fill value; xarray adds one to all floating-point variables."""
     for number, raster in enumerate((lai, lai.isel(x=slice(3, 9)), lai * 2, lai.chunk(x=20))):
         path = tmp_path / f"{number}.nc"
         raster.rename("lai").to_netcdf(path)
@@ -217,8 +217,8 @@ def test_netcdf_coordinates_have_no_fill_value(lai, tmp_path):
             assert "_FillValue" in found["lai"].ncattrs()
 
 
-def test_grid_of_a_placed_raster_is_read_anew_where_its_coordinates_change():
-    """A raster keeps its grid through copies; a window, shifted coordinates or another transform have their own."""
+def test_grid_of_a_placed_raster_follows_changed_coordinates():
+    """Copies keep the grid; a window, shifted coordinates or another transform give another grid."""
     grid = fifesim.grid_at("EPSG:26914", 705000, 4334000, 300, 200, 10)
     placed = grids.place(xr.DataArray(np.zeros((20, 30)), dims=("y", "x")), grid)
     assert grids.geobox(placed) == grids.geobox(placed.copy()) == grids.geobox(placed.drop_encoding()) == grid
@@ -229,7 +229,7 @@ def test_grid_of_a_placed_raster_is_read_anew_where_its_coordinates_change():
 
 
 def test_threads_may_place_rasters_on_many_grids():
-    """More grids than are kept at a time."""
+    """The number of grids exceeds the size of the cache."""
     values = xr.DataArray(np.zeros((2, 2)), dims=("y", "x"))
     known = [fifesim.grid_at("EPSG:26914", 705000 + 10 * k, 4334000, 20, 20, 10) for k in range(300)]
     with ThreadPoolExecutor(8) as pool:
@@ -237,14 +237,14 @@ def test_threads_may_place_rasters_on_many_grids():
     assert found == known
 
 
-def test_rows_from_the_south_are_turned(lai):
+def test_rows_ordered_from_the_south_are_flipped(lai):
     turned = lai.isel(y=slice(None, None, -1))
     xr.testing.assert_identical(north_up(turned), lai)
     assert north_up(lai) is lai
     np.testing.assert_array_equal(turned.fifesim.surface_reflectance(), lai.fifesim.surface_reflectance())
 
 
-def test_other_names_of_dimensions_say_what_to_type():
+def test_other_dimension_names_give_an_error_with_the_remedy():
     to_metres = r"\.rio\.write_crs\(4326\)\.rio\.reproject"
     messages = {
         ("latitude", "longitude"): rf"rename\(latitude='y', longitude='x'\){to_metres}",
@@ -259,8 +259,8 @@ def test_other_names_of_dimensions_say_what_to_type():
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_grid_is_carried_as_a_raster_tells_it(seed):
-    """Origins that are no multiples of cells, and cells that no binary number is."""
+def test_carried_grid_equals_the_grid_of_a_placed_raster(seed):
+    """Origins are no multiples of the cell size, and cell sizes have no exact binary value."""
     draw = np.random.default_rng(seed)
     cell = draw.choice([10 / 3, 30.0, 0.7, draw.uniform(0.5, 50)], 2)
     west, north = 708000 + cell[1] * draw.integers(0, 900), 4331000 - draw.uniform(0, 5000)
@@ -276,21 +276,21 @@ def test_a_grid_is_carried_as_a_raster_tells_it(seed):
 TM34 = ["TM3", "TM4"]
 
 
-def lost(raster):
-    """What `xr.where` leaves of a raster: the same numbers and places, the CRS gone."""
+def without_crs(raster):
+    """Result of `xr.where`: the same values and coordinates, but without the CRS."""
     out = xr.where(np.isfinite(raster), raster.drop_vars("spatial_ref"), np.nan)
     assert out.odc.crs is None
     return out
 
 
-def test_rasters_without_a_crs_take_that_of_their_cells_alone(lai, site):
-    found = with_crs_of(lost(lai), lai)
+def test_raster_without_a_crs_takes_it_from_a_raster_on_the_same_cells(lai, site):
+    found = with_crs_of(without_crs(lai), lai)
     assert grids.same_grid(grids.geobox(found), site)
     np.testing.assert_array_equal(found, lai)
-    assert with_crs_of(lai, lost(lai)) is lai
-    emptied = xr.where(lai > 1.5, 0.1, 0.3)  # the coordinate stays, without what it said
+    assert with_crs_of(lai, without_crs(lai)) is lai
+    emptied = xr.where(lai > 1.5, 0.1, 0.3)  # the coordinate remains, but its attributes are lost
     assert "spatial_ref" in emptied.coords and grids.same_grid(grids.geobox(with_crs_of(emptied, lai)), site)
-    bare = lost(lai)
+    bare = without_crs(lai)
     for other in (bare.assign_coords(x=bare["x"] + 1), bare.isel(x=slice(5)), bare.drop_vars(["x", "y"])):
         assert with_crs_of(other, lai) is other
         with pytest.raises(ValueError, match=r"no CRS.*xr\.where drops it"):
@@ -305,7 +305,7 @@ def axis(values):
     return xr.DataArray(np.zeros(len(values)), dims="x", coords={"x": values})
 
 
-def test_a_transform_that_agrees_keeps_its_digits():
+def test_consistent_transform_gives_the_exact_cell_size():
     third = axis([1.0, 2.0]).assign_coords(spatial_ref=0)
     third["spatial_ref"].attrs["GeoTransform"] = f"0 {10 / 3!r} 0 0 0 {-10 / 3!r}"
     assert exact_cell(third, 3.333333, -3.333333) == (10 / 3, -10 / 3)
@@ -317,7 +317,7 @@ def with_coordinates(raster, axis, change):
     return raster.assign_coords({axis: change(values)})
 
 
-def one_missing(values):
+def with_one_missing(values):
     values[5] = np.nan
     return values
 
@@ -326,7 +326,7 @@ UNEVEN = {
     "gap": lambda raster, axis: raster.isel({axis: [*range(20), *range(30, 60)]}),
     "overlap": lambda raster, axis: raster.isel({axis: [*range(30), *range(25, 60)]}),
     "shuffled": lambda raster, axis: raster.isel({axis: [0, *np.random.default_rng(0).permutation(58) + 1, 59]}),
-    "missing": lambda raster, axis: with_coordinates(raster, axis, one_missing),
+    "missing": lambda raster, axis: with_coordinates(raster, axis, with_one_missing),
     "changing": lambda raster, axis: with_coordinates(
         raster, axis, lambda values: values + 15 * np.sin(np.linspace(0, np.pi, values.size))
     ),
@@ -344,7 +344,7 @@ SOURCES = {
 
 @pytest.mark.parametrize("source", SOURCES)
 def test_sources_with_unevenly_spaced_coordinates_are_refused(source):
-    """odc-geo takes the grid from the first and last coordinates, and would shift the cells between them."""
+    """odc-geo derives the grid from the first and last coordinates, which would shift the cells between them."""
     raster = fifesim.lai_scene(GRID, seed=7).drop_attrs(deep=False)
     SOURCES[source](raster)
     for change, axis in product(UNEVEN.values(), ("x", "y")):
@@ -353,7 +353,7 @@ def test_sources_with_unevenly_spaced_coordinates_are_refused(source):
 
 
 def test_coordinates_in_single_precision_are_evenly_spaced():
-    """Half a metre of a northing of 4e6 m is lost then, which matters for cells of 1 m but not of 10 m."""
+    """Single precision resolves 0.5 m in a northing of 4e6 m, which matters for cells of 1 m but not of 10 m."""
     raster = fifesim.lai_scene(GRID, seed=7)
     single = with_coordinates(raster, "y", lambda values: values.astype(np.float32))
     assert regular_geobox(single).shape == GRID.shape
@@ -362,8 +362,8 @@ def test_coordinates_in_single_precision_are_evenly_spaced():
         regular_geobox(fine)
 
 
-def test_a_zarr_group_says_its_crs_and_its_transform():
-    """By the conventions of GeoZarr, whose README files have the identifiers."""
+def test_zarr_group_states_its_crs_and_transform():
+    """The README files of the GeoZarr conventions list the identifiers."""
     found = geozarr_attributes(fifesim.grid_at("EPSG:32735", 600000, 7200000, 900, 600, (20, 30)))
     assert found["proj:code"] == "EPSG:32735" and "proj:wkt2" not in found
     assert found["spatial:transform"] == [30.0, 0.0, 600000.0, 0.0, -20.0, 7200000.0]
@@ -376,7 +376,7 @@ def test_a_zarr_group_says_its_crs_and_its_transform():
     }
 
 
-def test_a_crs_without_a_code_is_written_out():
+def test_crs_without_a_code_is_written_as_wkt():
     own = pyproj.CRS.from_proj4("+proj=laea +lat_0=39 +lon_0=-96.5 +datum=WGS84 +units=m")
     (name, text), *others = crs_fields(own).items()
     assert name == "proj:wkt2" and not others

@@ -1,4 +1,4 @@
-"""Rasters of users: what is taken for a reflectance, and units, scales and names of bands."""
+"""User rasters: accepted reflectances, units, scales and band names."""
 
 import warnings
 
@@ -25,8 +25,8 @@ def fractions(site):
     )
 
 
-def stored(fractions, **attrs):
-    """As an agency stores it: whole numbers, with one cell without data."""
+def as_stored(fractions, **attrs):
+    """The raster as agencies store it: integers, with one cell without data."""
     whole = np.round(fractions * 10000).astype("int16")
     whole[:, 3, 4] = -9999
     return whole.drop_attrs(deep=False).assign_attrs(attrs)
@@ -39,8 +39,8 @@ def with_hole(fractions):
 
 
 @pytest.mark.parametrize("no_data", ["_FillValue", "nodata", "missing_value"])
-def test_whole_numbers_with_their_scale(fractions, no_data, array_type):
-    mine = array_type(stored(fractions, scale_factor=1e-4, add_offset=0.0, **{no_data: -9999}))
+def test_integers_are_scaled_to_reflectance(fractions, no_data, array_type):
+    mine = array_type(as_stored(fractions, scale_factor=1e-4, add_offset=0.0, **{no_data: -9999}))
     np.testing.assert_allclose(incoming(mine, "surface_reflectance"), with_hole(fractions), rtol=0, atol=1e-12)
     surface = mine.fifesim.to_toa(AIR, time=TIME, instrument="Sentinel-2")
     known = with_hole(fractions).fifesim.to_toa(AIR, time=TIME, instrument="Sentinel-2")
@@ -48,16 +48,16 @@ def test_whole_numbers_with_their_scale(fractions, no_data, array_type):
     assert surface["band"].values.tolist() == ["MSI4", "MSI8"]
 
 
-def test_an_offset_is_added_and_unmarked_no_data_are_told(site, fractions):
-    """As Landsat's Collection 2 stores surface reflectance: 7273 is 0, 43636 is 1, and 0 would be -0.2."""
+def test_offset_is_added_and_undeclared_nodata_gives_a_warning(site, fractions):
+    """Landsat Collection 2 surface reflectance: 7273 is 0 and 43636 is 1, so 0 would be read as -0.2."""
     whole = xr.DataArray(np.full((1, *site.shape), 10909, "uint16"), dims=("band", "y", "x"))
     mine = grids.place(whole, site).assign_attrs(scale_factor=2.75e-5, add_offset=-0.2)
     np.testing.assert_allclose(incoming(mine, "surface_reflectance"), 0.0999975, rtol=0, atol=1e-9)
     with pytest.warns(UserWarning, match=r"no value for no data.*_FillValue=0"):
-        incoming(stored(fractions.fillna(0), scale_factor=2.75e-5, add_offset=-0.2), "surface_reflectance")
+        incoming(as_stored(fractions.fillna(0), scale_factor=2.75e-5, add_offset=-0.2), "surface_reflectance")
 
 
-def test_raw_digital_numbers_are_no_reflectance(fractions):
+def test_raw_digital_numbers_are_rejected(fractions):
     dn = (fractions * 400).astype("uint8")
     for verb in (fifesim.to_surface, fifesim.to_toa):
         with pytest.raises(ValueError, match=r"mine holds whole numbers \(uint8\) without a scale.*calibrate"):
@@ -68,14 +68,14 @@ def test_raw_digital_numbers_are_no_reflectance(fractions):
     with pytest.raises(ValueError, match=r"reflectance of .* it is a fraction"):
         dn.astype(float).fifesim.to_surface(AIR, time=TIME, instrument="MSI")
     with pytest.raises(ValueError, match=r"reflectance of -0\.9999.*Mask no data"):
-        (stored(fractions) / 10000).fifesim.to_toa(AIR, time=TIME, instrument="MSI")
+        (as_stored(fractions) / 10000).fifesim.to_toa(AIR, time=TIME, instrument="MSI")
     with no_compute():
         lazy = in_chunks(fractions * 100, {"y": 20}).fifesim.to_toa(AIR, time=TIME, instrument="MSI")
     with pytest.raises(ValueError, match="it is a fraction"):
         lazy.compute()
 
 
-def test_range_of_a_reflectance():
+def test_valid_range_of_reflectance():
     edge = np.array([-0.5, 5.0, np.nan])
     assert check_reflectance(edge) is edge
     for wrong in (-0.51, 5.01, np.inf):
@@ -83,8 +83,8 @@ def test_range_of_a_reflectance():
             check_reflectance(np.array([0.2, wrong]))
 
 
-def test_a_dark_scene_in_percent_is_a_warning():
-    """Below 5 % everywhere, so that no value is impossible; a few bright cells are none."""
+def test_dark_scene_in_percent_gives_a_warning():
+    """All values are below 5 %, so none is impossible; a few bright cells do not matter."""
     for percent in (np.linspace(0.9, 4.5, 100), np.append(np.full(40, 0.2), np.full(60, 1.2))):
         with pytest.warns(UserWarning, match=r"reflectances above 1.*divide by\s+100"):
             check_reflectance(percent)
@@ -93,7 +93,7 @@ def test_a_dark_scene_in_percent_is_a_warning():
         check_reflectance(np.append(np.full(60, 0.2), np.full(40, 1.2)))
 
 
-def test_what_has_no_data_is_not_told_another_value(fractions):
+def test_remedy_suggests_nodata_only_if_it_is_missing(fractions):
     whole = (fractions * 10000).astype("int16")
     with pytest.raises(ValueError, match=r"scale_factor=0\.0001\), as"):
         incoming(whole.assign_attrs(_FillValue=-9999), "surface_reflectance")
@@ -103,19 +103,22 @@ def test_what_has_no_data_is_not_told_another_value(fractions):
         incoming(whole.assign_attrs(FIFESIM="{}"), "surface_reflectance")
 
 
-def test_fractions_that_say_a_scale_are_asked_whether_it_was_applied(fractions):
-    """Arithmetic keeps attributes, so a raster that was divided still says its scale."""
+def test_fractions_with_a_scale_attribute_are_rejected(fractions):
+    """Arithmetic keeps attributes, so a raster that was already scaled still carries its scale."""
     with pytest.raises(ValueError, match=r"also scale_factor 0\.0001.*remove them from \.attrs.*mask_and_scale=True"):
         incoming(fractions.assign_attrs(scale_factor=1e-4), "surface_reflectance")
     incoming(fractions.assign_attrs(scale_factor=1.0, add_offset=0.0), "surface_reflectance")
 
 
-def test_a_dataset_of_bands(fractions):
+def test_dataset_with_a_variable_per_band(fractions):
     dataset = xr.Dataset({name: fractions.sel(band=band, drop=True) for name, band in (("red", "B04"), ("nir", "B08"))})
     known = fractions.fifesim.to_toa(AIR, time=TIME, instrument="MSI")
     np.testing.assert_array_equal(dataset.fifesim.to_toa(AIR, time=TIME, instrument="MSI"), known)
-    whole = stored(fractions, scale_factor=1e-4, nodata=-9999)
-    bands = {"red": stored(fractions).sel(band="B04", drop=True), "nir": stored(fractions).sel(band="B08", drop=True)}
+    whole = as_stored(fractions, scale_factor=1e-4, nodata=-9999)
+    bands = {
+        "red": as_stored(fractions).sel(band="B04", drop=True),
+        "nir": as_stored(fractions).sel(band="B08", drop=True),
+    }
     once = incoming(xr.Dataset(bands).assign_attrs(scale_factor=1e-4, nodata=-9999), "surface_reflectance")
     np.testing.assert_allclose(once, with_hole(fractions), rtol=0, atol=1e-12)
     mixed = xr.Dataset({"red": whole.sel(band="B04", drop=True), "nir": fractions.sel(band="B08", drop=True)})
@@ -124,10 +127,10 @@ def test_a_dataset_of_bands(fractions):
         incoming(xr.Dataset({"sza": 3.0}), "surface_reflectance")
 
 
-def test_a_dataset_with_dates(fractions):
-    """As odc.stac.load gives it: a variable for each band over (time, y, x)."""
+def test_dataset_with_dates(fractions):
+    """odc.stac.load returns such a Dataset, with one variable over (time, y, x) per band."""
     times = np.array(["2022-05-01T17:10", "2022-06-03T17:10"], "M8[ns]")
-    whole = stored(fractions, scale_factor=1e-4, nodata=-9999)
+    whole = as_stored(fractions, scale_factor=1e-4, nodata=-9999)
     dates = xr.concat([whole, whole], dim=xr.DataArray(times, dims="time", name="time"))
     loaded = xr.Dataset({name: dates.sel(band=band, drop=True) for name, band in (("red", "B04"), ("nir", "B08"))})
     toa = loaded.fifesim.to_toa(AIR, instrument="MSI")
@@ -136,10 +139,10 @@ def test_a_dataset_with_dates(fractions):
     np.testing.assert_array_equal(toa[1], alone)
 
 
-def test_a_file_of_rioxarray(fractions, tmp_path):
-    """Bands count from 1 there, and their names are in long_name."""
+def test_file_opened_with_rioxarray(fractions, tmp_path):
+    """rioxarray numbers bands from 1 and stores their names in long_name."""
     path = tmp_path / "mine.tif"
-    whole = stored(fractions).rio.write_nodata(-9999)
+    whole = as_stored(fractions).rio.write_nodata(-9999)
     whole.rio.to_raster(path)
     with rasterio.open(path, "r+") as file:
         file.descriptions, file.scales = ("red", "nir"), (1e-4, 1e-4)
@@ -165,8 +168,8 @@ def test_wavelengths_in_nanometres(fractions, unit):
         in_micrometres(fractions.assign_coords(wavelength=("band", [6650.0, 8330.0], {"units": "angstrom"})))
 
 
-def test_names_are_those_of_the_numbers(fractions, tmp_path):
-    """A selection of bands keeps the numbers, and the file's names of all."""
+def test_band_names_follow_the_band_numbers(fractions, tmp_path):
+    """A band selection keeps the band numbers, but long_name still lists all names of the file."""
     path = tmp_path / "six.tif"
     six = xr.concat([fractions * share for share in (1.0, 0.5, 0.25)], "band").drop_vars("band")
     six.rio.to_raster(path)
@@ -182,12 +185,12 @@ def test_names_are_those_of_the_numbers(fractions, tmp_path):
         assert incoming(mine, "surface_reflectance")["band"].values.tolist() == list(names)
 
 
-def test_counted_bands_are_no_silent_assumption(fractions):
+def test_numbered_bands_give_a_warning(fractions):
     with pytest.warns(UserWarning, match="counts its bands 1 to 2, taken for TM1 to TM2: name them"):
         fractions.assign_coords(band=[1, 2]).fifesim.to_toa(AIR, time=TIME, instrument="TM")
 
 
-def test_bands_of_another_instrument_are_no_silent_assumption(lai):
+def test_bands_of_another_instrument_give_a_warning(lai):
     toa = lai.fifesim.surface_reflectance("MSI", bands=["MSI4", "MSI8"]).fifesim.to_toa()
     with pytest.warns(UserWarning, match=r"MSI4, MSI8 of MSI are taken for TM3, TM4 of TM.*adjust_bands\('TM'\)"):
         toa.fifesim.sense("TM")
@@ -200,7 +203,7 @@ def test_bands_of_another_instrument_are_no_silent_assumption(lai):
 CELLS = np.array([[0, 35], [255, 100]], np.uint8)
 
 
-def test_scale_offset_and_fill_are_undone_and_forgotten():
+def test_scale_offset_and_fill_value_are_applied_and_removed():
     packed = xr.DataArray(CELLS, dims=("y", "x"), name="Lai_500m")
     packed.attrs = {"scale_factor": 0.1, "add_offset": 1.0, "_FillValue": 255, "units": "m2/m2"}
     found = unpacked(packed)
@@ -212,6 +215,6 @@ def test_scale_offset_and_fill_are_undone_and_forgotten():
     np.testing.assert_array_equal(lazy, found)
 
 
-def test_what_is_not_packed_passes_as_it_is():
+def test_unpacked_values_are_unchanged():
     plain = xr.DataArray(CELLS.astype(np.float32), dims=("y", "x"), attrs={"_FillValue": np.nan, "scale_factor": 1})
     assert unpacked(plain) is plain

@@ -1,4 +1,4 @@
-"""Files that are opened: known formats of this machine, with numbers and a place on the Earth."""
+"""Opening files: known local formats only, with real numbers and a location on the Earth."""
 
 import math
 import os
@@ -26,7 +26,7 @@ PLACED = Affine(10, 0, 707900, 0, -10, 4332100)
 
 
 def write(path, *, scale=1.0, offset=0.0, gcps=None, **other):
-    """An ordinary raster around the grid."""
+    """Write an ordinary raster around the grid."""
     profile = {"driver": "GTiff", "width": 60, "height": 60, "count": 1, "dtype": "float32", "crs": "EPSG:26914"}
     profile |= {"transform": PLACED} | other
     with warnings.catch_warnings():
@@ -39,15 +39,15 @@ def write(path, *, scale=1.0, offset=0.0, gcps=None, **other):
     return path
 
 
-def refused_everywhere(path, reason, error=ValueError):
-    """Each function that opens a raster refuses it in one line."""
+def check_refused_everywhere(path, reason, error=ValueError):
+    """Check that each function that opens a raster rejects it in one line."""
     for door in DOORS:
         with pytest.raises(error, match=reason) as said:
             door(path)
         assert len(str(said.value)) <= 500 and str(said.value).isprintable()
 
 
-def mosaic(path, source, relative=0, inside="", band=""):
+def write_mosaic(path, source, relative=0, inside="", band=""):
     path.write_text(
         f'<VRTDataset rasterXSize="60" rasterYSize="60"><SRS>EPSG:26914</SRS>{inside}'
         "<GeoTransform>707900,10,0,4332100,0,-10</GeoTransform>"
@@ -59,7 +59,7 @@ def mosaic(path, source, relative=0, inside="", band=""):
 
 @pytest.fixture
 def server():
-    """An address, and who has asked there."""
+    """An address and the list of requests received there."""
     asked = []
     with socket.create_server(("127.0.0.1", 0)) as listening:
 
@@ -93,7 +93,7 @@ def tms(address):
     )
 
 
-def test_no_address_is_asked_unless_allowed(tmp_path, server):
+def test_no_request_is_sent_unless_allowed(tmp_path, server):
     address, asked = server
     (tmp_path / "tms.tif").write_text(tms(address))
     beside = write(tmp_path / "beside.tif")
@@ -106,12 +106,12 @@ def test_no_address_is_asked_unless_allowed(tmp_path, server):
         tms(address),
         str(tmp_path / "tms.tif"),
         beside,
-        mosaic(tmp_path / "curl.vrt", f"/vsicurl/{address}"),
-        mosaic(tmp_path / "tms.vrt", "tms.tif", relative=1),
-        mosaic(tmp_path / "nested.vrt", "curl.vrt", relative=1),
+        write_mosaic(tmp_path / "curl.vrt", f"/vsicurl/{address}"),
+        write_mosaic(tmp_path / "tms.vrt", "tms.tif", relative=1),
+        write_mosaic(tmp_path / "nested.vrt", "curl.vrt", relative=1),
     ]
     for path in hostile:
-        refused_everywhere(path, "allow_remote=True")
+        check_refused_everywhere(path, "allow_remote=True")
     assert not asked
     for number, door in enumerate(DOORS):
         with pytest.raises(ValueError, match="404"):
@@ -119,7 +119,7 @@ def test_no_address_is_asked_unless_allowed(tmp_path, server):
         assert len(asked) > number
 
 
-def test_a_context_allows_what_an_argument_does(server):
+def test_context_manager_allows_requests(server):
     address, asked = server
     with opening.remote_allowed(), pytest.raises(ValueError, match="404"):
         opening.raster_file(address.replace("x.tif", "context.tif"))
@@ -128,8 +128,8 @@ def test_a_context_allows_what_an_argument_does(server):
         opening.raster_file(address)
 
 
-def test_lazy_tasks_keep_what_was_decided(tmp_path):
-    """Threads and workers know of no context."""
+def test_lazy_tasks_keep_the_permission(tmp_path):
+    """Threads and workers do not see the context manager."""
     path = tmp_path / "warped.vrt"
     with rasterio.open(write(tmp_path / "a.tif")) as source, rasterio.vrt.WarpedVRT(source, crs="EPSG:26914") as warped:
         rasterio.shutil.copy(warped, path, driver="VRT")
@@ -140,10 +140,10 @@ def test_lazy_tasks_keep_what_was_decided(tmp_path):
     assert all((each.compute(scheduler="threads") == 3).all() for each in lazy)
 
 
-def test_mosaics_and_archives_of_this_machine_are_opened(tmp_path):
+def test_local_mosaics_and_archives_are_opened(tmp_path):
     path = write(tmp_path / "a.tif")
-    plain = mosaic(tmp_path / "a.vrt", "a.tif", relative=1)
-    for each in (plain, mosaic(tmp_path / "b.vrt", plain)):
+    plain = write_mosaic(tmp_path / "a.vrt", "a.tif", relative=1)
+    for each in (plain, write_mosaic(tmp_path / "b.vrt", plain)):
         assert (fifesim.open_lai(each, GRID) == 3).all()
         assert (fifesim.open_image(each) == 3).all()
     packed = tmp_path / "a.zip"
@@ -152,7 +152,7 @@ def test_mosaics_and_archives_of_this_machine_are_opened(tmp_path):
     assert (fifesim.open_lai(f"/vsizip/{packed}/a.tif", GRID) == 3).all()
 
 
-def test_what_is_no_file_is_refused_and_not_waited_for(tmp_path):
+def test_paths_that_are_no_regular_file_are_rejected_without_waiting(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     os.symlink(tmp_path / "loop", tmp_path / "loop")
     refused = {
@@ -166,19 +166,19 @@ def test_what_is_no_file_is_refused_and_not_waited_for(tmp_path):
         tmp_path / "\x1b[2J.tif": r"\\x1b\[2J\.tif as a raster: no raster file is there",
     }
     for path, reason in refused.items():
-        refused_everywhere(path, reason)
+        check_refused_everywhere(path, reason)
 
 
-def test_a_cut_file_names_itself(tmp_path):
+def test_error_names_the_truncated_file(tmp_path):
     rasterio.shutil.copy(write(tmp_path / "a.tif"), tmp_path / "cut.tif", driver="COG", compress="none")
     data = (tmp_path / "cut.tif").read_bytes()
     (tmp_path / "cut.tif").write_bytes(data[: len(data) // 2])
-    refused_everywhere(tmp_path / "cut.tif", r"cannot read .*cut\.tif", OSError)
+    check_refused_everywhere(tmp_path / "cut.tif", r"cannot read .*cut\.tif", OSError)
     with pytest.raises(OSError, match=r"cannot read .*cut\.tif"):
         fifesim.open_image(tmp_path / "cut.tif", chunks=20).compute()
 
 
-def test_plain_text_is_told_as_such_and_other_formats_as_a_matter_of_trust(tmp_path):
+def test_error_for_plain_text_quotes_it_and_for_other_formats_names_allow_remote(tmp_path):
     for name, text in (("points.xyz", "x;y;lai"), ("lai.txt", "plot,lai"), ("lai.tif", "sorry")):
         (tmp_path / name).write_text(f"{text}\n1 2\n")
         with pytest.raises(ValueError, match=f"{name} as a raster of GTiff.*; it is text that begins '{text}'") as said:
@@ -190,8 +190,8 @@ def test_plain_text_is_told_as_such_and_other_formats_as_a_matter_of_trust(tmp_p
             opening.raster_file(tmp_path / name)
 
 
-def test_a_file_that_may_not_be_read_says_so(tmp_path, monkeypatch):
-    """A superuser may read all: the system's refusal is made up."""
+def test_unreadable_file_is_reported(tmp_path, monkeypatch):
+    """The error is simulated, because a superuser may read every file."""
     path = write(tmp_path / "secret.tif")
 
     def refuse(*given):
@@ -221,7 +221,7 @@ ATTACKS = [
 ]  # fmt: skip
 
 
-def test_what_may_lead_elsewhere_is_refused(tmp_path):
+def test_mosaics_that_may_refer_elsewhere_are_rejected(tmp_path):
     (tmp_path / "a.tif").touch()
     for text in ATTACKS:
         (tmp_path / "a.vrt").write_text(text)
@@ -252,16 +252,16 @@ ODD = [
 ]
 
 
-def test_what_is_no_raster_on_the_earth_is_refused(tmp_path):
+def test_rasters_without_numbers_or_location_are_rejected(tmp_path):
     for number, (profile, reason) in enumerate(ODD):
-        refused_everywhere(write(tmp_path / f"{number}.tif", **profile), rf"{number}\.tif.*{reason}")
+        check_refused_everywhere(write(tmp_path / f"{number}.tif", **profile), rf"{number}\.tif.*{reason}")
     for angle in (90, 180, 20):
         turned = Affine.translation(708000, 4332000) @ Affine.rotation(angle) @ Affine.scale(10, -10)
         with pytest.raises(ValueError, match=r"turned\.tif is rotated or not north up.*gdalwarp"):
             fifesim.open_image(write(tmp_path / "turned.tif", transform=turned))
 
 
-def test_heights_take_no_part_in_places(tmp_path):
+def test_vertical_crs_is_ignored(tmp_path):
     plain, compound = (
         write(tmp_path / "plain.tif"),
         write(tmp_path / "compound.tif", crs="EPSG:26914+5703"),
@@ -272,7 +272,7 @@ def test_heights_take_no_part_in_places(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_small_file_of_huge_size_is_read_by_parts_only(tmp_path):
+def test_small_file_of_a_huge_raster_is_opened_only_in_chunks(tmp_path):
     path = tmp_path / "huge.tif"
     profile = {"driver": "GTiff", "width": 1_000_000, "height": 1_000_000, "count": 1, "dtype": "uint8"}
     profile |= {"tiled": True, "blockxsize": 8192, "blockysize": 8192, "sparse_ok": True, "bigtiff": "yes"}
@@ -285,8 +285,8 @@ def test_a_small_file_of_huge_size_is_read_by_parts_only(tmp_path):
     assert float(lazy[0, :5, :5].sum()) == 0
 
 
-def test_no_data_beyond_the_type_mark_nothing(tmp_path):
-    """A mark that no cell can hold, which GDAL takes from a mosaic."""
+def test_nodata_value_outside_the_dtype_is_ignored(tmp_path):
+    """GDAL passes on the nodata value of a mosaic even if no cell can hold it."""
     write(tmp_path / "cells.tif", dtype="uint8")
     rasterio.shutil.copy(tmp_path / "cells.tif", tmp_path / "marked.vrt", driver="VRT")
     text = (tmp_path / "marked.vrt").read_text()
@@ -320,7 +320,7 @@ def test_covering_grid_covers_the_file_in_whole_pixels(tmp_path, affine, own, as
     assert box.bottom <= y.min() < box.bottom + 31 and box.top - 31 < y.max() <= box.top
 
 
-def test_a_reference_system_in_which_no_map_is_made_is_refused(tmp_path):
+def test_unsuitable_crs_is_rejected(tmp_path):
     path = write(tmp_path / "lai.tif")
     for crs, said in (("EPSG:4326", "must be projected"), ("EPSG:2193", "EPSG:2193"), ("EPSG:3857", "the scale of")):
         with pytest.raises(ValueError, match=said) as caught:

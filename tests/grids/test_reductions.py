@@ -1,4 +1,4 @@
-"""Sums and means over rasters, over bands and over the footprints of pixels."""
+"""Sums and means over rasters, bands and pixel footprints."""
 
 import threading
 import time
@@ -28,21 +28,21 @@ RASTER = xr.DataArray(VALUES, dims=("y", "x"))
 
 
 def count_and_total(one, other, power):
-    """Sums of rows: of 1, and of one less a power of the other."""
+    """Row sums of ones and of one array minus a power of the other."""
     return np.stack([np.full(len(one), one.shape[1]), (one - other**power).sum(axis=1)], axis=1)
 
 
 @pytest.mark.parametrize("cells", [1, 31 * 5, 2**22])
 @pytest.mark.parametrize("chunks", [{}, ODD_CHUNKS, {"y": 1}, {"x": 1}])
-def test_each_row_is_summed_whole(monkeypatch, cells, chunks):
-    """Whatever blocks of rows are read together; whole numbers are exact."""
+def test_each_row_is_summed_as_a_whole(monkeypatch, cells, chunks):
+    """The result does not depend on how many rows are read together; integers are exact."""
     monkeypatch.setattr("fifesim.grids.reductions._CELLS", cells)
     found = sums_by_row(count_and_total, in_chunks(RASTER, chunks), RASTER + 1, count=2, power=2)
     np.testing.assert_array_equal(found, count_and_total(VALUES, VALUES + 1, 2))
 
 
 def margins_and_pairs(cells, margin):
-    """What there is of a margin, and the sum of products with the neighbour below of the cells inside it."""
+    """Margin sizes, and the sum of products of inner cells with the neighbour below."""
     (above, below), (left, right) = margin
     padded = np.pad(cells, ((0, 1), (0, 0)))
     inside = slice(above, len(cells) - below), slice(left, cells.shape[1] - right)
@@ -50,8 +50,8 @@ def margins_and_pairs(cells, margin):
 
 
 @pytest.mark.parametrize("chunks", [{}, ODD_CHUNKS, {"y": 23, "x": 4}])
-def test_blocks_with_their_margins_add_up(chunks):
-    """Two rows of blocks below the first have a margin of 1 above, and so on: 4 blocks of columns, 3 of rows."""
+def test_sums_by_block_with_margins_give_the_total(chunks):
+    """There are 3 rows and 4 columns of blocks; blocks at the raster edge lack the margin on that side."""
     data = in_chunks(RASTER, chunks).data
     found = sums_by_block(margins_and_pairs, data, (5,), 8, margin=(1, 2))
     pairs = np.sum(VALUES[:-1] * VALUES[1:])
@@ -59,15 +59,15 @@ def test_blocks_with_their_margins_add_up(chunks):
     np.testing.assert_array_equal(sums_by_block(margins_and_pairs, data, (5,), 99, margin=(1, 2)), [0, 0, 0, 0, pairs])
 
 
-def test_blocks_are_added_in_their_order():
-    """1e16 swallows what is added to it one by one, and not what was added up before."""
+def test_block_sums_are_added_in_order():
+    """Ones added singly to 1e16 are lost in rounding; ones summed beforehand are not."""
     data = np.array([[1e16, *[1.0] * 62, -1e16]])
     assert sums_by_block(lambda cells, margin: cells[0], data, (1,), 1).tolist() == [0.0]
     assert data.sum() != 0
 
 
 CELLS = fifesim.grid_at("EPSG:26914", 705600.0, 4334000.0, 120.0, 90.0, 3.0)
-# Off the lattice of the cells, and higher than wide.
+# The pixels are not aligned with the cells, and taller than wide.
 PIXELS = fifesim.grid_at("EPSG:26914", 705604.0, 4333991.5, 96.0, 75.0, (25.0, 16.0))
 
 
@@ -78,14 +78,14 @@ def cells():
 
 
 def overlaps(cell_edges, pixel_edges):
-    """Lengths that each pixel and each cell share, over the length of the pixel."""
+    """Overlap length of each pixel with each cell, divided by the pixel length."""
     low = np.maximum(pixel_edges[:-1, None], cell_edges[:-1])
     high = np.minimum(pixel_edges[1:, None], cell_edges[1:])
     return np.maximum(high - low, 0) / np.diff(pixel_edges)[:, None]
 
 
 def test_means_over_areas_are_sums_of_overlaps(cells):
-    """Edges counted southward and eastward from the corner of the cells."""
+    """Edges are measured southward and eastward from the corner of the cells."""
     rows = overlaps(3.0 * np.arange(31), 8.5 + 25.0 * np.arange(4))
     columns = overlaps(3.0 * np.arange(41), 4.0 + 16.0 * np.arange(7))
     found = regularized(cells, areas(PIXELS), PIXELS, min_valid=0.98)
@@ -98,7 +98,7 @@ def test_means_over_areas_are_sums_of_overlaps(cells):
 
 
 def test_shifts_go_southward_and_eastward(cells):
-    """Pixels that lie elsewhere by whole cells see what others see there; a drift is one shift for each."""
+    """A shift by whole cells equals moving the pixels; a drift is one shift per line."""
     there = fifesim.grid_at("EPSG:26914", 705601.0, 4333985.5, 96.0, 75.0, (25.0, 16.0))
     moved = regularized(cells, areas(there), there, min_valid=0.0)
     shifted = regularized(cells, areas(PIXELS), PIXELS, shifts=(6.0, -3.0), min_valid=0.0)
@@ -109,7 +109,7 @@ def test_shifts_go_southward_and_eastward(cells):
     np.testing.assert_array_equal(drift[0], regularized(cells, areas(PIXELS), PIXELS, min_valid=0.0)[0])
 
 
-def test_spreads_stand_down_and_across():
+def test_spreads_are_given_as_down_and_across():
     rows, columns = operators((Boxcar(9.0), Boxcar(30.0)), CELLS, PIXELS)
     assert len(rows) == 3 and len(columns) == 6
     assert rows.count.max() == 4 and columns.count.max() == 11
@@ -144,14 +144,14 @@ def test_resampling_gives_the_same_bits_in_any_chunks(pixels, bands):
             lazy = resample(rows, columns, in_chunks(scene, pieces), pixels)
         assert lazy.chunks is not None
         xr.testing.assert_identical(lazy.compute(), whole)
-    # Lazy arrays promise a dtype before they are computed.
+    # Lazy arrays declare a dtype before they are computed.
     single = scene.astype(np.float32)
     lazy, eager = (resample(rows, columns, each, pixels) for each in (in_chunks(single, ODD_CHUNKS), single))
     assert lazy.dtype == lazy.compute().dtype == eager.dtype
 
 
-def test_output_chunks_read_only_the_cells_that_they_need():
-    """One bad chunk spoils the pixels over it and no others."""
+def test_output_chunks_read_only_the_required_cells():
+    """A chunk that fails affects only the pixels over it."""
     scene = in_chunks(raster(), {"y": 9, "x": 9})
     rows, columns = operators((Boxcar(30.0), Boxcar(30.0)), SITE, ANYWHERE[0])
 
@@ -184,7 +184,7 @@ def cube():
     return xr.DataArray(values, dims=("band", "y", "x"), coords=coords, name="rho")
 
 
-def test_sums_are_those_of_the_matrix(cube):
+def test_combination_equals_the_matrix_product(cube):
     found = combined(cube, "band", WEIGHTS)
     np.testing.assert_allclose(found, np.einsum("bn,nyx->byx", WEIGHTS, cube), rtol=1e-15)
     assert found.dims == ("band", "y", "x") and found.name == "rho"
@@ -201,8 +201,8 @@ def test_chunks_give_the_same_bits_and_stay_lazy(cube, chunks, in_turn, monkeypa
     assert lazy.chunks[1:] == cube.chunk(dict(zip(cube.dims, chunks, strict=True))).chunks[1:]
 
 
-def test_large_chunks_wait_until_the_one_before_is_added(cube, monkeypatch):
-    """With more threads than chunks in a row, no two of a chain are in memory together."""
+def test_large_chunks_are_read_one_at_a_time(cube, monkeypatch):
+    """Even with more threads than chunks, at most one chunk of a sum is in memory at a time."""
     held = {"now": 0, "most": 0}
     lock, add = threading.Lock(), reductions._add
 
@@ -229,16 +229,16 @@ def test_large_chunks_wait_until_the_one_before_is_added(cube, monkeypatch):
     assert held["most"] == 1
 
 
-def test_what_has_no_weight_is_not_read(cube):
-    """A missing sample is missing in the sums that it counts in alone, and its chunk is never asked for."""
+def test_chunks_without_weight_are_not_read(cube):
+    """A missing sample is missing only in sums with a weight for it, and its chunk is not read for others."""
     cube[2, 1, 1] = np.nan
     found = combined(cube, "band", WEIGHTS)
     assert np.argwhere(np.isnan(found.values)).tolist() == [[1, 1, 1]]
-    whole = cube.chunk(band=1).map_blocks(_refuse_third, template=cube.chunk(band=1))
+    whole = cube.chunk(band=1).map_blocks(fail_on_third_band, template=cube.chunk(band=1))
     assert combined(whole, "band", WEIGHTS[:1]).compute().notnull().all()
 
 
-def _refuse_third(block):
+def fail_on_third_band(block):
     assert block.size == 0 or float(block["wavelength"][0]) != 2.0
     return block
 

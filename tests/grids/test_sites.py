@@ -1,4 +1,4 @@
-"""The FIFE site, and the sun over it."""
+"""The FIFE site and its sun position."""
 
 import datetime
 
@@ -14,7 +14,7 @@ from fifesim.grids.sites import is_fife, made_on_site, on_fife_site
 CELL = 30 / 9
 
 
-def test_site_is_15_km_of_whole_cells_from_its_corner():
+def test_site_is_15_km_wide_and_starts_at_its_corner():
     grid = fifesim.fife_site(CELL)
     assert tuple(grid.shape) == (4500, 4500) and grid.crs.epsg == 26914
     np.testing.assert_allclose(grid.boundingbox.bbox, (704970, 4319220, 719970, 4334220), rtol=0, atol=1e-6)
@@ -24,7 +24,7 @@ def test_site_is_15_km_of_whole_cells_from_its_corner():
     assert tuple(fifesim.grid_at("EPSG:32614", 0, 1e6, 100, 70, 30).shape) == (2, 3)
 
 
-def test_site_refuses_what_makes_no_grid():
+def test_invalid_site_arguments_are_rejected():
     refused = {
         r"cell must be in \(0, 15000\] m, got 0": {"cell": 0},
         "datum must be 'NAD83' or 'NAD27', got 'WGS84'": {"cell": 30, "datum": "WGS84"},
@@ -41,8 +41,8 @@ def test_site_refuses_what_makes_no_grid():
     ("east", "north", "inside"),
     [(0, 0, True), (7000, 7000, True), (8500, 0, False), (-8500, 0, False), (0, 8500, False), (0, -8500, False)],
 )
-def test_scenes_that_are_made_on_the_site_say_so(east, north, inside):
-    """A square of 300 m beside the middle of the site."""
+def test_scenes_on_the_site_are_marked(east, north, inside):
+    """A square of 300 m is shifted from the middle of the site."""
     grid = fifesim.grid_at("EPSG:26914", 712470 + east - 150, 4326720 + north + 150, 300, 300, 30)
     lai = fifesim.lai_scene(grid)
     assert is_fife(lai) == is_fife(fifesim.flint_hills(grid)) == inside
@@ -50,7 +50,7 @@ def test_scenes_that_are_made_on_the_site_say_so(east, north, inside):
 
 
 @pytest.mark.parametrize("datum", ["NAD83", "NAD27"])
-def test_the_site_is_the_site_in_any_reference_system(datum):
+def test_site_is_recognised_in_any_reference_system(datum):
     corner = fifesim.fife_site(30, datum=datum)[:2, :2]
     assert on_fife_site(corner) and not on_fife_site(corner.pad(20)[:3, :3])
     geodetic = fifesim.grid_at("EPSG:5070", -50000.0, 1788000.0, 300.0, 300.0, 30)
@@ -58,8 +58,8 @@ def test_the_site_is_the_site_in_any_reference_system(datum):
     assert not on_fife_site(fifesim.grid_at("EPSG:32735", 712000.0, 4327000.0 + 1e6, 300.0, 300.0, 30))
 
 
-def test_the_site_is_where_it_is(lai):
-    """Arithmetic spreads attributes, and coordinates may be changed."""
+def test_site_depends_on_coordinates_as_well_as_attributes(lai):
+    """Arithmetic propagates attributes, and coordinates may be changed."""
     assert is_fife(lai) and not is_fife(lai.assign_coords(x=lai.x + 500e3))
 
 
@@ -67,7 +67,7 @@ DATES = ["1987-06-06T16:35Z", "1987-08-15T11:40-05:00", "1987-10-10T17:00"]
 FIFE = {"latitude": 39.06, "longitude": -96.54}
 
 
-def test_season_is_each_date_by_itself():
+def test_season_equals_each_date_alone():
     season = fifesim.sun_position(DATES, **FIFE, altitude=400.0)
     assert season.sizes == {"time": 3}
     assert season["time"].values.astype("datetime64[m]").astype(str).tolist() == [
@@ -79,7 +79,7 @@ def test_season_is_each_date_by_itself():
             assert float(season[name][number]) == pytest.approx(getattr(alone, name), abs=1e-9)
 
 
-def test_times_of_any_kind():
+def test_times_of_any_type_are_accepted():
     expected = fifesim.sun_position(DATES[0], **FIFE).sza
     kinds = (
         pd.to_datetime(DATES[:1]),
@@ -91,7 +91,7 @@ def test_times_of_any_kind():
         assert float(fifesim.sun_position(times, **FIFE)["sza"][0]) == pytest.approx(expected, abs=1e-9)
 
 
-def test_what_is_no_time_or_place_is_one_line():
+def test_invalid_times_and_places_give_one_line():
     two = {"latitude": [1.0, 2.0], "longitude": 3.0}
     refused = [
         (["noon"], FIFE, r"time must be a date and time such as .*, got 'noon'"),
@@ -106,9 +106,9 @@ def test_what_is_no_time_or_place_is_one_line():
             fifesim.sun_position(time, **place)
 
 
-def test_a_place_for_each_time_and_a_time_for_many_places():
+def test_times_and_places_are_broadcast():
     both = fifesim.sun_position(DATES[:2], latitude=[39.06, -33.0], longitude=[-96.54, 150.0])
     assert float(both["sza"][0]) == pytest.approx(fifesim.sun_position(DATES[0], **FIFE).sza, abs=1e-9)
-    assert float(both["sza"][1]) > 90  # night in Australia: told, not refused
+    assert float(both["sza"][1]) > 90  # night in Australia is returned, not rejected
     many = fifesim.sun_position(DATES[0], latitude=[39.06, 0.0, 39.06], longitude=-96.54)
     assert many.sizes == {"time": 3} and float(many["sza"][0]) == float(many["sza"][2]) != float(many["sza"][1])

@@ -1,4 +1,4 @@
-"""Images of a scan put onto a map."""
+"""Gridding of swath images onto a map."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ GRID = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 1500.0, 1200.0, (30.0,
 
 
 def swath(dtype=float):
-    """Thirty by forty pixels of about 33 m, turned by a tenth, with a plane of values."""
+    """Thirty by forty pixels of about 33 m, rotated by about 0.1 rad, with a plane of values."""
     line, sample = np.mgrid[0:30, 0:40]
     x, y = 705180.7 + 31.3 * sample - 4.1 * line, 4333833.3 - 33.7 * line - 3.9 * sample
     values = np.stack([1 + line + 40 * sample, 5 + line % 200]).astype(dtype) % 250
@@ -36,7 +36,7 @@ def swath(dtype=float):
     )
 
 
-def test_each_cell_takes_the_pixel_that_is_nearest():
+def test_each_cell_takes_the_nearest_pixel():
     image = swath()
     out = grid_swath(image, GRID)
     check_place(out, GRID.crs)
@@ -46,7 +46,7 @@ def test_each_cell_takes_the_pixel_that_is_nearest():
     for band in range(2):
         np.testing.assert_array_equal(out.values[band][near], image.values[band].ravel()[number][near])
     np.testing.assert_array_equal(out["vza"].values[near], image["vza"].values.ravel()[number][near])
-    # A pixel reaches as far as its corners, half of 46 m.
+    # The farthest corner of a pixel is 23 m from its centre (half a diagonal of 46 m).
     assert np.isnan(out.values[:, away.min(-1) > 26]).all() and np.isnan(out["vza"].values[away.min(-1) > 26]).all()
     assert near.mean() > 0.5 and np.isnan(out).any()
     assert out.attrs["history"] == "sense_swath\ngrid_swath: nearest" and float(out["sza"]) == 31
@@ -62,7 +62,7 @@ def test_digital_numbers_stay_digital_numbers():
 
 
 def test_mean_of_a_plane_is_the_plane():
-    """Pixels of the cells' own size sample it; what they cover lies within one of them."""
+    """Pixels sample the plane at their centres; the covered part of a cell lies within one pixel of the plane."""
     image = swath()
     image = image.isel(band=0, drop=True).copy(data=0.02 * image["x"].values - 0.03 * image["y"].values)
     coarse = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 1500.0, 1200.0, 150.0)
@@ -74,7 +74,7 @@ def test_mean_of_a_plane_is_the_plane():
     assert float((out - plane).std()) < 0.05
 
 
-def test_cells_that_are_partly_covered_are_asked_for_by_their_share():
+def test_min_valid_selects_partly_covered_cells():
     image = swath()
     around = fifesim.grid_at("EPSG:26914", 704000.0, 4335000.0, 4000.0, 4000.0, 40.0)
     out = grid_swath(image, around, "mean", min_valid=0.0)
@@ -86,7 +86,7 @@ def test_cells_that_are_partly_covered_are_asked_for_by_their_share():
 
 
 @pytest.mark.parametrize(("method", "dtype"), [("nearest", np.uint8), ("nearest", float), ("mean", float)])
-def test_a_map_is_the_same_in_any_chunks(method, dtype, monkeypatch):
+def test_map_is_the_same_in_any_chunks(method, dtype, monkeypatch):
     image = swath(dtype)
     whole = grid_swath(image, GRID, method)
     monkeypatch.setattr("fifesim.grids.swaths._BLOCK", 17)
@@ -99,7 +99,7 @@ def test_a_map_is_the_same_in_any_chunks(method, dtype, monkeypatch):
 
 
 def test_latitude_and_longitude_are_enough():
-    """Of any swath; on NAD83 and WGS 84 they differ by a metre here."""
+    """This works for any swath; here NAD83 and WGS 84 differ by a metre."""
     image = swath()
     longitude, latitude = projection.carry(
         projection.operation("EPSG:26914", "EPSG:4326")[0], "EPSG:26914", "EPSG:4326", image["x"], image["y"]
@@ -112,17 +112,17 @@ def test_latitude_and_longitude_are_enough():
         grid_swath(image.drop_vars("x"), GRID)
 
 
-def test_a_map_in_another_crs_shows_the_same_ground():
+def test_map_in_another_crs_shows_the_same_ground():
     image = swath().isel(band=0)
     image = image.copy(data=image["y"].values)
     north = fifesim.grid_at("EPSG:32614", 705200.0, 4333700.0, 900.0, 600.0, 30.0)
     out = grid_swath(image, north)
     assert out.rio.crs.to_epsg() == 32614
-    # Half a pixel, and NAD83 beside WGS 84.
+    # Tolerance: half a pixel, plus the difference between NAD83 and WGS 84.
     assert float(abs(out - out["y"]).max()) < 27
 
 
-def test_what_is_no_scan_is_refused():
+def test_rasters_that_are_no_swath_are_rejected():
     on_grid = grid_swath(swath(), GRID)
     with pytest.raises(ValueError, match="takes the image of a scan"):
         grid_swath(on_grid, GRID)
@@ -135,7 +135,7 @@ def test_what_is_no_scan_is_refused():
         grid_swath(swath(), far)
 
 
-def test_results_lie_where_their_image_does():
+def test_results_keep_the_coordinates_of_the_image():
     image = swath()
     bare = xr.DataArray(image.values, dims=image.dims)
     assert placed_as(bare, image)["x"].equals(image["x"])
@@ -144,7 +144,7 @@ def test_results_lie_where_their_image_does():
         placed_as(bare, bare.rename(line="row", sample="column"))
 
 
-def test_each_date_of_a_scan_comes_to_its_place():
+def test_each_date_of_a_swath_is_gridded():
     times = np.array(["2022-05-01T17:00", "2022-06-01T17:00"], "M8[ns]")
     passes = [swath().assign_coords(sza=sza) * share for sza, share in ((31.0, 1.0), (27.0, 2.0))]
     season = xr.concat(passes, dim=xr.IndexVariable("time", times), coords="different", compat="equals")

@@ -1,4 +1,4 @@
-"""The tag of a file and its values: the right bands after changes by other programs, or an error."""
+"""The fifesim tag and the values of a file: the right bands after changes by other programs, or an error."""
 
 import json
 
@@ -33,8 +33,8 @@ def copy(image, tmp_path):
 
 
 @pytest.fixture
-def opened(tmp_path):
-    """A function that writes a changed copy and opens it; nothing is computed before the result is."""
+def open_changed(tmp_path):
+    """A function that writes a changed copy and opens it lazily."""
 
     def reopened(copy, chunks=None):
         path = copy.write(tmp_path / "changed.tif")
@@ -48,30 +48,30 @@ def opened(tmp_path):
 
 @EAGER_OR_LAZY
 @pytest.mark.parametrize("bands", [[2, 1, 0], [1, 2, 0], [2, 1], [0]])
-def test_selected_bands_keep_their_names_and_calibration(image, copy, opened, bands, chunks):
+def test_selected_bands_keep_their_names_and_calibration(image, copy, open_changed, bands, chunks):
     copy.select(bands)
-    xr.testing.assert_identical(opened(copy, chunks), image.isel(band=bands))
+    xr.testing.assert_identical(open_changed(copy, chunks), image.isel(band=bands))
 
 
-def test_selected_variables_keep_their_names(truth, tmp_path, opened):
+def test_selected_variables_keep_their_names(truth, tmp_path, open_changed):
     path = truth.fifesim.to_geotiff(tmp_path / "truth.tif")
     for bands in ([1, 0], [0], [1]):
         copy = Copy(path)
         copy.select(bands)
-        found, names = opened(copy), [list(truth)[band] for band in bands]
+        found, names = open_changed(copy), [list(truth)[band] for band in bands]
         assert found["band"].values.tolist() == names
         np.testing.assert_array_equal(found, [truth[name] for name in names])
     copy = Copy(path)
     copy.descriptions = ["lai", "mine"]
     with pytest.raises(ValueError, match="are lai, mine, and its tag FIFESIM has lai, fpar"):
-        opened(copy)
-    # One band can be no other.
+        open_changed(copy)
+    # A file with one band needs no band name.
     copy = Copy(truth["lai"].fifesim.to_geotiff(tmp_path / "lai.tif"))
     copy.descriptions = ["mine"]
-    np.testing.assert_array_equal(opened(copy), truth["lai"])
+    np.testing.assert_array_equal(open_changed(copy), truth["lai"])
 
 
-def test_bands_without_names_are_counted_by_their_wavelengths(image, tmp_path):
+def test_bands_without_names_are_restored_from_their_wavelengths(image, tmp_path):
     nameless = fifesim.to_reflectance(image)
     along = [name for name, value in nameless.coords.items() if value.dims == ("band",) and name != "wavelength"]
     nameless = nameless.drop_vars(along)
@@ -88,52 +88,52 @@ def test_bands_without_names_are_counted_by_their_wavelengths(image, tmp_path):
         ([1, 2], [None, None], "none, none"),
     ],
 )
-def test_descriptions_that_tell_no_bands_are_refused(copy, opened, bands, names, said):
+def test_ambiguous_band_descriptions_are_rejected(copy, open_changed, bands, names, said):
     copy.select(bands)
     copy.descriptions = names
     with pytest.raises(ValueError, match=f"the descriptions .* are {said}, and its tag FIFESIM has TM2, TM3, TM4: giv"):
-        opened(copy)
+        open_changed(copy)
 
 
 @EAGER_OR_LAZY
-def test_bands_without_descriptions_or_with_stale_ones_are_told_by_their_values(image, copy, opened, chunks):
-    """rioxarray reorders values, and neither descriptions nor scales."""
+def test_bands_without_valid_descriptions_are_checked_by_their_values(image, copy, open_changed, chunks):
+    """rioxarray can reorder values while descriptions and scales stay."""
     names, copy.descriptions = copy.descriptions, [None] * 3
-    xr.testing.assert_identical(opened(copy, chunks), image)
+    xr.testing.assert_identical(open_changed(copy, chunks), image)
     copy.values = copy.values[::-1]
     for copy.descriptions in ([None] * 3, names):
         with pytest.raises(ValueError, match=r"in a cell of TM2 where fifesim wrote .* order of the bands\. Open the"):
-            opened(copy, chunks)
+            open_changed(copy, chunks)
 
 
 @EAGER_OR_LAZY
-def test_a_crop_is_compared_in_the_cells_that_it_has(image, copy, opened, chunks):
+def test_crop_is_compared_in_its_remaining_cells(image, copy, open_changed, chunks):
     units = copy.units
     copy.crop(slice(1, 4), slice(2, 6))
     copy.units = units
-    found = opened(copy, chunks)
+    found = open_changed(copy, chunks)
     np.testing.assert_array_equal(found, image[:, 1:4, 2:6])
     copy.values = copy.values + 1
     with pytest.raises(ValueError, match="in a cell of TM2 where fifesim wrote"):
-        opened(copy, chunks)
+        open_changed(copy, chunks)
 
 
 def rescale(copy, gain, offset, dtype):
-    """``gdal_translate -unscale`` or ``-scale``, which drop units."""
+    """Equivalent of ``gdal_translate -unscale`` or ``-scale``, which drop units."""
     values = copy.values * np.reshape(gain, (-1, 1, 1)) + np.reshape(offset, (-1, 1, 1))
     copy.values = values.astype(dtype) if np.dtype(dtype).kind == "f" else np.rint(values).astype(dtype)
     copy.units = [None] * 3
 
 
 def unscale(copy):
-    """``gdal_translate -unscale -ot Float32``"""
+    """Equivalent of ``gdal_translate -unscale -ot Float32``."""
     rescale(copy, copy.scales, copy.offsets, np.float32)
     copy.scales, copy.offsets = [1.0] * 3, [0.0] * 3
 
 
 CHANGES = {
     "unscaled": unscale,
-    # rioxarray with `mask_and_scale`, which writes scales again.
+    # rioxarray with `mask_and_scale`, which writes the scales again.
     "unscaled, with scales": lambda copy: rescale(copy, copy.scales, copy.offsets, np.uint8),
     # `gdal_translate -scale 0 255 0 1 -ot Float32`, which keeps the scales, and `-scale 0 255 0 100`.
     "fractions": lambda copy: rescale(copy, 1 / 255, 0, np.float32),
@@ -146,101 +146,101 @@ CHANGES = {
 
 @EAGER_OR_LAZY
 @pytest.mark.parametrize("change", CHANGES)
-def test_values_that_are_not_those_written_are_refused(copy, opened, change, chunks):
+def test_changed_values_are_rejected(copy, open_changed, change, chunks):
     CHANGES[change](copy)
     with pytest.raises(ValueError, match=r"another program changed the values or .* rioxarray\.open_rasterio"):
-        opened(copy, chunks)
+        open_changed(copy, chunks)
 
 
-def test_a_digit_that_changed_is_noticed(truth, tmp_path, opened):
-    """A single cell that is compared, in its last digits; NaN is kept as such."""
+def test_change_in_the_last_digits_is_found(truth, tmp_path, open_changed):
+    """A single compared cell differs in its last digits; NaN counts as a value."""
     raster = truth["lai"].where(truth["lai"] > truth["lai"].min())
     copy = Copy(raster.fifesim.to_geotiff(tmp_path / "lai.tif"))
-    np.testing.assert_array_equal(opened(copy), raster)
+    np.testing.assert_array_equal(open_changed(copy), raster)
     kept, missing = copy.values.copy(), np.isnan(copy.values)
     for changed in (kept * (1 + 1e-12), np.where(missing, 0.0, kept)):
         copy.values = changed
         with pytest.raises(ValueError, match="another program changed the values"):
-            opened(copy)
+            open_changed(copy)
 
 
 @EAGER_OR_LAZY
 @pytest.mark.parametrize("dtype", ["uint16", "int16", "int32", "float32", "float64"])
-def test_digital_numbers_of_another_type_come_back(image, copy, opened, dtype, chunks):
+def test_digital_numbers_of_another_dtype_are_restored(image, copy, open_changed, dtype, chunks):
     copy.convert(dtype)
-    found = opened(copy, chunks)
+    found = open_changed(copy, chunks)
     assert found.dtype == np.uint8
     xr.testing.assert_identical(found, image)
 
 
 def resample(copy, shift=0.5):
-    """Move the cells by part of one, so that no cell can be compared."""
+    """Shift the cells by a fraction of a cell, so that no cell can be compared."""
     copy.transform = copy.transform @ copy.transform.translation(shift, shift)
 
 
 @EAGER_OR_LAZY
 @pytest.mark.parametrize("value", [30.5, -1.0, 256.0])
-def test_resampled_values_that_are_no_digital_numbers_are_refused(copy, opened, value, chunks):
+def test_resampled_values_that_are_no_digital_numbers_are_rejected(copy, open_changed, value, chunks):
     resample(copy, 0.02)
     copy.values = copy.values.astype(np.float32)
-    opened(copy, chunks)
+    open_changed(copy, chunks)
     copy.values[1, -1, -1] = value
     with pytest.raises(ValueError, match=rf"digital number of {value:g} is not .* 255: it is in .*changed\.tif"):
-        opened(copy, chunks)
+        open_changed(copy, chunks)
 
 
-def test_resampled_bands_need_descriptions_and_units(copy, opened):
+def test_resampled_bands_need_descriptions_and_units(copy, open_changed):
     resample(copy)
-    assert opened(copy)["band"].values.tolist() == ["TM2", "TM3", "TM4"]
+    assert open_changed(copy)["band"].values.tolist() == ["TM2", "TM3", "TM4"]
     kept, copy.units = copy.units, [None] * 3
     with pytest.raises(ValueError, match=r"other cells than fifesim wrote and lacks the units .* gdalwarp"):
-        opened(copy)
+        open_changed(copy)
     copy.units, copy.descriptions = kept, [None] * 3
     with pytest.raises(ValueError, match="have no descriptions that tell them apart"):
-        opened(copy)
+        open_changed(copy)
 
 
 @EAGER_OR_LAZY
-def test_another_value_for_no_data_becomes_that_of_the_raster(image, truth, copy, tmp_path, opened, chunks):
+def test_changed_nodata_value_becomes_the_value_of_the_raster(image, truth, copy, tmp_path, open_changed, chunks):
     copy.values[:, 0, 0] = copy.nodata = 255
-    found = opened(copy, chunks)
+    found = open_changed(copy, chunks)
     assert (found[:, 0, 0] == 0).all() and found.attrs["_FillValue"] == 0
     np.testing.assert_array_equal(found[:, 1:], image[:, 1:])
     own = Copy(truth["lai"].fifesim.to_geotiff(tmp_path / "lai.tif"))
     own.values[:, 0, 0] = own.nodata = -9999
-    found = opened(own, chunks)
+    found = open_changed(own, chunks)
     assert np.isnan(found[0, 0])
     np.testing.assert_array_equal(found[1:], truth["lai"][1:])
-    # Cells may be masked, not made.
+    # Cells may become missing, but missing cells may not become valid.
     copy.nodata = 0
     with pytest.raises(ValueError, match="another program changed the values"):
-        opened(copy, chunks)
+        open_changed(copy, chunks)
 
 
-def test_a_value_for_no_data_that_was_added_is_said(truth, tmp_path, opened):
+def test_added_nodata_value_is_kept(truth, tmp_path, open_changed):
     classes = truth["lai"].round().astype("int16").drop_attrs().rename("cover").rio.write_crs(truth.rio.crs)
     copy = Copy(classes.fifesim.to_geotiff(tmp_path / "classes.tif"))
     assert copy.nodata is None
     copy.nodata = -1
-    assert opened(copy).attrs["_FillValue"] == -1
+    assert open_changed(copy).attrs["_FillValue"] == -1
 
 
-def test_fractions_that_became_whole_numbers_are_refused(truth, tmp_path, opened):
+def test_fractions_rounded_to_integers_are_rejected(truth, tmp_path, open_changed):
     path = truth.fifesim.to_geotiff(tmp_path / "truth.tif")
     copy = Copy(path)
     copy.convert("uint8")
     with pytest.raises(ValueError, match=r"holds values of type uint8, and fifesim wrote float64: .* rounded"):
-        opened(copy)
+        open_changed(copy)
     copy = Copy(path)
     copy.convert("float32")
-    found = opened(copy)
+    found = open_changed(copy)
     assert found.dtype == np.float32
     np.testing.assert_allclose(found.sel(band="fpar"), truth["fpar"], rtol=1e-7)
 
 
 @pytest.fixture(scope="module")
 def composite(lai_values):
-    """The second date is greener in the east; no date has data in the last row."""
+    """Composite of two dates, the second greener in the east; the last row has no data at either date."""
     toa = fifesim.surface_reflectance(lai_values, bands=["TM3", "TM4"]).fifesim.to_toa()
     toa = toa.where(toa["y"] > toa["y"].min())
     greener = toa.copy(deep=True)
@@ -251,7 +251,7 @@ def composite(lai_values):
 
 @EAGER_OR_LAZY
 @pytest.mark.parametrize(("dtype", "bands"), [("float64", True), ("float32", False)], ids=["bands", "ndvi"])
-def test_dates_of_a_composite_come_back(composite, tmp_path, dtype, chunks, bands):
+def test_dates_of_a_composite_survive_a_round_trip(composite, tmp_path, dtype, chunks, bands):
     dates = composite["date"]
     assert np.unique(dates).size == 3 and dates.isnull().any()
     raster = composite.astype(dtype)
@@ -265,17 +265,17 @@ def test_dates_of_a_composite_come_back(composite, tmp_path, dtype, chunks, band
     np.testing.assert_allclose(copy.values[-1, -2, -1], dates[-2, -1].values.astype(float) / 86400e9, rtol=1e-14)
 
 
-def test_a_composite_without_its_band_of_dates_opens(composite, tmp_path, opened):
+def test_composite_opens_without_its_date_band(composite, tmp_path, open_changed):
     copy = Copy(composite.fifesim.to_geotiff(tmp_path / "composite.tif"))
     copy.select([1, 0])
-    xr.testing.assert_identical(opened(copy), composite.isel(band=[1, 0]).drop_vars("date"))
+    xr.testing.assert_identical(open_changed(copy), composite.isel(band=[1, 0]).drop_vars("date"))
     copy = Copy(tmp_path / "composite.tif")
     copy.select([2])
     with pytest.raises(ValueError, match="holds date without the bands that it belongs to"):
-        opened(copy)
+        open_changed(copy)
 
 
-def test_dates_that_digital_numbers_cannot_hold_are_left_out_with_a_warning(image, tmp_path):
+def test_dates_that_digital_numbers_cannot_hold_are_omitted_with_a_warning(image, tmp_path):
     dates = np.full(image.shape[1:], np.datetime64("1987-06-06", "ns"))
     with pytest.warns(UserWarning, match="lacks date"):
         image.assign_coords(date=(("y", "x"), dates)).fifesim.to_geotiff(tmp_path / "image.tif")
@@ -284,7 +284,7 @@ def test_dates_that_digital_numbers_cannot_hold_are_left_out_with_a_warning(imag
 GOOD = {"name": "lai", "dims": ["y", "x"], "attrs": {}, "coords": {}}
 NUMBER = {"dims": [], "values": 1.0, "dtype": "<f8", "attrs": {}}
 
-# Tags that anybody may have written: changes of the tag, and of its coordinate sza.
+# Foreign tags: changes of the tag and of its coordinate sza.
 BAD_TAGS = [{"dims": ["z", "x"]}, {"dims": ["y", "x", "x"]}, {"attrs": [1]}, {"coords": {"y": NUMBER}}]
 BAD_COORDINATES = [
     {"dims": ["band"], "values": [1.0, 2.0]}, {"dims": ["band"], "values": [[1.0]]}, {"values": {"a": 1}},
@@ -294,7 +294,7 @@ BAD_COORDINATES = [
 BAD_TEXTS = ["1", "[1]", "null", "[" * 200_000, "x" * 1_000_001, '"\x1b[2J"', '{"name": "lai"}']
 
 
-def test_a_foreign_tag_is_refused_by_the_name_of_its_file(tmp_path):
+def test_foreign_tag_is_rejected_with_the_file_name(tmp_path):
     grid = fifesim.fife_site(30.0, window=((0, 4), (0, 5)))
     lai = place(xr.DataArray(np.ones((4, 5)), dims=("y", "x"), name="lai"), grid)
     path = fifesim.to_geotiff(lai, tmp_path / "tagged.tif")
@@ -313,37 +313,37 @@ def test_a_foreign_tag_is_refused_by_the_name_of_its_file(tmp_path):
 
 
 @pytest.fixture
-def untagged(copy):
+def untagged_copy(copy):
     del copy.tags["FIFESIM"]
     return copy
 
 
 @pytest.mark.parametrize("bands", [[0, 1, 2], [2, 1, 0], [1]])
-def test_names_calibration_and_wavelengths_of_gdal_go_with_the_bands(image, untagged, opened, bands):
-    untagged.select(bands)
-    found, expected = opened(untagged), image.isel(band=bands)
+def test_gdal_names_calibration_and_wavelengths_follow_the_bands(image, untagged_copy, open_changed, bands):
+    untagged_copy.select(bands)
+    found, expected = open_changed(untagged_copy), image.isel(band=bands)
     np.testing.assert_allclose(fifesim.to_radiance(found), fifesim.to_radiance(expected), rtol=1e-12)
     np.testing.assert_allclose(found["wavelength"], expected["wavelength"], rtol=1e-8)
     assert found["band"].values.tolist() == expected["band"].values.tolist()
 
 
-def test_untagged_fractions_with_a_scale_are_radiance(image, untagged, opened):
-    untagged.convert("float32")
-    found = opened(untagged)
+def test_untagged_fractions_with_a_scale_are_radiance(image, untagged_copy, open_changed):
+    untagged_copy.convert("float32")
+    found = open_changed(untagged_copy)
     assert found.attrs["units"] == "W m-2 sr-1 um-1" and "gain" not in found.coords
     np.testing.assert_allclose(found, fifesim.to_radiance(image), rtol=1e-6)
 
 
-def test_digital_numbers_that_lost_their_scale_are_refused(untagged, opened):
-    untagged.scales, untagged.offsets = [1.0] * 3, [0.0] * 3
+def test_digital_numbers_without_scale_are_rejected(untagged_copy, open_changed):
+    untagged_copy.scales, untagged_copy.offsets = [1.0] * 3, [0.0] * 3
     with pytest.raises(ValueError, match=r"bands of .*changed\.tif have units of radiance and no scale"):
-        opened(untagged)
-    untagged.convert("float32")
-    np.testing.assert_array_equal(opened(untagged).fillna(0), untagged.values)
+        open_changed(untagged_copy)
+    untagged_copy.convert("float32")
+    np.testing.assert_array_equal(open_changed(untagged_copy).fillna(0), untagged_copy.values)
 
 
-def test_units_are_those_of_all_bands(untagged, opened):
-    untagged.units = ["1", "m", "m"]
-    assert "units" not in opened(untagged).attrs
-    untagged.units = ["m"] * 3
-    assert opened(untagged).attrs["units"] == "m"
+def test_units_are_read_only_if_all_bands_agree(untagged_copy, open_changed):
+    untagged_copy.units = ["1", "m", "m"]
+    assert "units" not in open_changed(untagged_copy).attrs
+    untagged_copy.units = ["m"] * 3
+    assert open_changed(untagged_copy).attrs["units"] == "m"

@@ -1,4 +1,4 @@
-"""Files onto grids: operations of known accuracy, and the same numbers as an interpolation by another route."""
+"""Warping files onto grids: operations of known accuracy, compared with an independent interpolation."""
 
 import numpy as np
 import pyproj
@@ -29,20 +29,20 @@ def write(path, values, affine, crs, nodata=-999.0, dtype="float64"):
 
 
 def hills(rows, columns):
-    """Smooth on the scale of a file's cells, and different everywhere."""
+    """Values that vary smoothly over several file cells and differ everywhere."""
     i, j = np.arange(rows)[:, None], np.arange(columns)
     return 2 + np.sin(i / 5) + 0.5 * np.cos(j / 7 + i / 11)
 
 
-def geographic(path, values=None, crs="EPSG:4326", cell=0.0002):
-    """A file in degrees around the grid's place, cells of about 20 m."""
+def write_geographic(path, values=None, crs="EPSG:4326", cell=0.0002):
+    """Write a file in degrees around the grid, with cells of about 20 m."""
     west, north = -96.6, 39.12
     values = hills(500, 500) if values is None else values
     return write(path, values, Affine(cell, 0, west, 0, -cell, north), crs), values
 
 
 def interpolated(path, values, grid, transform):
-    """Bilinear interpolation between the file's cell centres, at the grid's cell centres. NaN beyond the centres."""
+    """Bilinear interpolation between file cell centres, at grid cell centres; NaN beyond the outermost centres."""
     with rasterio.open(path) as source:
         affine = source.transform
     rows, columns = np.arange(values.shape[0]) + 0.5, np.arange(values.shape[1]) + 0.5
@@ -56,7 +56,7 @@ def interpolated(path, values, grid, transform):
 UNKNOWN = "+proj=utm +zone=14 +ellps=clrk66 +units=m +no_defs"
 
 
-def test_unknown_datum_is_refused(tmp_path):
+def test_unknown_datum_is_rejected(tmp_path):
     with pytest.raises(ValueError, match=r"no operation of known accuracy.*EPSG:26914.*ballpark.*projsync"):
         projection.operation(UNKNOWN, "EPSG:26914", FIFE)
     path = write(tmp_path / "lai.tif", hills(400, 400), Affine(10, 0, 709000, 0, -10, 4332000), UNKNOWN)
@@ -67,11 +67,11 @@ def test_unknown_datum_is_refused(tmp_path):
 @pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:4269"])
 def test_degrees_onto_metres_is_bilinear_interpolation(tmp_path, crs):
     """
-    The warper's rows are straight over 32 cells: 320 m on the ellipsoid sag by 2 mm, 1e-4 of a file's cell.
+    The warper approximates rows by straight lines over 32 cells. Over 320 m these deviate by 2 mm, 1e-4 of a file cell.
 
-    The values change by 0.3 a cell at most.
+    The values change by at most 0.3 per cell.
     """
-    path, values = geographic(tmp_path / "lai.tif", crs=crs)
+    path, values = write_geographic(tmp_path / "lai.tif", crs=crs)
     found = warp.file_onto_grid(path, GRID)
     pipeline, _ = projection.operation("EPSG:26914", crs, FIFE)
 
@@ -94,7 +94,7 @@ def test_metres_onto_metres_is_bilinear_interpolation(tmp_path, cell, shift):
     np.testing.assert_allclose(warp.file_onto_grid(path, GRID), expected, rtol=0, atol=1e-6)
 
 
-def test_file_on_the_grid_is_read_as_it_is(tmp_path):
+def test_file_on_the_grid_is_read_unchanged(tmp_path):
     values = hills(100, 120)
     path = write(tmp_path / "lai.tif", values, GRID.affine, "EPSG:26914")
     np.testing.assert_array_equal(warp.file_onto_grid(path, GRID), values)
@@ -111,7 +111,7 @@ def test_larger_cells_hold_means(tmp_path):
 def test_chunks_and_windows_change_nothing(tmp_path, crs):
     grid = fifesim.fife_site(5.0, window=((600, 1300), (1000, 1700)))
     if crs == "EPSG:4326":
-        path, _ = geographic(tmp_path / "lai.tif")
+        path, _ = write_geographic(tmp_path / "lai.tif")
     else:
         path = write(tmp_path / "lai.tif", hills(300, 300), Affine(17, 0, 709003, 0, -17, 4332000), crs)
     whole = warp.file_onto_grid(path, grid)
@@ -126,8 +126,8 @@ def test_chunks_and_windows_change_nothing(tmp_path, crs):
 
 
 @pytest.mark.parametrize("dtype, nodata", [("float32", -999.0), ("float64", np.nan), ("int16", -1)])
-def test_no_data_stay_no_data(tmp_path, dtype, nodata):
-    """And do not leak into their neighbours as numbers."""
+def test_no_data_stays_no_data(tmp_path, dtype, nodata):
+    """Missing cells do not leak into their neighbours as numbers."""
     values = np.full((400, 400), 3.0)
     values[150:170, 200:260] = np.nan
     affine = Affine(10, 0, GRID.affine.c - 1400, 0, -10, GRID.affine.f + 1200)
@@ -147,8 +147,8 @@ def test_cells_beyond_the_file_are_missing(tmp_path):
     assert np.isfinite(found[40:, 30:]).all()
 
 
-def test_nad27_file_lands_where_it_belongs(tmp_path):
-    """A bright square at a known place in NAD27 is found there, not a TM pixel away."""
+def test_nad27_file_is_placed_correctly(tmp_path):
+    """A bright square in NAD27 is found at its true location, not one TM pixel away."""
     values = np.zeros((400, 400))
     values[200:210, 200:210] = 1.0
     path = write(tmp_path / "lai.tif", values, Affine(10, 0, 709000, 0, -10, 4332000), "EPSG:26714")
@@ -175,7 +175,7 @@ def test_files_that_cannot_be_used_are_named(tmp_path):
         fifesim.open_lai(away, GRID)
 
 
-def test_grids_whose_cells_are_no_metres_are_refused(tmp_path):
+def test_grids_not_in_metres_are_rejected(tmp_path):
     path = write(tmp_path / "hills.tif", hills(40, 40), GRID.affine, "EPSG:26914")
     degrees = GeoBox((9, 9), Affine(0.001, 0, -97, 0, -0.001, 39), "EPSG:4326")
     for bring, raster in ((warp.file_onto_grid, path), (warp.raster_onto_grid, fifesim.open_lai(path, GRID))):
@@ -185,7 +185,7 @@ def test_grids_whose_cells_are_no_metres_are_refused(tmp_path):
 
 @pytest.mark.parametrize("times", [8, 40])
 def test_far_finer_files_are_averaged_block_by_block(tmp_path, times):
-    """Means are exact, and the same in every window and chunk; a whole tile of the file is never read."""
+    """Means are exact and identical in every window and chunk; no whole tile is read at once."""
     grid = fifesim.grid_at("EPSG:26914", 708000.0, 4332000.0, 400.0, 360.0, 10.0)
     values = np.random.default_rng(0).random((36 * times, 40 * times)).astype("float32")
     path = write(tmp_path / "fine.tif", values, grid.affine * Affine.scale(1 / times), "EPSG:26914", dtype="float32")
@@ -196,12 +196,12 @@ def test_far_finer_files_are_averaged_block_by_block(tmp_path, times):
     np.testing.assert_array_equal(warp.file_onto_grid(path, grid, chunks=13), whole)
 
 
-def test_blocks_read_no_more_than_so_many_cells():
+def test_block_size_limits_the_number_of_cells_read():
     assert warp._block_size(warp._MUCH_FINER) == warp._TILE
     assert [warp._block_size(cells) for cells in (7, 64, 65, 2048, 1e6, np.nan)] == [32, 32, 16, 1, 1, 32]
 
 
-def test_a_cell_of_too_many_is_refused(tmp_path):
+def test_grid_cells_with_too_many_file_cells_are_rejected(tmp_path):
     path = tmp_path / "finest.tif"
     profile = {"driver": "GTiff", "width": 100_000, "height": 100_000, "count": 1, "dtype": "uint8", "sparse_ok": True}
     profile |= {"tiled": True, "blockxsize": 8192, "blockysize": 8192, "crs": "EPSG:26914"}
@@ -213,10 +213,10 @@ def test_a_cell_of_too_many_is_refused(tmp_path):
 
 @pytest.mark.parametrize("south_up", [False, True])
 @pytest.mark.parametrize("kind", ["same", "coarser", "degrees"])
-def test_an_array_comes_onto_a_grid_as_its_file_does(tmp_path, kind, south_up):
-    """In memory and lazy, under any chunks of either, to the bit."""
+def test_array_is_warped_like_its_file(tmp_path, kind, south_up):
+    """Results are identical to the bit, in memory or lazy and under any chunks."""
     if kind == "degrees":
-        path, _ = geographic(tmp_path / "lai.tif")
+        path, _ = write_geographic(tmp_path / "lai.tif")
     else:
         cell = 10 if kind == "same" else 33
         path = write(tmp_path / "lai.tif", hills(120, 130), Affine(cell, 0, 709450, 0, -cell, 4331500), "EPSG:26914")
@@ -233,7 +233,7 @@ def test_an_array_comes_onto_a_grid_as_its_file_does(tmp_path, kind, south_up):
     check_place(lazy, GRID.crs)
 
 
-def test_an_array_elsewhere_says_where_it_lies():
+def test_array_without_overlap_is_rejected_with_its_location():
     away = xr.DataArray(np.ones((4, 4)), dims=("y", "x"), name="mine")
     grid = fifesim.grid_at("EPSG:32735", 620000.0, 7220000.0, 40.0, 40.0, 10.0)
     with pytest.raises(ValueError, match=r"mine does not overlap .* it spans 620000 to 620040 E .*\(latitude -25.13, "):
