@@ -6,13 +6,13 @@ Change one operator, comparison, constant or call of the package at a time, and 
     python tests/mutate.py --draws 300 --log mutations.txt             # the package, hours; goes on where the log ends
     python tests/mutate.py --draws 40 --verify                         # what `fifesim verify` notices in its kernels
 
-The last lines are a summary for a pull request. Without the run for coverage, only the tests of the module and of those
-that import it are asked.
+The last lines are a summary for a pull request. Without the coverage run, only tests of the module and of modules that
+import it are used.
 
-Each change is made in a copy of the checkout. The module's own tests and examples come first, then some of each other
-file that run the line, then those of the modules that import it and some that run any line of it, the nearest first and
-as long as there is time. What fails must fail again alone, and pass without the change. Numbers with a point change
-by a hundredth, whole numbers by one. Each run of tests is a fork of a process that has imported all but the package.
+Each change is made in a copy of the checkout. The order of the tests, within time limits, is: tests and examples of the
+module; some tests of each other file that run the line; tests of importing modules; tests that run any line of the
+module, nearest folders first. A failing test must fail again alone and pass without the change. Floats change by 1 %,
+integers by 1. Each test run is a fork of a process that has imported everything except the package.
 """
 
 import argparse
@@ -34,17 +34,17 @@ import hypothesis
 import pytest
 from mutations import ROOT, changed, draw, imported
 
-LONGEST = 200  # of a module's own tests [s]; none takes so long
-LONG = 60  # of tests of others that run the line [s]
-SHORT = 30  # of those that run the module [s]
+LONGEST = 200  # time limit of the tests of the module [s]
+LONG = 60  # of other tests that run the line [s]
+SHORT = 30  # of other tests that run the module [s]
 ENDLESS = "it does not end"
 FEW = 3  # tests of each other file
-TIMED = ("tests/test_faults.py",)  # processes that are killed at a moment
+TIMED = ("tests/test_faults.py",)  # tests that depend on time
 
 
 @cache
 def importers():
-    """By module, those that import it."""
+    """Importing modules, by module."""
     direct = {}
     for path in (ROOT / "fifesim").rglob("*.py"):
         for each in imported(ast.parse(path.read_text())):
@@ -54,7 +54,7 @@ def importers():
 
 @cache
 def compiled_with(path):
-    """A module and all that may have compiled its functions into theirs."""
+    """A module and all modules that may have inlined its compiled functions."""
     found, ahead = {path}, [path]
     while ahead:
         for each in importers().get(ahead.pop(), ()):
@@ -69,11 +69,11 @@ def lines_of(path):
     """
     Tests by the lines of a module that they run.
 
-    Compiled lines have none, and those that fill a cache have the first test alone.
+    Lines of compiled functions have no tests, and lines that fill a cache have only the first test.
     """
     if not (ROOT / ".coverage").exists():
         return {}
-    from coverage import CoverageData  # which tests themselves do not need
+    from coverage import CoverageData  # not a dependency of the tests
 
     known = CoverageData(str(ROOT / ".coverage"))
     known.read()
@@ -100,7 +100,7 @@ def own_tests(path):
 
 
 def _few(tests, path, without):
-    """Some of each test file, those of the nearest folders first."""
+    """Some tests of each test file, starting with the nearest folders."""
     by_file = {}
     for test in sorted(tests):
         by_file.setdefault(test.split("::")[0], []).append(test)
@@ -109,14 +109,14 @@ def _few(tests, path, without):
 
 
 def _apart_by(path, file):
-    """Folders between a module and a test file."""
+    """Number of folders between a module and a test file."""
     one, other = path.parent.parts[1:], Path(file).parent.parts[1:]
     shared = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(one, other, strict=False)))
     return len(one) + len(other) - 2 * shared
 
 
 def tests_of(path, line):
-    """What may notice a change of a line, the quickest first, and for how long it is asked. [s]"""
+    """Tests that may detect a change of a line, fastest first, and their time limits. [s]"""
     own = own_tests(path)
     yield own, LONGEST
     yield _few(lines_of(path).get(line, ()), path, own), LONG
@@ -126,7 +126,7 @@ def tests_of(path, line):
 
 
 class Watch:
-    """Ends a run of tests when its time is over, leaves out those that hang on a clock, and keeps what failed first."""
+    """Pytest plugin that enforces the time limit, skips timing tests, and records the first failure."""
 
     def __init__(self, seconds):
         self.end, self.failed = time.monotonic() + seconds, None
@@ -165,7 +165,7 @@ def verified():
 
 
 def apart(folder, function, *given):
-    """What a function returns in a fork that imports the package from a folder."""
+    """Result of a function in a fork that imports the package from a folder."""
     fork = multiprocessing.get_context("fork")
     here, there = fork.Pipe(duplex=False)
     process = fork.Process(target=_apart, args=(folder, function, given, there))
@@ -197,7 +197,7 @@ def _apart(folder, function, given, there):
 
 
 def _imported():
-    """Modules of others that the tests import; what is compiled of the package and its tests is kept."""
+    """Third-party modules that the tests import. The collection of tests also writes bytecode."""
     sys.dont_write_bytecode = False
     pytest.main(["-q", "--collect-only", "-p", "no:cacheprovider"])
     here = os.getcwd()
@@ -209,7 +209,7 @@ def _imported():
 
 
 class Checkout:
-    """Two copies of the checkout: one to change, one to stay."""
+    """Two copies of the checkout, one to change and one unchanged."""
 
     def __init__(self, scratch):
         self.folder, self.kept = (Path(scratch) / name for name in ("checkout", "kept"))
@@ -221,7 +221,7 @@ class Checkout:
         self.passing = {}
 
     def import_others(self):
-        """Import here, once, what every fork needs but the package itself, and start the compiler."""
+        """Import the third-party modules of the forks once, and start the compiler."""
         for name in self.others:
             with contextlib.suppress(Exception):
                 importlib.import_module(name)
@@ -246,7 +246,7 @@ class Checkout:
         return None
 
     def tried(self, path, number, verify):
-        """A change in words, and what noticed it."""
+        """Description of a change, and the test that detected it."""
         text, line, words = changed((self.kept / path).read_text(), number)
         self.restore(path)
         (self.folder / path).write_text(text)
@@ -258,7 +258,7 @@ class Checkout:
             self.restore(path, caches=True)
 
     def restore(self, path, caches=False):
-        """Put a module back with what was compiled of it, as long as it is not to change."""
+        """Restore a module and delete its compiled code; with `caches`, restore the compiled code too."""
         shutil.copy2(self.kept / path, self.folder / path)
         for each in compiled_with(path):
             compiled = f"__pycache__/{each.stem}.*.nb[ic]"

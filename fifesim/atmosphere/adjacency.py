@@ -185,7 +185,7 @@ def _edge_flux(distance, middle, length, vza, weights, nodes):
     distance, middle = np.broadcast_arrays(distance, middle)
     node, weight = (values[:, None] for values in np.polynomial.legendre.leggauss(nodes))
     flux = np.empty(distance.shape)
-    # By rows, which stay in the processor's cache: a scene of 185 km has ten million blocks.
+    # By rows, which fit in the processor cache: a scene of 185 km has ten million blocks.
     for row in range(len(flux)):
         r_squared = distance[row] ** 2 + (middle[row] + node * length / 2) ** 2
         scattered = _weighted(weights, environment_function(np.sqrt(r_squared), vza))
@@ -218,7 +218,7 @@ class BlockSpread(NamedTuple):
 def spread_over(along_y, along_x, cell, margin, vza, weight_molecules, weight_aerosol):
     """Point spread over the blocks of a scene and its margin, as a Spread."""
     block = tuple(along.cells * size for along, size in zip((along_y, along_x), cell, strict=True))
-    # Half the transform: the farthest blocks that see each other must not do so around the back.
+    # Padding: the farthest blocks must not interact through the periodic boundary.
     half = [fft.next_fast_len(along.count + m + 1) for along, m in zip((along_y, along_x), margin, strict=True)]
     quadrant = point_spread([size + 1 for size in half], block, vza, weight_molecules, weight_aerosol)
     # The cosine transform is the real transform of the quadrant and its mirror images.

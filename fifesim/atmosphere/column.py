@@ -231,7 +231,7 @@ def stokes_basis(order, cosine, count, components):
 
 MOLECULES_HEIGHT = 8.0  # scale height [km]
 
-_LEAST_DEPTH = 1e-12  # optical depth that stands for none [1]
+_LEAST_DEPTH = 1e-12  # optical depth used in place of 0 [1]
 
 
 class Column(NamedTuple):

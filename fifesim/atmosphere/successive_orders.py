@@ -448,7 +448,7 @@ def stokes_reflectance(
     azimuth = np.radians(np.asarray(raa, float)) - (0 if at_ground else np.pi)  # between the ways of the light
     for mode, radiance in rescattered_light(column, mu_s, mu_v, at_ground=at_ground, stokes=True, **accuracy):
         waves = np.stack([np.cos(mode * azimuth), -np.cos(mode * azimuth), np.sin(mode * azimuth)])
-        light += radiance[:, :, None] * waves[:, None] / mu_s  # Siewert's Q is across less along the meridian
+        light += radiance[:, :, None] * waves[:, None] / mu_s  # Siewert: Q is across minus along
     if ground:
         light += _from_ground(column, mu_s, mu_v, ground, at_ground, accuracy)[:, :, None]
     return light
@@ -460,7 +460,7 @@ def _rotation(sza, vza, raa, way):
     along = np.cos(sun) * np.sin(view) - np.sin(sun) * np.cos(view) * np.cos(azimuth)
     across = way * np.sin(sun) * np.sin(azimuth)
     norm = along**2 + across**2
-    norm = np.where(norm > 0, norm, 1)  # straight on or back there is no plane, and nothing to turn
+    norm = np.where(norm > 0, norm, 1)  # no scattering plane at 0 and 180 degrees
     return np.stack([along**2 - across**2, -2 * along * across]) / norm
 
 

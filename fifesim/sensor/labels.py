@@ -70,7 +70,7 @@ def recorded(radiance, description, bands, quantise, product_geometry=None):
     scales = {}
     if quantise:
         gain, offset, bits = scale(description, bands, product_geometry)
-        # Numbers of a product are linear, even if those of the detector are not.
+        # Product numbers are linear, even if detector counts are compressed.
         compression = [band.compressed_count(bits) if product_geometry is None else 0 for band in bands]
         scales = {"gain": gain, "offset": offset} | ({"compression": compression} if any(compression) else {})
         along_band = [xr.Variable("band", values) for values in (gain, offset, compression)]
@@ -258,7 +258,7 @@ def sensed(
     toa, description, bands = by_bands(toa, instrument)
     check_scaling(scaling, description, quantise)
     line_spreads = line_spreads or description.line_spreads
-    # A radiance is recorded whatever the sun.
+    # Radiance is recorded independently of the sun.
     needed = not is_radiance(toa) or scaling == "product"
     geometry = (directions.given_geometry if needed else directions.known_geometry)(geometry, toa, time)
     check_same_angles(geometry, toa, "sza")

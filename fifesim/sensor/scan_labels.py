@@ -113,7 +113,7 @@ def find_track(grid, track=None, nadir_offset=0.0, heading=180.0):
     latitude, longitude = latitude_longitude(grid, grid.shape.y / 2, grid.shape.x / 2)
     here = scan.Track(float(latitude), float(longitude), heading)
     aside = np.degrees(nadir_offset / scan.EARTH_RADIUS)
-    # The great circle that keeps the distance there: its point is abeam to the left, its heading that of the parallel.
+    # Great circle at this distance. Its nearest point is abeam to the left, and it is parallel to `here` there.
     latitude, longitude = scan.place_of(here, 0.0, -aside)
     _, along, _ = here.axes()
     _, east, north = scan.frame(float(latitude), float(longitude))
@@ -154,7 +154,7 @@ def _splines(grid, track, altitude):
     """Components of the direction to the sensor over a grid, as splines of row and column."""
     rows, columns, latitude, longitude = _nodes(grid)
     east, north = scan.view_components(track, latitude, longitude, altitude)
-    # Beyond the horizon, which a spline cannot hold: a direction that no limit passes.
+    # Beyond the horizon, where splines need finite values: a direction outside every scan.
     to_east = RectBivariateSpline(rows, columns, np.nan_to_num(east, nan=2.0))
     return to_east, RectBivariateSpline(rows, columns, np.nan_to_num(north, nan=2.0))
 

@@ -409,7 +409,7 @@ def _cloud_rows(scene, first, seen, sunlit, overhead, at_nadir, sky, cell, step,
         if max(v, s, o) == 0:
             continue
         for field in range(6):
-            # Without clouds, reflectance and albedo are 0 and transmittances are 1, which changes nothing to the bit.
+            # Without clouds, reflectance and albedo are 0 and transmittances are 1, so the result is bitwise unchanged.
             light[field] = 0 if field in (0, 3) else 1
         for kind in range(len(sky.light)):
             table = sky.light[kind]

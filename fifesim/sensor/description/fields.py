@@ -96,7 +96,7 @@ def band_called(name, instrument):
     for band, letters, its in own:
         if wanted == key(band.name) or (number and (letters, its) == (prefix, number)):
             return band
-    # VIIRS counts two kinds of bands, I1 and M1: a number alone means neither.
+    # VIIRS has two kinds of bands, I1 and M1, so a number is ambiguous.
     numbered = [band for band, _, its in own if number and its == number]
     return numbered[0] if len(numbered) == 1 and prefix in _PREFIXES else None
 

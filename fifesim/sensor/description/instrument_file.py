@@ -61,7 +61,7 @@ class Noise:
             raise ValueError("high_radiance and high_snr belong together: give both or neither")
         if self.high_radiance is not None and self.high_radiance <= self.radiance:
             raise ValueError(f"high_radiance must be above radiance = {self.radiance:g}, got {self.high_radiance:g}")
-        # Raises if the points and the share do not fit together.
+        # Raises if the points and the share are inconsistent.
         self.model()
 
     @property

@@ -98,7 +98,7 @@ def instrument(
 @cached(128, "instruments by name")
 def catalogued(name):
     """Built-in instrument by name or alias."""
-    # Most are called as their file is; to read all of them takes ten times as long.
+    # Most files have the name of the instrument; reading all of them takes ten times as long.
     path = _files().get(key(name)) if isinstance(name, str) else None
     if path and key(_listed(path).name) == key(name):
         return _listed(path)
@@ -157,7 +157,7 @@ def read_instrument(path: FilePath) -> Instrument:
     >>> [band.name for band in fifesim.read_instrument(path).bands]
     ['red', 'nir']
     """
-    # Tables that it names lie beside it, wherever Python goes.
+    # Tables are found relative to the file, even if the working directory changes.
     path = Path(path).absolute()
     found = _parse(path)
     try:
@@ -235,7 +235,7 @@ _REFERENCES = {
     _WHITE: "taken for a white surface below an overhead sun of ASTM G173-03, and 0 for digital number 0",
 }
 
-# Made once: making it takes longer than what it does.
+# Created once, since creation takes longer than validation.
 _ADAPTER: TypeAdapter = TypeAdapter(SpectralResponse)
 
 

@@ -130,7 +130,7 @@ def _detector(instrument, band):
     passed = _transfer(instrument, band)
     detector = with_response(instrument, "detector")
     alone = _transfer(detector, *detector.select([band.name]))
-    # To the two digits that are shown.
+    # Rounded to the two printed digits.
     return [f"the detector alone has {_pair(alone, '.2f')}"] if max(passed) > max(alone) + 0.005 else []
 
 

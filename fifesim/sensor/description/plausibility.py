@@ -12,8 +12,8 @@ _WIDEST = 0.02
 # Smaller angles are below the diffraction limit of a mirror of 5 m: gsd is in kilometres [rad].
 _FINEST = 1e-7
 
-# A product's pixel is seldom three times smaller or larger than the interval: a ratio of these, within a factor of
-# three, is a unit that was taken for another.
+# The pixel size of a product is usually within a factor of 3 of the interval. A ratio within a factor of 3 of these
+# values indicates a wrong unit.
 _UNITS = {
     1000.0: ("altitude", "metres", "kilometres, so multiply by 1000"),
     1e-3: ("interval", "radians", "milliradians, so multiply by 1e-3, unless gsd is in kilometres"),
@@ -30,7 +30,7 @@ _RADIANCE = (0.02, 5.0)
 _BRIGHTEST = 0.1
 
 # Share of the line spread within one interval of its centre, below which it is too wide, and narrowest support in
-# intervals. Detectors fill a third of their interval and more, and none spreads a sample over ten.
+# intervals. Detectors fill at least a third of their interval, and no response is wider than ten intervals.
 _SHARE = 0.1
 _NARROWEST = 0.1
 

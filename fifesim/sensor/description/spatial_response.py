@@ -96,7 +96,7 @@ class TableResponse:
     values: Annotated[tuple[Number, ...], Field(min_length=2)]  # in any unit
 
     def __post_init__(self):
-        # Raises what is wrong with the table before anything is simulated.
+        # Errors in the table are raised before the simulation starts.
         spatial.TableSpread(self.angles, self.values)
 
     def spread(self, view):

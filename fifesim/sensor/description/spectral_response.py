@@ -16,7 +16,7 @@ from fifesim.base.caches import cached
 from fifesim.base.files import check_regular, shown
 from fifesim.sensor.description.fields import CONFIG, Name, Number, Positive
 
-# No band of these instruments reaches 100 um, and none begins below 100 nm.
+# All bands lie between 100 nm and 100 um.
 _LONGEST = 100.0
 
 # A Gaussian ends 1.5 of its widths from its centre, where it is 0.2 % of its maximum; it has so many wavelengths.
@@ -66,7 +66,7 @@ class ResponseTable(NamedResponse):
     def _read(self, name):
         beside = Path(self.folder) / self.table
         try:
-            # A name may be too long to ask for.
+            # The operating system rejects names that are too long.
             path = beside if self.folder and os.path.isfile(beside) else files.path(self.table)
             check_regular(path)
         except (OSError, ValueError):

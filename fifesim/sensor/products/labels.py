@@ -185,7 +185,7 @@ def calibrate(
     description = find_instrument(instrument)
     dn = north_up(dn if "band" in dn.dims else dn.expand_dims("band")).transpose("band", "y", "x")
     bands = matching_bands(dn, description)
-    # A geometry that is given wins over the sun of a time that is given, which is the image's all the same.
+    # A given geometry overrides the sun of a given time, which still becomes the time of the image.
     geometry = directions.given_geometry(geometry, dn, time if geometry is None else None)
     time = directions.dated(dn, time).coords.get("time")
     if (gain is None) != (offset is None):
@@ -200,7 +200,7 @@ def calibrate(
             sensor_labels.numbers_of_bands(given, bands, name) for name, given in (("gain", gain), ("offset", offset))
         )
         bits = 16 if dn.dtype.itemsize > 1 else 8
-        # Products of instruments of up to 8 bits have 8, also where they are stored in wider numbers.
+        # Products of instruments with up to 8 bits have 8 bits, even if stored in a wider type.
         full = 8 if description.bits <= 8 else bits
         if not np.all(gain > 0):  # type: ignore[operator]
             raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.min(gain):g}")

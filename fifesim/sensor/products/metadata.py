@@ -55,7 +55,7 @@ def utc_time(text, key, launch=_FIRST_LAUNCH):
         seconds = np.datetime64(match[1][:19] if match else "none", "s")
     except ValueError:
         raise ValueError(f"{key} must be a date and time such as 1987-06-06T16:35:00Z, got {shown(text)}") from None
-    # A clock may be a day behind.
+    # The computer clock may be a day behind.
     today = np.datetime64("now", "s")
     if not np.datetime64(launch, "s") <= seconds <= today + np.timedelta64(1, "D"):
         raise ValueError(

@@ -33,7 +33,7 @@ class Track:
     Parameters
     ----------
     latitude, longitude : float
-        Of a point on the track. [degree]
+        Coordinates of a point on the track. [degree]
     heading : float
         Direction of flight there over the ground, clockwise from north. [degree]
 
@@ -77,9 +77,9 @@ class Track:
         Parameters
         ----------
         latitude, longitude : float
-            Of a point on the track. [degree]
+            Coordinates of a point on the track. [degree]
         inclination : float
-            Of the orbit. [degree]
+            Inclination of the orbit. [degree]
         altitude : float
             [m]
         ascending : bool, optional
@@ -364,7 +364,7 @@ def view_components(track, latitude, longitude, altitude):
     there, to_east, to_north = frame(latitude, longitude)
     sine = there @ right
     vza, _ = view_from_ground(np.degrees(np.arcsin(np.clip(sine, -1, 1))), altitude)
-    # Of unit length on the ground: `right` without its part along the vertical.
+    # Horizontal component of `right`, normalized to unit length.
     length = np.sin(np.radians(vza)) / np.sqrt(1 - sine**2)
     return -length * (to_east @ right), -length * (to_north @ right)
 
@@ -561,7 +561,7 @@ class Footprints:
         """Half height and half width of the bounding box of each footprint, shape (n_pixels,). [cell]"""
         back = np.linalg.inv(self.frame)
         half = np.array([self.along.half_width, self.across.half_width])
-        # Pieces that touch the footprint from outside have a share, too.
+        # Pieces that touch the footprint from outside also have a weight.
         return np.moveaxis(np.abs(back) @ half, -1, 0) + 1
 
     def window(self, shape):
@@ -676,7 +676,7 @@ def _in_frame(frame, down, right):
 
 @compiled
 def _cell_weight(i, j, row, column, frame, n, a, b, along, across):
-    # Most cells of the box lie beyond the footprint's turned sides.
+    # Most cells of the box lie outside the rotated footprint.
     u, v = _in_frame(frame, i + 0.5 - row, j + 0.5 - column)
     if abs(u) > along.half + 2 * n * a or abs(v) > across.half + 2 * n * b:
         return 0.0

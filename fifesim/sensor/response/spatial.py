@@ -15,7 +15,7 @@ from scipy.special import ndtr, spherical_jn
 from fifesim.base.caches import cached
 from fifesim.base.footprints import FiniteSpread, LineSpread, Transfer
 
-# Standard deviations at which a Gaussian is cut: 2e-9 of it lie beyond.
+# Standard deviations at which a Gaussian is truncated; 2e-9 of its integral lies beyond.
 _GAUSSIAN_REACH = 6.0
 
 
@@ -212,14 +212,14 @@ class AggregatedSpread(LineSpread):
         return self.sample.mtf(frequency) * np.cos(2 * np.pi * frequency[..., None] * self._places).mean(axis=-1)
 
 
-# Samples of the tabulated response over its equivalent width, and the periods of the transform that are tried, in the
-# same widths. What lies beyond half a period folds back into it: of a response that decays as x^-2 about 1 % of the
-# share that is cut at a sixteenth of the period.
+# Samples of the tabulated response per equivalent width, and tried periods of the transform in equivalent widths. The
+# response beyond half a period is aliased: for a response that decays as x^-2, about 1 % of the share that is truncated
+# at a sixteenth of the period.
 _SAMPLES = 128
 _PERIODS = (64, 512, 4096, 16384)
 _CUT = 16
 
-# Share of a sinusoid at the end of the sampled frequencies above which the response has jumps that no table holds.
+# Transfer at the largest sampled frequency above which the response has jumps and cannot be tabulated.
 _JUMP = 1e-3
 
 

@@ -8,7 +8,7 @@ from fifesim.base.bands import solar_spectrum
 
 # A step between samples is a gap from this many times the median of the steps around it, where no widths are known.
 _GAP = 2.5
-# Number of steps to either side whose median is the usual step.
+# Number of steps on each side for the median step.
 _AROUND = 2
 
 
@@ -44,7 +44,7 @@ def covered_steps(wavelength, fwhm=None):
     steps = np.diff(wavelength)
     if fwhm is not None:
         fwhm = np.asarray(fwhm, float)
-        # Differences of decimal fractions miss their sum by rounding.
+        # Differences of decimal fractions have rounding errors.
         return steps <= (fwhm[1:] + fwhm[:-1]) * (1 + 1e-6)
     places = [slice(max(at - _AROUND, 0), at + _AROUND + 1) for at in range(steps.size)]
     usual = np.array([np.median(steps[place]) for place in places])
@@ -113,8 +113,8 @@ def _runs(nodes, chosen):
     return tuple((float(nodes[first]), float(nodes[last])) for first, last in edges.reshape(-1, 2))
 
 
-# Share [1] and reflectance [1] of grey surfaces beside a library of land: roads, roofs and clouds stay about what they
-# are. A tenth of it would leave a road of 0.2 at 0.196 in TM5.
+# Share [1] and reflectance [1] of grey surfaces added to the land library, so that roads, roofs and clouds keep their
+# reflectance. With a tenth of this share, a road of 0.2 would become 0.196 in TM5.
 GREY_SHARE = 0.01
 GREY = 0.3
 
@@ -137,16 +137,16 @@ class Line(NamedTuple):
 
 def best_linear(source, target, uncertainty):
     r"""
-    Best linear estimate of bands from other bands over a library, and its error in spectra of leaves that it lacks.
+    Best linear estimate of bands from other bands over a library, and its error for leaves outside the library.
 
     .. math::
 
         B = C_{ts} \, (C_{ss} + u^2 I)^{-1}, \quad C = \frac{1}{N} \sum_n \rho_n \rho_n^T + g \, \rho_g^2, \quad
         e_t^2 = \frac{1}{N} \sum_n (\rho_t - B_{(n)} \rho_s)_n^2 + u^2 \sum_s B_{ts}^2
 
-    with a share :math:`g = 0.01` of grey surfaces of :math:`\rho_g = 0.3`, and :math:`B_{(n)}` the estimate from the
-    spectra of all other leaves than that of spectrum n. There is no offset: a black surface is black in all bands, and
-    half the light is half the reflectance.
+    with a share :math:`g = 0.01` of grey surfaces of :math:`\rho_g = 0.3`, and :math:`B_{(n)}` the estimate without the
+    spectra of the leaf of spectrum n. There is no offset: a black surface is black in all bands, and half the light is
+    half the reflectance.
 
     Parameters
     ----------
