@@ -73,7 +73,7 @@ def surroundings_of(array):
 
 @pytest.mark.parametrize("vza", [0.0, 40.0])
 @pytest.mark.parametrize("kind", ["mean", "number", "bands", "raster"])
-def test_uniform_ground_is_its_own_environment(scene, kind, vza):
+def test_environment_of_uniform_ground_is_uniform(scene, kind, vza):
     flat = xr.full_like(scene, 0.3).where(scene.notnull())
     around = {"mean": None, "number": 0.3, "bands": [0.3, 0.3], "raster": surroundings_of(scene) * 0 + 0.3}[kind]
     np.testing.assert_allclose(environment(flat, around, vza), 0.3, rtol=0, atol=1e-14)
