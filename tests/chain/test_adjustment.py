@@ -192,6 +192,7 @@ def test_fewer_bands_state_larger_errors(msi):
         (lambda msi: msi.drop_attrs(), {}, "the instrument of the raster is unknown"),
         (lambda msi: msi.isel(band=2), {}, "needs a dimension band"),
         (lambda msi: msi.fifesim.to_toa(), {}, "surface reflectance factor is needed"),
+        (lambda msi: msi.copy(data=100 * msi.values), {}, "it is a fraction"),
         (lambda msi: msi, {"uncertainty": 0.0}, "uncertainty must be above 0"),
         (lambda msi: msi, {"source": "SPOT"}, "SPOT"),
     ],

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 
 import fifesim
 from fifesim.chain.driver import Driver
@@ -118,6 +119,18 @@ def test_spectra_outside_the_training_are_flagged(retrieval, image):
 
 def test_ends_of_intervals_are_ordered_around_the_median():
     np.testing.assert_allclose(methods.probabilities_of((0.5, 0.8)), [0.1, 0.25, 0.5, 0.75, 0.9])
+
+
+def test_quantiles_of_a_network_are_sorted_and_give_the_standard_deviation():
+    """A normal distribution of standard deviation 3 has the interval whose level is nearest to 68 %."""
+    levels, normal = (0.5, 0.8, 0.95), stats.norm.ppf([0.025, 0.1, 0.25, 0.5, 0.75, 0.9, 0.975])
+    outputs = normal * [2, 1, 1.5, 1, 1.5, 1, 2]
+    tables = {"weight0": np.zeros((5, 7)), "bias0": outputs[::-1], "input_mean": 0.0, "input_spread": 1.0}
+    tables |= {"centre": np.array([2.0]), "scale": np.array([3.0])}
+    found = methods.by_quantiles(tables, np.full((4, 2), 0.2), np.zeros((4, 3)), levels)
+    np.testing.assert_allclose(found.quantiles, np.full((4, 1, 7), 2 + 3 * outputs))
+    np.testing.assert_allclose(np.stack([found.median, found.sd], axis=-1), np.full((4, 1, 2), (2.0, 3.0)))
+    assert methods.ends_of(found.quantiles, levels, 0.8)[0][0, 0] == pytest.approx(2 + 3 * normal[1])
 
 
 def test_stretch_factors_weight_landscapes_equally():

@@ -53,6 +53,8 @@ def test_rows_of_the_table_are_in_the_order_of_the_paper(found, tables):
             assert row["paper_slope"] == float(found["paper_slope"].sel(place))
             three = found["slope"].sel(reading=name).sel(place).values
             assert row["slope_deviation"] == pytest.approx(np.sqrt(np.sum((three - three.mean()) ** 2) / 2), rel=1e-9)
+            samples = found["slope_200"].sel(reading=name).sel(place).values.ravel()
+            assert row["slope_deviation_200"] == pytest.approx(np.std(samples, ddof=1), rel=1e-9)
 
 
 def test_samples_of_200_have_the_theoretical_scatter(tables):

@@ -314,6 +314,15 @@ def test_band_without_mean_view_raises(tmp_path):
     assert float(both["vza"]) == pytest.approx(products.MEAN_VIEWS["2"][0], abs=1e-9)
 
 
+def test_impossible_solar_irradiance_raises(tmp_path):
+    path, _ = products.sentinel2(tmp_path, 1)
+    file = path / "MTD_MSIL1C.xml"
+    file.write_text(file.read_text(encoding="utf-8").replace("1512.06", "151.206"), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"the scale of MSI4 .* means a solar irradiance of 151"):
+        fifesim.open_sentinel2(path, 10)
+    assert fifesim.open_sentinel2(path, 10, instrument="MSI-B").sizes["band"] == 4
+
+
 def test_instrument_argument_is_used_for_another_spacecraft(tmp_path):
     path, _ = products.sentinel2(tmp_path, 1, "05.11", spacecraft="Sentinel-2C")
     said = "is of Sentinel-2C, whose responses fifesim does not have: give instrument='MSI-C'"
