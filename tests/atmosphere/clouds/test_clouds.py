@@ -7,9 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from scipy.interpolate import BSpline
 
 import fifesim
-from fifesim.atmosphere.clouds import layer
+from fifesim.atmosphere.clouds import field, layer
 from fifesim.atmosphere.clouds.field import PERIOD, CloudCover, cloud_displacement, cloud_thickness
 from fifesim.atmosphere.clouds.layer import clouded_reflectance, layer_light, two_stream_reflectance
 from fifesim.atmosphere.successive_orders import flux_transmittance
@@ -264,6 +265,15 @@ def test_correlation_is_5_percent_at_the_correlation_length():
     sign = np.sign(cloud_thickness(CloudCover(0.5, (8.0, 6.0), 2000.0, 5), place, place) - 1e-9)
     found = np.mean(sign * np.roll(sign, 20, axis=0)), np.mean(sign * np.roll(sign, 20, axis=1))
     np.testing.assert_allclose(found, 2 / np.pi * np.arcsin(0.05), atol=0.03)
+
+
+def test_weights_of_lattice_nodes_are_cubic_b_splines():
+    """The basis function of scipy, scaled so that the squares sum to one."""
+    place = np.arange(0, PERIOD, PERIOD // 64)
+    node, weights = field._spline(place, 4)
+    basis = BSpline.basis_element(np.arange(-2.0, 3.0), extrapolate=False)
+    expected = np.nan_to_num(basis(place * 4 / PERIOD + 1 - node - np.arange(4)[:, None]))
+    np.testing.assert_allclose(weights, expected / np.sqrt((expected**2).sum(axis=0)), rtol=0, atol=1e-12)
 
 
 def test_clouds_do_not_depend_on_window_chunks_or_cell_size_and_drift(site):
