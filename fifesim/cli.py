@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from fifesim.output.terminal import Commands, Exit, Quiet, Verbose, importing, kept, print_lines, report, stop
+from fifesim.output.terminal import (
+    Commands,
+    Exit,
+    Quiet,
+    Verbose,
+    exit_with_error,
+    importing,
+    kept,
+    print_lines,
+    report,
+)
 
 app = typer.Typer(
     cls=Commands,
@@ -369,7 +379,7 @@ def verify_command():
             print_lines(text)
     except FileNotFoundError as error:
         # A table missing from the installation is a failure, not an invalid request.
-        stop(error, Exit.FAILURE)
+        exit_with_error(error, Exit.FAILURE)
     print_lines(deviation_summary(found))
     if not all(deviation.within for deviation in found):
         raise typer.Exit(Exit.FAILURE)

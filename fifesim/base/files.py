@@ -14,8 +14,8 @@ from fifesim.base.caches import cached
 
 # Larger than any scenario or instrument file, and read in a second. [byte]
 _LARGEST = 1_000_000
-# Tables within tables in one dotted key, for which tomllib takes the square of their number in time. The dots of a path
-# lie beside slashes.
+# Most nested tables in one dotted key; tomllib takes time quadratic in their number. Dots next to slashes belong to
+# paths and do not count.
 _DEEPEST = 100
 _DOT_OF_KEY = re.compile(r"[\w\"'-][ \t]*\.(?=[ \t]*[\w\"'-])")
 

@@ -234,7 +234,7 @@ class RPV:
     ----------
     rho0, k, theta, rhoc : number, sequence or xarray.DataArray
         Parameters of `fifesim.base.surface_kernels.rpv`: a number, one for each band, or a raster over ([band], y, x).
-        Of rasters, each different set of k, theta and rhoc takes 2 ms. [1]
+        Each different set of k, theta and rhoc in rasters takes 2 ms. [1]
 
     Examples
     --------

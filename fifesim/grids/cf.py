@@ -162,7 +162,7 @@ _LONG_NAMES = {quantity.standard_name: quantity.long_name for quantity in QUANTI
 TIME_ATTRIBUTES = {"standard_name": "time", "long_name": "time, UTC"}
 """Attributes of a coordinate of times; units are the dates' own."""
 
-# Attributes that are copied from inputs to results; others are replaced.
+# Attributes copied from inputs to results; all other attributes are replaced.
 PROVENANCE = (
     "site", "rng_seed", "arp", "lai_distribution", "method", "leaf_angles", "background", "soil", "moisture",
     "atmosphere", "instrument", "instrument_description", "recorded_by", "composite",
@@ -239,7 +239,7 @@ def check_quantity(array, *names):
 
 
 def check_words(raster, texts, name, units=""):
-    """Raise ValueError if metadata clearly name another quantity; unknown ones pass, and what is no text."""
+    """Raise ValueError if metadata clearly name another quantity; unknown names and values that are no text pass."""
     for text in texts:
         if not isinstance(text, str):
             continue

@@ -307,14 +307,14 @@ _asked = Lock()
 def _computed(sealed):
     """Values of arrays, computed once by all threads of a process."""
     if sum(array.size for array in sealed.arrays) > _FEW:
-        return _made(sealed)
+        return _compute_arrays(sealed)
     with _asked:
         found = _known.get(sealed.name)
         if mine := found is None:
             found = _known[sealed.name] = Future()
     if mine:
         try:
-            found.set_result(_made(sealed))
+            found.set_result(_compute_arrays(sealed))
         except BaseException as error:
             with _asked:
                 _known.pop(sealed.name, None)
@@ -322,7 +322,7 @@ def _computed(sealed):
     return tuple(each.copy() for each in found.result())
 
 
-def _made(sealed):
+def _compute_arrays(sealed):
     # This thread belongs to a scheduler; another scheduler in it would deadlock.
     return dask.compute(*sealed.arrays, scheduler="synchronous")
 

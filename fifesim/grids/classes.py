@@ -1,4 +1,4 @@
-"""Evaluation by class of a raster: each class computes its own cells only."""
+"""Evaluation by class of a raster: each class computes only its cells."""
 
 import math
 from functools import partial

@@ -104,7 +104,7 @@ def _within(longitude, latitude):
         return False
     crs, west, north = SITE_CORNERS["NAD83"]
     x, y = projection.transformer(4326, crs).transform(longitude, latitude)
-    # The corner of one datum is 9 m from that of the other.
+    # The corners in the two datums lie 9 m apart.
     return max(abs(x - west - SITE_SIZE / 2), abs(y - north + SITE_SIZE / 2)) <= SITE_SIZE / 2 + 10
 
 

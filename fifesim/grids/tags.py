@@ -229,15 +229,15 @@ def tag_of(array, dims, layers=()):
         "dtype": array.dtype.str,
         "attrs": {key: _plain(value) for key, value in array.attrs.items() if not _is_implied(key, value, array)},
         "coords": {
-            name: {"dims": list(value.dims), "values": _plain(value.values)} | _type_of(value)
+            name: {"dims": list(value.dims), "values": _plain(value.values)} | _dtype_and_attrs(value)
             for name, value in array.coords.items()
             if not {"y", "x"} & set(value.dims) and name != "spatial_ref"
         },
-        "layers": {name: _type_of(array[name]) for name in layers},
+        "layers": {name: _dtype_and_attrs(array[name]) for name in layers},
     }
 
 
-def _type_of(coordinate):
+def _dtype_and_attrs(coordinate):
     return {"dtype": coordinate.dtype.str, "attrs": dict(coordinate.attrs)}
 
 

@@ -79,7 +79,7 @@ def held(array):
 
 
 def alone(array):
-    """Lazy array with a graph reduced to its own tasks and what they need."""
+    """Lazy array with a graph reduced to its tasks and their dependencies."""
     graph = {array.name: array.dask.cull(array.__dask_keys__()).to_dict()}
     return da.Array(HighLevelGraph(graph, {array.name: set()}), array.name, array.chunks, meta=array._meta)
 
@@ -228,7 +228,7 @@ _ORIGINS = {}
 """Origins by graph and name of dask arrays, as long as the graphs live."""
 
 
-def made_of(raster, origin):
+def with_origin(raster, origin):
     """The same lazy raster with a known origin, which is lost when values change."""
     key = _identity(raster)
     _ORIGINS[key] = origin
@@ -238,7 +238,7 @@ def made_of(raster, origin):
 
 
 def origin_of(raster):
-    """Origin of a raster given to `made_of`, or None."""
+    """Origin of a raster given to `with_origin`, or None."""
     return None if raster.chunks is None else _ORIGINS.get(_identity(raster))
 
 

@@ -44,7 +44,7 @@ def check_folder(folder, overwrite, resume=False, names=None):
     whole = bool(names) and not begun and all((folder / name).exists() for name in names)
     finished = resume and not overwrite and whole
     if (folder / UNFINISHED).is_dir():
-        with _held(folder) as hidden:
+        with _locked_hidden_folder(folder) as hidden:
             if finished:
                 # Remains of a run that was killed after moving its last file.
                 _empty(hidden)
@@ -73,7 +73,7 @@ def results(folder, names, *, overwrite=False, resume=False, worth_keeping=None,
     existed = folder.is_dir()
     (folder / UNFINISHED).mkdir(parents=True, exist_ok=True)
     try:
-        with _held(folder) as hidden:
+        with _locked_hidden_folder(folder) as hidden:
             _check_contents(folder, overwrite, resume)
             if resume:
                 # The run makes the files again that were replaced by links or devices.
@@ -110,7 +110,7 @@ def errors_with_their_file(folder):
 
 
 @contextmanager
-def _held(folder):
+def _locked_hidden_folder(folder):
     """Hidden folder of a run, locked until this process ends, and removed if it remains empty."""
     hidden = folder / UNFINISHED
     holder = hidden / _HOLDER

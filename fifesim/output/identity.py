@@ -17,11 +17,11 @@ SCENARIO_TAG, PRODUCT, VERSIONS = "FIFESIM_SCENARIO", "FIFESIM_PRODUCT", "FIFESI
 def origin_tags(scenario, product, folder):
     """Tags by which a file of a run can be reproduced."""
     home = os.path.abspath(folder)
-    text = write_scenario(scenario.with_paths(lambda path: _beside(path, home)))
+    text = write_scenario(scenario.with_paths(lambda path: _relative_path(path, home)))
     return {SCENARIO_TAG: text, PRODUCT: product, VERSIONS: json.dumps(versions())}
 
 
-def _beside(path, home):
+def _relative_path(path, home):
     """Path relative to a folder; virtual files of GDAL and paths on other drives stay."""
     if not os.path.isfile(path):
         return path

@@ -343,7 +343,7 @@ def write_style(path: FilePath, *, overwrite: bool = False) -> Path:
 
 
 def rendered(template, filters=MappingProxyType({}), **values):
-    """Text of a template with values; templates may include those of this folder."""
+    """Text of a template with values; it may include other templates of this folder."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader([template.parent, Path(__file__).parent]),
         autoescape=True,

@@ -105,7 +105,7 @@ def steps(sequence, label):
 
 
 @contextmanager
-def doing(label):
+def spinner(label):
     """Context with a spinner on a terminal or in a notebook, for work of unknown length."""
     LOG.info(label)
     with _bar(progress.SpinnerColumn(), _LABEL, progress.TimeElapsedColumn()) as bar:

@@ -208,7 +208,7 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
     # Pixels and their truth are paired by row and column.
     step = -(-max(rasters.sizes[axis] for rasters in (image, truth) for axis in ("y", "x")) // _MOST)
     shown, means = _thinned(image, step), _thinned(truth, step)
-    whole, *close = _seen(shown, image, detail)
+    whole, *close = _overview_maps(shown, image, detail)
     figures = {name: png(fit_figure(shown, means, name, fit), _DPI) for name, fit in fits.items()}
     html = page_html(
         _TEMPLATE,
@@ -328,7 +328,7 @@ def pairing(scenario, image, truth):
     return text + "."
 
 
-def _seen(shown, image, detail):
+def _overview_maps(shown, image, detail):
     """Maps of the whole image, of the cells in its middle, and of the pixels over them."""
     box = grids.geobox(detail).boundingbox
     part = image.sel(x=slice(box.left, box.right), y=slice(box.top, box.bottom)).compute()

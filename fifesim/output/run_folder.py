@@ -25,7 +25,7 @@ from fifesim.grids.reductions import computed
 from fifesim.output import identity, products, report, stac, workers
 from fifesim.output.folders import check_folder, errors_with_their_file, results
 from fifesim.output.maps import write_style
-from fifesim.output.progress import Progress, doing, memory, steps
+from fifesim.output.progress import Progress, memory, spinner, steps
 from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.simulation import simulate
@@ -98,7 +98,7 @@ def simulate_to_folder(
         _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads, as_json)
         # The function instead of its name, with which dask would import distributed.
         scheduler = {"scheduler": dask.threaded.get, "num_workers": threads}
-        with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}), doing("writing files and report"):
+        with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}), spinner("writing files and report"):
             _write_files(complete, tree, found, unfinished, folder if home is None else home)
         identity.check_inputs(json.loads(state[identity.STATE])["inputs"], identity.inputs_of(complete))
     LOG.info("wrote %s into %s", ", ".join(names), folder)
@@ -232,7 +232,7 @@ def estimate(scenario, folder=".", *, threads=None, scene=False, start=0.0):
         "tasks": len(graph),
         "threads": threads,
         "memory": round(_SPREAD + before + (peak - before) * _growth(len(lai.chunks[-1]))),
-        "disk": round(workers.disk_of(complete, scene)[1]),
+        "disk": round(workers.disk_space(complete, scene)[1]),
         "seconds": start + once + _SLACK * (lai.size - cells) / rate,
     }
 

@@ -78,15 +78,15 @@ class Commands(TyperGroup):
                 raise KeyboardInterrupt
             sys.exit(code)
         except (KeyboardInterrupt, typer.Abort):
-            stop("interrupted; nothing was written", Exit.INTERRUPTED)
+            exit_with_error("interrupted; nothing was written", Exit.INTERRUPTED)
         except _UsageError as error:
             error.message = in_a_line(error.message)
             error.show()
             sys.exit(error.exit_code)
         except (ValueError, FileNotFoundError, IsADirectoryError) as error:
-            stop(error, Exit.MISTAKE)
+            exit_with_error(error, Exit.MISTAKE)
         except (OSError, MemoryError, RuntimeError, ImportError) as error:
-            stop(error or "out of memory", Exit.FAILURE)
+            exit_with_error(error or "out of memory", Exit.FAILURE)
 
 
 def _be_quiet(context: typer.Context, wanted: bool):
@@ -166,7 +166,7 @@ def kept(output):
             if output.exists()
             else "nothing was written"
         )
-        stop(f"interrupted; {left}", Exit.INTERRUPTED)
+        exit_with_error(f"interrupted; {left}", Exit.INTERRUPTED)
 
 
 def report(files, seconds, look, as_json=False, finished=False):
@@ -188,7 +188,7 @@ def in_time(seconds):
     return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
 
 
-def stop(error, code):
+def exit_with_error(error, code):
     """Exit with a message and a code."""
     lines = str(error).split("\n")
     length = max(_LONGEST // len(lines), _SHORTEST)

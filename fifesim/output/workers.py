@@ -35,8 +35,8 @@ _TRUTH = 16
 _COPIES = 3.4
 
 
-def disk_of(scenario, scene=False):
-    """Disk that a run needs while it computes: for blocks alone, and with files and scene products in full. [byte]"""
+def disk_space(scenario, scene=False):
+    """Disk space of a run [byte]: for blocks alone, and including files and scene products."""
     bands = len(scenario.sensor.bands)
     blocks = _pixels(scenario) * (bands * math.ceil(scenario.sensor.description.bits / 8) + _TRUTH)
     return blocks, _COPIES * blocks + (_cells(scenario) * 8 * (bands + 2) if scene else 0)
@@ -49,7 +49,7 @@ def check_size(scenario, folder):
     memory = cells / FIELD_TILE**2 * _GRAPH + at_once * _CELL, psutil.virtual_memory().available / 2
     folder = Path(folder).absolute()
     place = next(parent for parent in (folder, *folder.parents) if parent.exists())
-    disk = disk_of(scenario)[0], shutil.disk_usage(place).free
+    disk = disk_space(scenario)[0], shutil.disk_usage(place).free
     if not disk[1]:
         raise OSError(f"{os.strerror(errno.ENOSPC)} in {place}: name another output folder with -o")
     for kind, problem, (needed, free) in (

@@ -167,7 +167,7 @@ def _driver(scenario, setup):
     if scenario.files:
         # The content of a file may change while its name stays the same.
         return Driver(setup)
-    return _known(_Keyed((scenario.model_dump_json(exclude=others), setup.geometry), setup))
+    return _cached_driver(_Keyed((scenario.model_dump_json(exclude=others), setup.geometry), setup))
 
 
 @dataclass(frozen=True)
@@ -179,5 +179,5 @@ class _Keyed:
 
 
 @cached(32, "kernels of setups")
-def _known(keyed):
+def _cached_driver(keyed):
     return Driver(keyed.setup)

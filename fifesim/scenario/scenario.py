@@ -556,7 +556,7 @@ def find_key(name, called="the axis"):
         tables, parts = [parts[:2]], parts[2:]
     elif parts[:1] in tables and len(parts) > 1:
         tables, parts = [parts[:1]], parts[1:]
-    found = [NamedKey(table, *parts) for table in tables if _has(Keys.section(table), parts)]
+    found = [NamedKey(table, *parts) for table in tables if _section_has_key(Keys.section(table), parts)]
     if len(found) == 1:
         return found[0]
     if found:
@@ -569,7 +569,7 @@ def find_key(name, called="the axis"):
     raise ValueError(f"{called} {shown(name)} is not a key of a scenario: {hint}`fifesim scenario` lists all keys")
 
 
-def _has(section, parts):
+def _section_has_key(section, parts):
     """Whether a section has a key, and, if an entry is named, whether the key has entries."""
     if section is None or not parts or parts[0] not in section.model_fields or "" in parts:
         return False

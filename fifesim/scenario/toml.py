@@ -69,7 +69,7 @@ def mistakes(error, values, model):
         for item in unknown:
             *place, key = item["loc"]
             table = reduce(lambda found, name: found[name], place, rest)
-            table.setdefault(closest(key, _known(item["loc"])) or key, table.pop(key))
+            table.setdefault(closest(key, _section_keys(item["loc"])) or key, table.pop(key))
             table.pop(key, None)
         try:
             model(**rest)
@@ -139,7 +139,7 @@ def _described(section):
     return table
 
 
-def _known(place):
+def _section_keys(place):
     """Names of the keys in the section of a key."""
     return list(((Keys.section(place[:-1]) if len(place) > 1 else None) or Keys).model_fields)
 
@@ -149,7 +149,7 @@ def _explain(error):
     place, value = [str(part) for part in error["loc"]], error["input"]
     key = in_a_line(".".join(place), 100)
     if error["type"] == "extra_forbidden":
-        known = _known(place)
+        known = _section_keys(place)
         hint = nearest(place[-1], known)
         return in_a_line(f"unknown key {key} = {shown(value)}: {hint}allowed are {', '.join(known)}")
     message = str(error["ctx"]["error"]) if error["type"] == "value_error" else in_own_words(error)

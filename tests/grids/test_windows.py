@@ -13,7 +13,7 @@ from lazy import no_compute
 import fifesim
 from fifesim.grids import grid as grids
 from fifesim.grids import windows
-from fifesim.grids.windows import _ORIGINS, array_by_place, array_from_windows, gather, held, made_of, origin_of
+from fifesim.grids.windows import _ORIGINS, array_by_place, array_from_windows, gather, held, origin_of, with_origin
 
 CELLS = np.arange(11.0 * 13).reshape(11, 13)
 
@@ -171,14 +171,14 @@ def raster(chunks):
 
 
 def test_origin_is_kept_with_unchanged_values():
-    made = made_of(raster(2), "leaves")
+    made = with_origin(raster(2), "leaves")
     assert origin_of(made) == "leaves" and origin_of(made.compute()) is None
     assert origin_of(made.assign_coords(sza=30.0).rename("other")) == "leaves"
     assert origin_of(made + 1) is None and origin_of(made[1:]) is None and origin_of(made.persist()) is None
 
 
 def test_origin_is_released_with_its_raster():
-    made = made_of(raster(2), "leaves")
+    made = with_origin(raster(2), "leaves")
     key = id(made.data.dask), made.data.name
     assert key in _ORIGINS
     del made

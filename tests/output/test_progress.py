@@ -9,7 +9,7 @@ import pytest
 
 from fifesim.base.messages import quiet
 from fifesim.output import progress
-from fifesim.output.progress import Progress, doing, since_start, steps
+from fifesim.output.progress import Progress, since_start, spinner, steps
 
 
 def test_json_lines_report_progress(capsys):
@@ -43,7 +43,7 @@ def test_short_run_without_a_terminal_prints_nothing(capsys):
     with Progress("simulating", "cells", 2) as progress:
         progress.advance(2)
     assert list(steps([1, 2], "counting")) == [1, 2]
-    with doing("a report"):
+    with spinner("a report"):
         pass
     assert capsys.readouterr() == ("", "")
 

@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from fifesim.base.messages import LOG, quiet
-from fifesim.output.terminal import Exit, in_time, interrupts_blocked, listening, print_lines, report, stop
+from fifesim.output.terminal import Exit, exit_with_error, in_time, interrupts_blocked, listening, print_lines, report
 
 
 def test_last_line_gives_the_duration_and_the_file_to_open(capsys):
@@ -47,7 +47,7 @@ def test_control_characters_are_escaped(capsys):
 @pytest.mark.parametrize("code", Exit)
 def test_error_gives_its_exit_code_and_at_most_500_characters(code, capsys):
     with pytest.raises(SystemExit) as caught:
-        stop(ValueError("x" * 2000), code)
+        exit_with_error(ValueError("x" * 2000), code)
     assert caught.value.code == code
     said = capsys.readouterr().err
     assert said.startswith("fifesim: xxx") and len(said) <= 501

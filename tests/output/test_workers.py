@@ -30,7 +30,7 @@ from fifesim.output.workers import (
     check_memory_of_cells,
     check_size,
     cluster,
-    disk_of,
+    disk_space,
     run_on_client,
     run_on_threads,
     tasks_of,
@@ -193,7 +193,7 @@ def test_scene_too_large_for_memory_is_rejected_with_a_size_that_fits(tmp_path, 
 def test_disk_that_is_too_small_is_named(tmp_path, monkeypatch):
     """On a full disk no scene fits, so the message suggests another folder."""
     scenario = complete_flat_scenario()
-    least, most = disk_of(scenario)
+    least, most = disk_space(scenario)
     assert least == pytest.approx(500**2 * (2 + 16), rel=0.01) and most == 3.4 * least
     free = {"now": 10**9}
     monkeypatch.setattr(workers.shutil, "disk_usage", lambda path: namedtuple("Usage", "free")(free["now"]))

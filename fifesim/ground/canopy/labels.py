@@ -15,7 +15,7 @@ from fifesim.grids import grid as grids
 from fifesim.grids.classes import by_class
 from fifesim.grids.grid import north_up, with_crs_of
 from fifesim.grids.inputs import unpacked
-from fifesim.grids.windows import made_of
+from fifesim.grids.windows import with_origin
 from fifesim.ground.canopy import layers
 from fifesim.ground.canopy.crowns import SHAPE, check_crowns, crown_shares, lai_in_crowns
 from fifesim.ground.canopy.description import Canopy
@@ -209,7 +209,7 @@ def level_reflectance(lai, bands, stand, light, exact=False, attrs=MappingProxyT
     attrs = {"background": below} | dict(attrs)
     shares, angles = shares_in_words(stand.canopy), stand.canopy.leaf_angle_distribution.name
     out = _labelled(out, lai, bands, light.geometry, angles, shares, attrs, _NAMES[stand.canopy.model])
-    return out if out.chunks is None else made_of(out, even_canopy(lai, stand, light, exact))
+    return out if out.chunks is None else with_origin(out, even_canopy(lai, stand, light, exact))
 
 
 def reflectance_of_classes(lai, cover, bands, stands, light, exact=False, attrs=MappingProxyType({})):

@@ -108,7 +108,7 @@ def made_shards(chips, layout, shards, wanted, advance, makers=None):
     """Iterate over shards and their arrays as they are finished."""
     jobs, begun = jobs_of(chips, shards, wanted, 1 if makers is None else makers.number), {}
     here = ((job, chip_arrays(chips, job, layout)) for job in jobs)
-    for job, arrays in here if makers is None else _made(makers, chips, jobs, layout):
+    for job, arrays in here if makers is None else _finished_jobs(makers, chips, jobs, layout):
         of = shards.shard_of(job)
         for shard in np.unique(of).tolist():
             first, last = shards.range_of(shard)
@@ -123,8 +123,8 @@ def made_shards(chips, layout, shards, wanted, advance, makers=None):
         advance(len(job))
 
 
-def _made(makers, chips, jobs, layout):
-    """Jobs and the arrays of their chips, in the order in which they are done."""
+def _finished_jobs(makers, chips, jobs, layout):
+    """Jobs and the arrays of their chips, in order of completion."""
     known, waiting, working = pickle.dumps((chips.study, len(chips))), iter(jobs), {}
     try:
         while True:

@@ -173,8 +173,8 @@ def make_store(folder, chips, layout, shards):
     fresh = folder / "fresh.partial"
     shutil.rmtree(fresh, ignore_errors=True)
     table = chips.table()
-    group = zarr.create_group(fresh, zarr_format=3, attributes=_about(chips, layout, table))
-    for name, (dims, values, attributes) in _known(chips, layout, table).items():
+    group = zarr.create_group(fresh, zarr_format=3, attributes=_global_attributes(chips, layout, table))
+    for name, (dims, values, attributes) in _known_variables(chips, layout, table).items():
         dtype, shape = str if values.dtype == object else values.dtype, values.shape
         array = group.create_array(
             name, shape=shape, dtype=dtype, chunks=shape, dimension_names=dims, attributes=attributes
@@ -211,7 +211,7 @@ def make_store(folder, chips, layout, shards):
 
 def stored_names(chips, layout):
     """Names of the arrays of a store, which are folders."""
-    return [*_known(chips, layout, chips.table()), *layout.variables]
+    return [*_known_variables(chips, layout, chips.table()), *layout.variables]
 
 
 def chips_in(folder):
@@ -245,8 +245,8 @@ def _file(path):
     return path
 
 
-def _known(chips, layout, table):
-    """Dimensions, values and attributes of all variables known before chips are made, by name."""
+def _known_variables(chips, layout, table):
+    """Dimensions, values and attributes of all variables known before chips are computed, by name."""
     down, across = ((np.arange(size) + 0.5) * layout.pixel for size in layout.pixels)
     found = {"chip": (("chip",), table["chip"].values, {"long_name": "number of the chip"})}
     for name, word, values in (("y", "northing", -down), ("x", "easting", across)):
@@ -261,7 +261,7 @@ def _known(chips, layout, table):
     return found | {str(name): (("chip",), each.values, each.attrs) for name, each in table.data_vars.items()}
 
 
-def _about(chips, layout, table):
+def _global_attributes(chips, layout, table):
     """Global attributes of the dataset."""
     study, (rows, columns) = chips.study, layout.pixels
     of_bands = (name for name in layout.bands.coords if name != "band")
