@@ -179,7 +179,7 @@ def hold_folder(folder, ready, end):
 
 @pytest.fixture
 def rival(tmp_path):
-    """A process that holds the folder until it is told to end."""
+    """A process that holds the folder until it receives the signal to end."""
     spawn = multiprocessing.get_context("spawn")
     ready, end = spawn.Event(), spawn.Event()
     process = spawn.Process(target=hold_folder, args=(tmp_path / "out", ready, end))

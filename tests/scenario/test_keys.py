@@ -1,4 +1,4 @@
-"""Keys: what is spelled, and what is left to physics."""
+"""Keys of a scenario: spelling, units and files."""
 
 import subprocess
 import sys

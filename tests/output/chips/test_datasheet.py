@@ -1,4 +1,4 @@
-"""The datasheet says what the dataset holds."""
+"""The datasheet describes the contents of a dataset."""
 
 import html
 import re
@@ -34,7 +34,7 @@ def dataset(chips):
     return found.assign_attrs(title="11 simulated chips")
 
 
-def test_ranges_are_those_of_all_chips(dataset, chips):
+def test_ranges_cover_all_chips(dataset, chips):
     (found,) = datasheet.ranges_of(dataset, 4).values()
     values = dataset["lai"].values.astype(float)
     assert (found["least"], found["greatest"]) == (np.nanmin(values), np.nanmax(values))
@@ -49,7 +49,7 @@ def page(dataset, chips):
     return datasheet.datasheet_page(dataset, chips, datasheet.ranges_of(dataset, 4), b"picture")
 
 
-def test_page_names_what_is_drawn_and_how(page, chips):
+def test_page_lists_the_distributions_of_drawn_parameters(page, chips):
     for name in ("atmosphere.visibility", "ground.distribution", "ground.seed"):
         assert f"<code>{name}</code>" in page
     row = re.search(r"<code>atmosphere\.visibility</code>.*?</tr>", page, re.S)[0]
@@ -68,7 +68,7 @@ def test_page_counts_chips_and_landscapes(page, chips):
 
 
 @pytest.mark.parametrize(("count", "said"), [(1, "<b>{} have none</b>"), (2, "<b>{} has none</b>"), (3, None)])
-def test_page_says_why_a_part_has_no_chips(count, said, dataset):
+def test_page_explains_a_part_without_chips(count, said, dataset):
     chips = chips_of(Study(parse_scenario(SMALL), DRAWS, landscapes=3), count)
     part = dataset.isel(chip=range(count))
     page = datasheet.datasheet_page(part, chips, datasheet.ranges_of(part, 4), b"")
@@ -82,7 +82,7 @@ def test_page_is_self_contained_and_has_the_study(page, chips):
     assert chips.study.to_toml() in html.unescape(page)
 
 
-def dataset_of(bands, wavelengths, names=("lai", "fpar"), chips=7):
+def make_dataset(bands, wavelengths, names=("lai", "fpar"), chips=7):
     generator = np.random.default_rng(0)
     rasters = {name: (("chip", "y", "x"), generator.random((chips, 5, 4))) for name in (*names, "ndvi")}
     reflectance = ("chip", "band", "y", "x"), generator.random((chips, len(bands), 5, 4))
@@ -91,23 +91,23 @@ def dataset_of(bands, wavelengths, names=("lai", "fpar"), chips=7):
     return xr.Dataset(rasters | {"toa_reflectance": reflectance}, coords=coordinates)
 
 
-def test_a_few_chips_of_each_part_in_its_order():
-    figure = contact_sheet(dataset_of(["TM3", "TM4"], [0.66, 0.84]), ["train", "validation", "test"])
+def test_contact_sheet_shows_a_few_chips_of_each_part_in_order():
+    figure = contact_sheet(make_dataset(["TM3", "TM4"], [0.66, 0.84]), ["train", "validation", "test"])
     titles = [axis.get_title() for axis in figure.axes if axis.get_title()]
     assert titles == ["train\nchip 1", "\nchip 2", "\nchip 3", "\nchip 4", "test\nchip 0", "\nchip 6"]
     labels = [axis.get_ylabel() for axis in figure.axes if axis.get_ylabel()]
     assert labels == ["NDVI\nof the image", "LAI", "FPAR"]
 
 
-def test_pixels_without_data_are_clear():
-    dataset = dataset_of(["TM2", "TM3", "TM4"], [0.56, 0.66, 0.84])
+def test_pixels_without_data_are_transparent():
+    dataset = make_dataset(["TM2", "TM3", "TM4"], [0.56, 0.66, 0.84])
     dataset["toa_reflectance"][1, 0, 2, 3] = np.nan
     picture = contact_sheet(dataset, ["train"]).axes[0].images[0].get_array()
     assert picture[2, 3, 3] == 0 and (np.delete(picture[..., 3].ravel(), 11) == 1).all()
 
 
-def test_near_infrared_is_red_and_stretched_as_in_a_report_over_all_chips():
-    dataset = dataset_of(["B03", "B04", "B08"], [0.56, 0.66, 0.84])
+def test_false_colour_is_stretched_over_all_chips_as_in_a_report():
+    dataset = make_dataset(["B03", "B04", "B08"], [0.56, 0.66, 0.84])
     near = dataset["toa_reflectance"].sel(band="B08").isel(chip=[0, 6])
     dark, bright = dark_and_bright(near.values.ravel())
     axis = contact_sheet(dataset, ["test"]).axes[0]
@@ -116,8 +116,8 @@ def test_near_infrared_is_red_and_stretched_as_in_a_report_over_all_chips():
     np.testing.assert_allclose(axis.images[0].get_array()[..., 0], expected, rtol=0, atol=1e-12)
 
 
-def test_without_a_green_band_the_image_is_its_ndvi_and_a_row_shares_its_colours():
-    dataset = dataset_of(["TM3", "TM4"], [0.66, 0.84])
+def test_ndvi_is_shown_without_a_green_band_with_common_colours():
+    dataset = make_dataset(["TM3", "TM4"], [0.66, 0.84])
     figure = contact_sheet(dataset, ["train", "test"])
     pictures = [axis.images[0] for axis in figure.axes[:6]]
     np.testing.assert_array_equal(pictures[4].get_array(), dataset["ndvi"][0])

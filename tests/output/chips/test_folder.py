@@ -1,4 +1,4 @@
-"""Datasets: whole or not there, and the same bits whatever stopped them and whoever made them."""
+"""Dataset folders are complete or absent, and have the same bits after interruptions and with any workers."""
 
 import os
 import re
@@ -27,7 +27,7 @@ COUNT = 7
 
 @pytest.fixture(scope="module", autouse=True)
 def small_shards():
-    """Of two chips, so that there are four; nobody looks at the pictures."""
+    """Use shards of two chips, so that there are four shards, and omit the pictures."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(store, "_FEWEST", 2)
         patch.setattr(datasheet, "contact_sheet", lambda dataset, parts: Figure((1, 1)))
@@ -41,7 +41,7 @@ def study():
 
 @pytest.fixture(scope="module")
 def whole(study, tmp_path_factory):
-    """A dataset that nobody disturbed."""
+    """A dataset written without interruption."""
     folder = tmp_path_factory.mktemp("whole") / "chips.zarr"
     dataset_to_folder(study, folder, COUNT)
     return folder
@@ -51,8 +51,8 @@ def contents(folder):
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def stopping(monkeypatch, after, error=KeyboardInterrupt):
-    """Have the making of chips end with an error."""
+def interrupt_after(monkeypatch, after, error=KeyboardInterrupt):
+    """Make the computation of chips fail with an error."""
     made, realise = [], store.realise_arrays
 
     def stop(*arguments, **options):
@@ -65,7 +65,7 @@ def stopping(monkeypatch, after, error=KeyboardInterrupt):
     return made
 
 
-def test_the_function_gives_what_it_wrote(study, whole, tmp_path):
+def test_function_returns_the_written_dataset(study, whole, tmp_path):
     path = tmp_path / "study.toml"
     path.write_text(study.to_toml())
     found = fifesim.dataset(path, tmp_path / "chips.zarr", COUNT)
@@ -74,35 +74,35 @@ def test_the_function_gives_what_it_wrote(study, whole, tmp_path):
     assert found.sizes == {"chip": COUNT, "band": 2, "y": 6, "x": 6}
 
 
-def test_a_chip_is_its_scenario_simulated(study, whole):
+def test_chip_equals_its_simulated_scenario(study, whole):
     run = fifesim.simulate(fifesim.chips_of(study, COUNT).scenario(4), complete=True)
     chip = xr.open_zarr(whole, mask_and_scale=False).isel(chip=4)
     np.testing.assert_array_equal(chip.dn, run["image"]["dn"])
     assert float(chip["atmosphere.visibility"]) == fifesim.chips_of(study, 40).scenario(4).atmosphere.visibility
 
 
-# Chips come in shards of two.
+# There are two chips in each shard.
 @pytest.mark.parametrize("after", [3, 6])
-def test_a_stopped_run_goes_on_to_the_same_bits(after, study, whole, tmp_path, monkeypatch):
+def test_resumed_run_gives_the_same_bits(after, study, whole, tmp_path, monkeypatch):
     folder = tmp_path / "chips.zarr"
     with monkeypatch.context() as patch:
-        stopping(patch, after)
+        interrupt_after(patch, after)
         with pytest.raises(KeyboardInterrupt):
             dataset_to_folder(study, folder, COUNT)
     assert {path.name for path in folder.iterdir()} == {UNFINISHED}
     assert study_to_resume(folder) == (study, COUNT)
     with pytest.raises(ValueError, match="has an unfinished run"):
         dataset_to_folder(study, folder, COUNT)
-    made = stopping(monkeypatch, 100)
+    made = interrupt_after(monkeypatch, 100)
     dataset_to_folder(study, folder, COUNT, resume=True)
     assert len(made) == COUNT - 2 * (after // 2)
     assert contents(folder) == contents(whole)
 
 
-def test_a_finished_dataset_is_resumed_without_work(study, whole, tmp_path, monkeypatch):
+def test_resuming_a_finished_dataset_computes_nothing(study, whole, tmp_path, monkeypatch):
     folder = tmp_path / "chips.zarr"
     shutil.copytree(whole, folder)
-    made = stopping(monkeypatch, 0)
+    made = interrupt_after(monkeypatch, 0)
     dataset_to_folder(study, folder, COUNT, resume=True)
     assert not made and contents(folder) == contents(whole)
     assert study_to_resume(folder) == (study, COUNT)
@@ -114,10 +114,10 @@ def test_a_finished_dataset_is_resumed_without_work(study, whole, tmp_path, monk
     assert contents(folder) == contents(whole)
 
 
-def test_half_written_shards_do_not_count(study, whole, tmp_path, monkeypatch):
+def test_truncated_shards_are_ignored(study, whole, tmp_path, monkeypatch):
     folder = tmp_path / "chips.zarr"
     with monkeypatch.context() as patch:
-        stopping(patch, 6)
+        interrupt_after(patch, 6)
         with pytest.raises(KeyboardInterrupt):
             dataset_to_folder(study, folder, COUNT)
     hidden = folder / UNFINISHED
@@ -130,14 +130,14 @@ def test_half_written_shards_do_not_count(study, whole, tmp_path, monkeypatch):
     assert contents(folder) == contents(whole)
 
 
-def test_nothing_is_left_of_a_run_that_cannot_end_well(study, tmp_path, monkeypatch):
-    stopping(monkeypatch, 4, ValueError("cannot be"))
+def test_failed_run_leaves_no_files(study, tmp_path, monkeypatch):
+    interrupt_after(monkeypatch, 4, ValueError("cannot be"))
     with pytest.raises(ValueError, match=r"chip \d: cannot be"):
         dataset_to_folder(study, tmp_path / "chips.zarr", COUNT)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_earlier_dataset_is_replaced_with_all_its_arrays(whole, study, tmp_path):
+def test_earlier_dataset_is_replaced_completely(whole, study, tmp_path):
     folder = tmp_path / "chips.zarr"
     sun = Study(study.scenario, {"vza": {"uniform": [0, 20]}}, landscapes=3)
     dataset_to_folder(sun, folder, 3)
@@ -158,9 +158,7 @@ def earlier(study, tmp_path_factory):
 
 
 @pytest.mark.parametrize("number", [1, 2, 8, 20, 40])
-def test_a_run_killed_between_its_moves_leaves_no_store_of_two_datasets(
-    earlier, whole, study, tmp_path, monkeypatch, number
-):
+def test_run_killed_between_moves_leaves_no_mixed_store(earlier, whole, study, tmp_path, monkeypatch, number):
     folder, replace, moved = tmp_path / "chips.zarr", os.replace, []
     shutil.copytree(earlier, folder)
 
@@ -182,7 +180,7 @@ def test_a_run_killed_between_its_moves_leaves_no_store_of_two_datasets(
     assert contents(folder) == contents(whole)
 
 
-def test_what_a_study_cannot_be_is_told_before_anything_is_written(study, tmp_path, monkeypatch):
+def test_invalid_study_is_reported_before_anything_is_written(study, tmp_path, monkeypatch):
     draws = {"brown": {"choice": [0.3, 0.95]}, "landscape.deviations.brown": {"choice": [0.05, 0.25]}}
     with pytest.raises(ValueError, match=r"chip \d+: landscape\.deviations: brown"):
         dataset_to_folder(Study(study.scenario, draws, landscapes=3), tmp_path / "chips.zarr", 20)
@@ -195,13 +193,13 @@ def test_what_a_study_cannot_be_is_told_before_anything_is_written(study, tmp_pa
 
 
 @pytest.mark.parametrize(("count", "none"), [(1, "test and (train|validation)"), (2, "(test|train|validation)")])
-def test_a_part_that_gets_no_chip_is_told(count, none, study):
+def test_part_without_chips_gives_a_warning(count, none, study):
     chips = fifesim.chips_of(study, count)
     with pytest.warns(UserWarning, match=rf"no chip for {none}: {count} chips are in as many of 3 landscapes.*-n"):
         chips_folder._warn_of_empty_parts(chips)
 
 
-def test_a_file_that_is_chosen_is_an_input(tmp_path, study):
+def test_drawn_file_is_an_input(tmp_path, study):
     samples = tmp_path / "mine.csv"
     samples.write_text("lai\n0.5\n0.7\n0.9\n1.1\n1.4\n")
     draws = {"distribution": {"choice": ["burned-grazed", str(samples)]}}
@@ -209,8 +207,8 @@ def test_a_file_that_is_chosen_is_an_input(tmp_path, study):
     assert list(chips_folder._inputs(chips)) == [str(samples)]
 
 
-def test_the_loader_of_the_page_reads_each_chip_of_a_part_once(whole, monkeypatch):
-    """With what it takes of PyTorch in the place of it, as the second of two processes that share the shards."""
+def test_documented_loader_reads_each_chip_of_a_part_once(whole, monkeypatch):
+    """PyTorch is replaced by a stub in which this process is the second of two workers that share the shards."""
     page = Path(__file__).parents[3] / "docs" / "howto" / "training_set.md"
     (block,) = re.findall(r"^:class: no-run\n(.*?)^```", page.read_text("utf-8"), re.S | re.M)
     workers = [SimpleNamespace(id=number, num_workers=2) for number in (0, 1)]
@@ -230,27 +228,27 @@ def test_the_loader_of_the_page_reads_each_chip_of_a_part_once(whole, monkeypatc
     assert {(x.tobytes(), y.tobytes()) for x, y in found} == expected
 
 
-def test_processes_make_the_same_bits(study, whole, tmp_path):
+def test_processes_give_the_same_bits(study, whole, tmp_path):
     fifesim.dataset(study, tmp_path / "chips.zarr", COUNT, workers=2)
     assert contents(tmp_path / "chips.zarr") == contents(whole)
 
 
 class Client:
-    """Stands for a client of distributed."""
+    """Stub of a distributed client."""
 
 
 @pytest.mark.parametrize(
     ("workers", "client", "said"),
     [(0, None, "at least 1, got 0"), (2.0, None, "at least 1, got 2.0"), (2, Client(), "give one of them")],
 )
-def test_processes_are_a_number_or_a_cluster(workers, client, said, study, tmp_path):
+def test_processes_must_be_a_number_or_a_client(workers, client, said, study, tmp_path):
     with pytest.raises(ValueError, match=said):
         fifesim.dataset(study, tmp_path / "chips.zarr", 2, workers=workers, client=client)
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
-def test_workers_of_a_cluster_make_the_same_bits(study, whole, tmp_path):
+def test_workers_of_a_cluster_give_the_same_bits(study, whole, tmp_path):
     from fifesim.output.workers import cluster
 
     with cluster(workers=2) as client:

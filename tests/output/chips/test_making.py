@@ -1,4 +1,4 @@
-"""Shards are whole when they come, whoever makes their chips and in whatever order."""
+"""Shards are delivered complete, in any order of computation and with any workers."""
 
 import multiprocessing
 import os
@@ -27,7 +27,7 @@ def chips_on(dem="flat", count=30, landscapes=6):
     return chips_of(Study(parse_scenario(SMALL | {"terrain": {"dem": dem}}), DRAWS, landscapes=landscapes), count)
 
 
-def shards_of(length, count=30):
+def list_shards(length, count=30):
     shards = Shards(count, 1, length)
     shards.length = length
     return shards
@@ -35,23 +35,23 @@ def shards_of(length, count=30):
 
 @pytest.mark.parametrize("dem", ["flat", "flint-hills"])
 @pytest.mark.parametrize("wanted", [range(5), [1, 4]])
-def test_each_chip_that_is_wanted_is_in_one_job(dem, wanted):
-    chips, shards = chips_on(dem), shards_of(6)
+def test_each_requested_chip_is_in_one_job(dem, wanted):
+    chips, shards = chips_on(dem), list_shards(6)
     found = np.concatenate(jobs_of(chips, shards, wanted, 2))
     expected = np.concatenate([np.arange(*shards.range_of(shard)) for shard in wanted])
     np.testing.assert_array_equal(np.sort(found), expected)
 
 
-def test_flat_ground_is_made_shard_by_shard_so_that_each_is_soon_whole():
-    jobs = jobs_of(chips_on(), shards_of(6), range(5), 2)
+def test_chips_on_flat_ground_are_computed_shard_by_shard():
+    jobs = jobs_of(chips_on(), list_shards(6), range(5), 2)
     shards = np.concatenate(jobs) // 6
     assert (np.diff(shards) >= 0).all()
     assert all(len(set(job // 6)) == 1 for job in jobs)
 
 
-def test_hills_of_a_landscape_are_made_once_for_several_shards():
+def test_hills_of_a_landscape_are_computed_once_for_several_shards():
     chips = chips_on("flint-hills")
-    jobs = jobs_of(chips, shards_of(6), range(5), 2)
+    jobs = jobs_of(chips, list_shards(6), range(5), 2)
     for job in jobs:
         assert len(set(chips.landscape[job])) == 1
     assert [len(job) for job in jobs] == [4] * 6 + [1] * 6
@@ -69,11 +69,11 @@ def layout(chips):
 
 @pytest.fixture(scope="module")
 def shards():
-    return shards_of(3, 7)
+    return list_shards(3, 7)
 
 
 class Shuffled(Executor):
-    """Does two things in a drawn order when the second is submitted, and the last one by itself."""
+    """Run each two tasks in a random order when the second is submitted, and a remaining task alone."""
 
     def __init__(self, seed, number):
         self.random, self.waiting, self.left = random.Random(seed), [], number
@@ -99,13 +99,13 @@ def check_all(made, told, chips, layout, shards):
 
 
 @pytest.mark.parametrize("seed", [None, 0, 1, 2])
-def test_shards_are_those_of_the_chips_one_after_the_other(seed, chips, layout, shards):
+def test_shards_equal_those_of_sequential_computation(seed, chips, layout, shards):
     number = len(jobs_of(chips, shards, [0, 1, 2], 1))
     told, makers = [], None if seed is None else Makers(Shuffled(seed, number), 1, ())
     check_all(made_shards(chips, layout, shards, [0, 1, 2], told.append, makers), told, chips, layout, shards)
 
 
-def test_processes_make_the_same_bits_and_end(chips, layout, shards):
+def test_processes_give_the_same_bits_and_end(chips, layout, shards):
     told = []
     with processes(2) as makers:
         made = made_shards(chips, layout, shards, [0, 1, 2], told.append, makers)
@@ -115,14 +115,14 @@ def test_processes_make_the_same_bits_and_end(chips, layout, shards):
     assert not any(process.is_alive() for process in begun)
 
 
-def test_a_process_that_is_killed_is_told(chips, layout, shards):
+def test_killed_process_is_reported(chips, layout, shards):
     with pytest.raises(RuntimeError, match="ended unexpectedly, perhaps from lack of memory"), processes(1) as makers:
         for _ in made_shards(chips, layout, shards, [0, 1, 2], [].append, makers):
             (process,) = multiprocessing.active_children()
             os.kill(process.pid, signal.SIGKILL)
 
 
-def test_processes_end_with_the_one_that_started_them(tmp_path):
+def test_processes_end_with_their_parent(tmp_path):
     code = (
         "import os, signal\n"
         "from fifesim.output.chips.makers import processes\n"

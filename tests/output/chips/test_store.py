@@ -21,7 +21,7 @@ DRAWS = {"visibility": {"uniform": [10, 60]}, "distribution": {"choice": ["burne
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A store of seven chips in shards of four, and what was written."""
+    """A store of seven chips in shards of four, and the written arrays."""
     folder = tmp_path_factory.mktemp("chips")
     chips = chips_of(Study(parse_scenario(SMALL), DRAWS, landscapes=3), 7)
     layout, shards = layout_of(chips), Shards(7, 1, 4)
@@ -35,7 +35,7 @@ def made(tmp_path_factory):
     return folder, chips, layout, shards, arrays
 
 
-def test_xarray_opens_it_without_a_warning(made):
+def test_xarray_opens_the_store_without_a_warning(made):
     folder, chips, layout, _, arrays = made
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -50,7 +50,7 @@ def test_xarray_opens_it_without_a_warning(made):
     assert {"split", "landscape", "atmosphere.visibility", "sza", "gain", "spatial_ref"} <= set(dataset.coords)
 
 
-def test_what_it_holds_says_its_units(made):
+def test_variables_have_units(made):
     dataset = xr.open_zarr(made[0])
     assert all({"units", "long_name"} <= set(each.attrs) for each in dataset.data_vars.values())
     assert dataset["atmosphere.visibility"].attrs == {"long_name": "meteorological range", "units": "km"}
@@ -59,7 +59,7 @@ def test_what_it_holds_says_its_units(made):
     assert np.diff(dataset.y.values).tolist() == [-30.0] * 5 and dataset.x.values[0] == 15
 
 
-def test_a_shard_is_a_file(made):
+def test_each_shard_is_a_file(made):
     folder = made[0]
     files = sorted(path.relative_to(folder / "dn").as_posix() for path in (folder / "dn").rglob("0") if path.is_file())
     assert files == ["c/0/0/0/0", "c/1/0/0/0"]
@@ -69,7 +69,7 @@ def test_a_shard_is_a_file(made):
     assert raw.dtype == np.uint8 and raw.shards == (4, 2, 6, 6)
 
 
-def test_making_it_again_leaves_the_shards(made):
+def test_creating_the_store_again_keeps_the_shards(made):
     folder, chips, layout, shards, _ = made
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     (folder / "dn" / "zarr.json").write_text("half")
@@ -123,7 +123,7 @@ def arrays(chips, layout):
     return chip_arrays(chips, range(2, 7), layout)
 
 
-def test_a_chip_has_the_bits_of_its_scenario(chips, arrays):
+def test_chip_has_the_bits_of_its_scenario(chips, arrays):
     run = fifesim.simulate(chips.scenario(5), complete=True)
     expected = (
         run["truth"]
@@ -136,14 +136,14 @@ def test_a_chip_has_the_bits_of_its_scenario(chips, arrays):
     assert arrays["sza"][3] == float(run["image"]["sza"])
 
 
-def test_green_leaves_are_all_leaves_where_none_is_dead(chips, arrays):
+def test_green_fpar_equals_fpar_without_dead_leaves(chips, arrays):
     brown = np.array([chips.scenario(chip).ground.brown for chip in range(2, 7)])
     assert {0.0, 0.3} == set(brown.tolist())
     alike = (arrays["green_fpar"] == arrays["fpar"]).all(axis=(1, 2))
     np.testing.assert_array_equal(alike, brown == 0)
 
 
-def test_a_truth_that_others_have_not_names_its_chip(chips, layout):
+def test_error_names_the_chip_with_different_truth_variables(chips, layout):
     without = layout._replace(truth=("lai", "fpar"))
     with pytest.raises(ValueError, match=r"chip \d: has a true property that others lack, green_fpar"):
         chip_arrays(chips, range(0, 7), without)
@@ -164,7 +164,7 @@ GRASS = {"landscape": {"cover": "voronoi"}, "classes": {"grass": {}, "burned": {
     ids=["blur", "offset", "cover", "hills", "adjacency"],
 )
 def test_chips_have_no_missing_pixels(sections):
-    """Their edges see the ground around; each chip has the bits of its scenario, simulated with that ground."""
+    """Edge pixels see the surrounding ground; each chip equals its scenario simulated with that ground."""
     study = Study(parse_scenario(SMALL | sections), {"visibility": {"uniform": [10, 60]}}, landscapes=3)
     chips = chips_of(study, 3)
     found = chip_arrays(chips, range(3), layout_of(chips))
@@ -178,13 +178,13 @@ def test_chips_have_no_missing_pixels(sections):
     assert run["scene"].sizes == bare["scene"].sizes
     np.testing.assert_array_equal(run["truth"]["lai"], bare["truth"]["lai"])
     if "atmosphere" not in sections:
-        # Nearer to the edge, a pixel of the bare scene sees between 98 % and all of its footprint.
+        # Closer to the edge, pixels of the scene without surroundings see only 98 to 100 % of their footprint.
         middle = (..., slice(size := bare["image"].sizes["y"] // 2 - 1, -size), slice(size, -size))
         assert (run["image"]["dn"].values[middle] > 0).all()
         np.testing.assert_array_equal(run["image"]["dn"].values[middle], bare["image"]["dn"].values[middle])
 
 
-def test_pixels_at_the_edge_are_those_of_a_larger_scene():
+def test_edge_pixels_equal_those_of_a_larger_scene():
     scenario = parse_scenario(SMALL | {"sensor": {"instrument": "L4TM"}})
     image = fifesim.simulate(scenario, complete=True)["image"]["dn"]
     grid = scenario.geobox().pad(90)
