@@ -207,6 +207,8 @@ def _statistics(pixels, limits, key):
     found = {}
     for suffix, values in (("", pixels), ("_200", samples)):
         lines = np.stack([line(values[2], values[k]) for k in range(2)])
+        # Samples of all pixels do not differ, and have no standard deviation to divide by.
+        lines = np.full_like(lines, np.nan) if suffix and pixels.shape[-1] <= SAMPLE else lines
         found |= {name + suffix: lines[..., number] for number, name in enumerate(COEFFICIENTS)}
     found["ren"] = [_noise_of_samples(samples[k], samples[2], INCREMENTS[name]) for k, name in enumerate(VARIABLES)]
     found["range_kept"] = np.ptp(samples, axis=-1).mean(axis=-1) / np.ptp(limits, axis=-1)

@@ -68,6 +68,15 @@ def test_samples_of_200_have_the_theoretical_scatter(tables):
     np.testing.assert_allclose(table["r2_deviation_200"], expected, rtol=0.35)
 
 
+def test_samples_of_all_pixels_have_no_scatter():
+    """The spread of their coefficients is a rounding error, which must not divide a difference."""
+    pixels = 2 + np.random.default_rng(0).random((3, 201))
+    for count, finite in ((200, False), (201, True)):
+        found = friedl1995_table._statistics(pixels[:, :count], pixels, (1,))
+        assert np.isfinite(found["r2"]).all()
+        assert np.isfinite(found["r2_200"]).all() == finite
+
+
 def test_aligned_pixels_do_not_explain_the_paper(tables):
     """A literal reading leaves R2 near 0.8 and above, compared with 0.38 to 0.81 in the paper."""
     assert (tables["aligned"]["r2"] > 0.78).all()
