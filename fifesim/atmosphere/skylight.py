@@ -121,7 +121,7 @@ def directional_coupling(
     tss, tsd, too, tdo, spherical_albedo, path_reflectance, gas_transmittance : array
         As in `four_stream_coupling`. [1]
     around : GroundStreams, optional
-        Mean streams of the surroundings, which exchange light with the atmosphere; by default those of the ground. The
+        Mean streams of the surroundings, which exchange light with the atmosphere; by default the ground itself. The
         three streams to the view are of the ground alone. [1]
 
     Returns

@@ -352,21 +352,20 @@ def _checked(raster, band):
 def _draw(axes, array, cmap=None, limits=(None, None), rgba=None):
     """Draw a raster as a map with equal scales in metres or kilometres, by a colour map or in given colours."""
     values, (low, high) = array.values if rgba is None else rgba, limits
-    style = {"cmap": cmap, "vmin": low, "vmax": high}
     if "line" in array.dims and "x" not in array.coords:
         latitude, longitude, values = _mesh(array, ("latitude", "longitude"), values)
-        drawn = axes.pcolormesh(longitude, latitude, values, **style)
+        drawn = axes.pcolormesh(longitude, latitude, values, cmap=cmap, vmin=low, vmax=high)
         axes.set(xlabel="Longitude [°]", ylabel="Latitude [°]", aspect=1 / np.cos(np.radians(latitude.mean())))
         return drawn
     if "line" in array.dims:
         y, x, values = _mesh(array, ("y", "x"), values)
         unit_size, name = _length(np.ptp(x), np.ptp(y))
-        drawn = axes.pcolormesh(x / unit_size, y / unit_size, values, **style)
+        drawn = axes.pcolormesh(x / unit_size, y / unit_size, values, cmap=cmap, vmin=low, vmax=high)
     else:
         box = grids.geobox(array).boundingbox
         unit_size, name = _length(box.span_x, box.span_y)
         extent = [edge / unit_size for edge in (box.left, box.right, box.bottom, box.top)]
-        drawn = axes.imshow(values, extent=extent, interpolation="nearest", **style)
+        drawn = axes.imshow(values, extent=extent, interpolation="nearest", cmap=cmap, vmin=low, vmax=high)
     axes.set(xlabel=f"Easting [{name}]", ylabel=f"Northing [{name}]", aspect="equal")
     axes.ticklabel_format(useOffset=False, style="plain")
     axes.locator_params(nbins=4)

@@ -1,5 +1,5 @@
 """
-Reflectance of a canopy and absorbed light in many cells: by the models, or interpolated in tables of what cells share.
+Reflectance of a canopy and absorbed light in many cells: from the models, or interpolated in tables.
 """
 
 from functools import partial

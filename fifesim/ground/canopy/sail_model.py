@@ -481,8 +481,8 @@ def _slabs(lai, ks, ko, a, sigma, m, sf, sb, vf, vb, out, left):
         view_again = (a[i] + m[i]) * vb[i] + sigma[i] * vf[i]
         sun_forward = (a[i] + m[i]) * sf[i] + sigma[i] * sb[i]
         view_forward = (a[i] + m[i]) * vf[i] + sigma[i] * vb[i]
-        # Paths with the scatterings of one beam above those by the other. Both beams cross the leaves above the upper
-        # scattering, only the other beam those between; above and below, the diffuse light is as on its own.
+        # Paths on which one beam scatters above the other. Both beams cross the leaves above the upper scattering, and
+        # only the other beam crosses the leaves between; elsewhere, each diffuse stream is as for one beam.
         both, both_through = ks[i] + ko[i], sun * view
         crossed = _of_two(depth, both, twice, both_through, square)
         rso = 0 * slab
@@ -525,7 +525,7 @@ def _of_two(depth, p, q, through_p, through_q):
 
 @jitable
 def _of_three(depth, x, y, low, high, across, through):
-    """Chain of the rates q + x, q + y and q: from those of (q + y, q), (q + x, q + y), (q + x, q) and e^(-q L)."""
+    """Chain of the rates q + x, q + y and q from the chains of each two of them (low, high, across) and e^(-q L)."""
     widest = max(abs(x), abs(y), abs(x - y))
     if widest * depth.real > 0.5:
         if abs(x) == widest:

@@ -104,7 +104,7 @@ def densities_of_means(arp, ratio, shape):
     """Spectral densities of means over pixels of the process and of a trend, shape (rows, columns). [1]"""
     u, v = (2.0 * np.pi * fft.fftfreq(size * number) for size, number in zip(shape, ratio, strict=True))
     process, trend = np.zeros(shape), np.zeros(shape)
-    # The frequencies of rows that are one of pixels after one another: those of all cells would be large.
+    # One group of row frequencies at a time, because an array of all frequencies of the cells would be large.
     for some in u.reshape(ratio[0], shape[0]):
         *both, mean = _densities(arp, ratio, some, v)
         for total, each in zip((process, trend), both, strict=True):
@@ -228,7 +228,7 @@ def _second_differences(arp, ratio):
     return variances
 
 
-# Of the shift before, where the gradient is asked again: (1 - H)^(-1/2) = 1 + H / 2 + 3 / 8 H^2 for a quadratic ln w.
+# Second place of the gradient, as a fraction of the shift: (1 - H)^(-1/2) = 1 + H / 2 + 3 / 8 H^2 for quadratic ln w.
 _AGAIN = 0.75
 
 # Standard deviation of the weights of the local mean of pixel levels, a quarter of the pixels read around a tile. With
@@ -242,7 +242,7 @@ class Kriging(NamedTuple):
     response: np.ndarray  # from pixels to cells, of `kriging_filter`
     process: np.ndarray  # spectral density of the cells, on the half plane of a real transform
     precision: np.ndarray  # inverse spectral density of the pixels without their local mean, on such a half plane
-    shares: np.ndarray  # shape (down, across): weight that a cell has in its own estimate from the means over pixels
+    shares: np.ndarray  # shape (down, across): weight of a cell in its estimate from the means over pixels
 
     @classmethod
     def of(cls, arp, trend, ratio, shape):
@@ -560,7 +560,7 @@ def deviation_table(arp, ratio):
     r"""
     Coefficients of variation c of log-normal cells within pixels, shape (41,), and deviations s of logarithms. [1]
     :math:`c^2 = \left\langle \frac{\overline{l^2} - \bar l^2}{\bar l^2} \right\rangle, \quad l = e^{s z}`. Both
-    increase from 0; they are those of `pixel_sample`, good to 0.5 %.
+    increase from 0. They come from `pixel_sample`, with an error of 0.5 %.
     """
     sample = pixel_sample(arp, ratio)
     sample = sample - sample.mean(axis=1, keepdims=True)

@@ -204,7 +204,7 @@ STREAM_POWER = StreamPower(steps=40, area_exponent=0.519, uplift=751.0, creep=50
 ERODIBILITY = 4.68  # mean, for areas in m2
 
 # Standard deviations of the logarithms, and lattice steps [m], of the noise in erodibility and in the cost of a way to
-# a river, which lays out the first streams; and that of the preference for one of eight neighbours.
+# a river, which lays out the first streams, and in the preference for one of eight neighbours.
 ERODIBILITY_NOISE = ((0.077, 2400.0), (0.09, 208.0))
 WAY_NOISE = ((0.286, 1050.0), (0.622, 150.0))
 PREFERENCE_NOISE = 0.104
@@ -261,8 +261,8 @@ BENDING = ((450.0, 3000.0), (130.0, 700.0), (28.0, 200.0))
 BASE_NOISE = (5.0, 7000.0)
 ROUGHNESS = ((1.05, 160.0), (0.48, 80.0), (0.3, 40.0), (0.8, 20.0))
 
-# Streams of random numbers: the first of those that bend along and across, of the base level, roughness and benches,
-# and that of the origin of the net.
+# First streams of random numbers: of the bends along and across, the base level, the roughness, the benches and the
+# origin of the net.
 _ALONG, _ACROSS, _LEVEL, _ROUGH, _BENCH, _ORIGIN = 16, 24, 32, 40, 48, 81
 
 # Benches: height from one to the next [m], and the share of the slope that changes over them where they are clearest.
