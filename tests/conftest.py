@@ -2,6 +2,10 @@
 
 import os
 
+# One BLAS thread, as commands use by default; set before numpy is imported. Threads for small matrices mostly wait for
+# each other, and more so where several workers run tests.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings

@@ -4,6 +4,7 @@ import ast
 import inspect
 import re
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 from statistics import median
 
@@ -19,7 +20,12 @@ LABEL_LIBRARIES = {"xarray", "dask", "odc", "rioxarray", "rasterio"}
 ORDER = ("base", "grids", "stages", "chain", "scenario", "output", "retrieval", "experiments", "cli")
 
 FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix().replace("/", "."): path for path in PACKAGE.rglob("*.py")}
-TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
+
+
+@cache
+def trees():
+    """Syntax trees of the files, by name."""
+    return {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
 
 
 def imported(tree):
@@ -37,7 +43,7 @@ def imported(tree):
 def own_imports(name):
     """Files of the package imported by a file."""
     found = set()
-    for dotted in imported(TREES[name]):
+    for dotted in imported(trees()[name]):
         parts = dotted.split(".")
         if parts[0] == "fifesim":
             path = ".".join(parts[1:])
@@ -46,7 +52,7 @@ def own_imports(name):
 
 
 def libraries(name):
-    return {dotted.split(".")[0] for dotted in imported(TREES[name])}
+    return {dotted.split(".")[0] for dotted in imported(trees()[name])}
 
 
 def folder(name):
@@ -141,7 +147,7 @@ def test_imports_are_at_the_top():
     """Exceptions: the command line (for fast help), and slow libraries that few runs need."""
     breaches = []
     for name in sorted(set(FILES) - {"cli"}):
-        functions = [node for node in ast.walk(TREES[name]) if isinstance(node, ast.FunctionDef)]
+        functions = [node for node in ast.walk(trees()[name]) if isinstance(node, ast.FunctionDef)]
         late = {library.split(".")[0] for each in functions for library in imported(each)}
         breaches += [f"{name} imports {each} late" for each in late - {"distributed", "zarr"}]
     assert breaches == []
@@ -149,19 +155,21 @@ def test_imports_are_at_the_top():
 
 def test_only_lazy_modules_import_by_name():
     """The other tests do not detect `import_module`."""
-    by_name = {name for name in FILES if "importlib.import_module" in imported(TREES[name])}
+    by_name = {name for name in FILES if "importlib.import_module" in imported(trees()[name])}
     assert by_name <= {"__init__", "accessor", "atmosphere.__init__"}
 
 
 def test_no_file_shares_a_name_with_a_public_function_in_it():
-    functions = {name: {node.name for node in TREES[name].body if isinstance(node, ast.FunctionDef)} for name in FILES}
+    functions = {
+        name: {node.name for node in trees()[name].body if isinstance(node, ast.FunctionDef)} for name in FILES
+    }
     assert [name for name in FILES if name.split(".")[-1] in functions[name]] == []
 
 
 def docstring_lines(name):
     """Line numbers of docstrings in a file."""
     found = set()
-    for node in ast.walk(TREES[name]):
+    for node in ast.walk(trees()[name]):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node, clean=False):
             found |= set(range(node.body[0].lineno, node.body[0].end_lineno + 1))
     return found
@@ -207,7 +215,7 @@ SHARED_NAMES = {
 
 def test_names_are_defined_in_one_file():
     found = defaultdict(set)
-    for name, tree in TREES.items():
+    for name, tree in trees().items():
         for node in tree.body:
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 found[node.name].add(name)
@@ -220,7 +228,7 @@ def test_names_are_defined_in_one_file():
 
 def public_functions():
     """Public functions and methods by dotted name, except the command line."""
-    for name, tree in TREES.items():
+    for name, tree in trees().items():
         if name == "cli":
             continue
         for node in tree.body:
