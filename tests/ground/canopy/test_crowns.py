@@ -1,4 +1,4 @@
-"""Crowns and gaps: limits, energy, crowns thrown at random, and another program's spheres."""
+"""Tests of crowns and gaps: limits, energy, crowns at random places, and spheres by a Monte Carlo model."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def crowns(lai=2.0, view=VIEWS[2], rho=0.45, tau=0.42):
 
 
 @pytest.mark.parametrize("view", VIEWS)
-def test_crowns_without_gaps_are_the_canopy_and_no_crowns_the_ground(view):
+def test_crown_cover_of_1_is_the_canopy_and_of_0_the_ground(view):
     canopy = crowns(view=view)
     for name, value in clumped(canopy, crown_shares(1.0, 0.7, *view))._asdict().items():
         np.testing.assert_allclose(value, getattr(canopy, name), rtol=0, atol=1e-15, err_msg=name)
@@ -34,7 +34,7 @@ def test_crowns_without_gaps_are_the_canopy_and_no_crowns_the_ground(view):
 
 @pytest.mark.parametrize("shape", [0.0, 1.0, 3.0])
 @pytest.mark.parametrize("view", VIEWS)
-def test_shares_are_shares(view, shape):
+def test_crown_shares_are_consistent_probabilities(view, shape):
     found = crown_shares(COVER, shape, *view)
     assert np.all((found.both <= np.minimum(found.sun, found.view) + 1e-15) & (found.both >= 0))
     assert np.all((found.sun >= COVER - 1e-15) & (found.lit >= found.both - 1e-15) & (found.lit <= 1))
@@ -43,8 +43,8 @@ def test_shares_are_shares(view, shape):
         np.testing.assert_allclose(found.both, found.sun, rtol=0, atol=1e-15)
 
 
-def test_round_crowns_at_random_places_hide_the_ground_as_they_should():
-    """Shadows of spheres are ellipses; 570 of them hide half of the square with a standard error of about .02."""
+def test_crown_shares_match_spheres_at_random_places():
+    """Shadows of spheres are ellipses; the standard error of the cover by 570 spheres is about 0.02."""
     rng, radius, side, sza = np.random.default_rng(4), 1.0, 60.0, 55.0
     count = rng.poisson(-np.log(1 - 0.5) * side**2 / (np.pi * radius**2))
     at = rng.uniform(0, side, (count, 2))
@@ -59,7 +59,7 @@ def test_round_crowns_at_random_places_hide_the_ground_as_they_should():
 
 
 @pytest.mark.parametrize("cover", COVER)
-def test_crowns_of_white_leaves_lose_no_light(cover):
+def test_crowns_of_white_leaves_conserve_energy(cover):
     canopy = clumped(crowns(rho=0.5, tau=0.5), crown_shares(cover, 1.0, *VIEWS[2]))
     np.testing.assert_allclose(canopy.rsd + canopy.tsd + canopy.tss, 1, rtol=1e-12)
     np.testing.assert_allclose(canopy.rdd + canopy.tdd, 1, rtol=1e-12)
@@ -67,7 +67,7 @@ def test_crowns_of_white_leaves_lose_no_light(cover):
     np.testing.assert_allclose([surface.rsd, surface.rdd, surface.rdo], 1, rtol=1e-12)
 
 
-def test_sun_and_view_may_be_exchanged():
+def test_crowns_are_reciprocal():
     there, back = (
         with_background(clumped(crowns(view=view), crown_shares(COVER, 0.8, *view)), 0.2).rso
         for view in ((60, 25, 50), (25, 60, 50))
@@ -76,7 +76,7 @@ def test_sun_and_view_may_be_exchanged():
 
 
 @pytest.mark.parametrize("view", VIEWS)
-def test_terms_of_crowns_are_the_clumped_canopy_over_its_ground(view):
+def test_terms_of_crowns_give_the_clumped_canopy_over_its_background(view):
     canopy, shares, sky = crowns(np.array([0.0, 0.5, 6])[:, None], view), crown_shares(COVER, 0.8, *view), 0.3
     surface = with_background(clumped(canopy, shares), 0.4)
     of_crowns = COVER, shares.sun, shares.view, shares.apart, shares.lit
@@ -84,8 +84,8 @@ def test_terms_of_crowns_are_the_clumped_canopy_over_its_ground(view):
     np.testing.assert_allclose(found, reflectance_factor(surface.rso, surface.rdo, sky), rtol=0, atol=1e-14)
 
 
-def test_spheres_full_of_leaves_are_nearer_with_crowns_than_without():
-    """Another program's spheres, one by one: within 14 %, where a plain canopy is 14 to 36 % too bright."""
+def test_crowns_agree_with_rami_het01_better_than_a_plain_canopy():
+    """Spheres of leaves by Eradiate: within 14 %, whereas a plain canopy is 14 to 36 % too bright."""
     table = files.table("verification/spheres_of_leaves.csv")
     angles = 20.0, table["vza"].to_numpy(), table["raa"].to_numpy()
     given = {"sza": 20.0, "vza": angles[1], "raa": angles[2], "hotspot": 0.01}
@@ -103,7 +103,7 @@ def test_spheres_full_of_leaves_are_nearer_with_crowns_than_without():
         ([1.0, 3.0], 0.02, "lai / crown_cover, at most 100, got up to 150"),
     ],
 )
-def test_crowns_that_cannot_be_are_refused(lai, cover, message):
+def test_impossible_crowns_are_refused(lai, cover, message):
     with pytest.raises(ValueError, match=message):
         check_crowns(lai, cover)
     check_crowns([5.0, np.nan, 5.0], [0.0, 0.5, np.nan])

@@ -1,4 +1,4 @@
-"""The description of a canopy: ranges, what was given, and the table from which all else takes its properties."""
+"""Tests of the description of a canopy: ranges, given fields, and the table that defines all properties."""
 
 import os
 import pickle
@@ -32,7 +32,7 @@ def given_by(canopy):
 
 
 @pytest.mark.parametrize("name", list(NUMERIC_PROPERTIES))
-def test_a_number_may_be_a_limit_and_nothing_beyond(name):
+def test_numbers_are_valid_up_to_and_including_their_limits(name):
     low, high = NUMERIC_PROPERTIES[name].lowest, NUMERIC_PROPERTIES[name].highest
     for value in (low, high, float(low), np.float32(high), np.int64(high)):
         assert getattr(Canopy(**{name: value}), name) == value
@@ -44,36 +44,22 @@ def test_a_number_may_be_a_limit_and_nothing_beyond(name):
             Canopy(**{name: value})
 
 
-def test_a_share_beyond_its_range_may_be_a_percentage():
-    with pytest.raises(ValueError) as told:
-        Canopy(brown=30)
-    assert str(told.value) == "brown must be in [0, 1], got 30: it is the share of dead leaf area, not percent"
-    with pytest.raises(ValueError, match=r"crown diameter over the height of its middle$"):
-        Canopy(crown_shape=30)
-
-
-def test_a_hot_spot_narrower_than_the_sun_is_refused():
-    assert Canopy(hotspot=LEAST_HOTSPOT).hotspot == LEAST_HOTSPOT
-    with pytest.raises(ValueError, match=r"hotspot must be 0, for no hot spot, or at least 1e-06, got 9.9e-07"):
-        Canopy(hotspot=0.99 * LEAST_HOTSPOT)
-
-
 @pytest.mark.parametrize("name", list(NUMERIC_PROPERTIES))
-def test_what_is_no_number_is_refused_by_name(name):
+def test_values_of_other_types_are_refused_by_name(name):
     raster = r", or an xarray.DataArray over \(y, x\)" if name in BY_CELL else ""
-    for value, said in (
+    for value, text in (
         ("0.3", "'0.3'"),
         (True, "True"),
         ([0.3], "a list of 1"),
         (np.full(3, 0.3), r"a numpy array \(3,\)"),
         (RASTER.to_dataset(name="a"), "an xarray.Dataset of a"),
     ):
-        with pytest.raises(TypeError, match=f"^{name} must be a number{raster}, got {said}"):
+        with pytest.raises(TypeError, match=f"^{name} must be a number{raster}, got {text}"):
             Canopy(**{name: value})
 
 
 @pytest.mark.parametrize("name", BY_CELL)
-def test_a_raster_is_over_the_cells_and_holds_real_numbers(name):
+def test_rasters_need_dims_y_x_and_real_numbers(name):
     for raster in (RASTER, RASTER.T, RASTER.astype(int), RASTER.expand_dims(time=2), RASTER.chunk()):
         assert getattr(Canopy(**{name: raster}), name) is raster
     for raster, dims in (
@@ -90,7 +76,7 @@ def test_a_raster_is_over_the_cells_and_holds_real_numbers(name):
 
 
 @pytest.mark.parametrize("name", sorted(set(NUMERIC_PROPERTIES) - set(BY_CELL)))
-def test_what_is_the_same_everywhere_is_no_raster(name):
+def test_properties_of_the_whole_scene_must_not_be_rasters(name):
     with pytest.raises(TypeError, match=rf"^{name} must be a number, got an xarray.DataArray \(y: 2, x: 3\)"):
         Canopy(**{name: RASTER})
 
@@ -98,6 +84,9 @@ def test_what_is_the_same_everywhere_is_no_raster(name):
 @pytest.mark.parametrize(
     ("field", "error", "message"),
     [
+        ({"brown": 30}, ValueError, r"^brown must be in \[0, 1\], got 30: it is the share of .*area, not percent$"),
+        ({"crown_shape": 30}, ValueError, "crown diameter over the height of its middle$"),
+        ({"hotspot": 0.99 * LEAST_HOTSPOT}, ValueError, "hotspot must be 0, for no .* at least 1e-06, got 9.9e-07"),
         ({"leaf_angles": "spheric"}, ValueError, "unknown leaf angle distribution 'spheric', did you mean 'spherical'"),
         ({"leaf_angles": [0.5, 0.6]}, ValueError, "1.1"),
         ({"leaf_angles": 57}, TypeError, r"leaf_angles must be .*, got 57: .*'campbell\(57\)'"),
@@ -112,32 +101,32 @@ def test_what_is_the_same_everywhere_is_no_raster(name):
     ],
     ids=str,
 )
-def test_other_fields_are_refused_by_name(field, error, message):
+def test_invalid_fields_are_refused_by_name(field, error, message):
     with pytest.raises(error, match=message):
         Canopy(**field)
 
 
-def test_the_default_is_tallgrass_of_which_nothing_was_given():
+def test_default_canopy_is_tallgrass_without_given_fields():
     assert TALLGRASS.given == frozenset() and repr(TALLGRASS) == "Canopy()"
     assert all(getattr(Canopy(), name) == known.default for name, known in PROPERTIES.items())
     assert (Canopy().leaf_angles, Canopy().model) == ("spherical", "sail")
     assert fifesim.Setup().canopy is TALLGRASS and fifesim.CoverClass("grass").canopy is TALLGRASS
 
 
-def test_every_field_takes_its_default(lai):
-    """Given or not, a default leaves all bits."""
+def test_passing_the_defaults_changes_no_bit(lai):
     defaults = {name: each.default for name, each in PROPERTIES.items()}
     rho = lai.fifesim.surface_reflectance("TM", bands=TM34)
     xr.testing.assert_identical(lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=Canopy(**defaults)), rho)
 
 
-def test_given_fields_are_told_from_defaults():
+def test_given_lists_the_fields_that_were_passed():
     canopy = Canopy(brown=0.0, leaf_angles="spherical", crown_cover=RASTER, soil=None)
     assert canopy.given == {"brown", "leaf_angles", "crown_cover"}
     assert canopy.soil == 0.0
+    assert Canopy(hotspot=LEAST_HOTSPOT).hotspot == LEAST_HOTSPOT
 
 
-def test_replace_keeps_what_was_not_given_open():
+def test_replace_leaves_other_fields_unset():
     canopy = Canopy(brown=0.3, hotspot=0.1)
     changed = canopy.replace(brown=0.0, soil=0.1)
     assert given_by(changed) == {"brown": 0.0, "hotspot": 0.1, "soil": 0.1}
@@ -150,22 +139,22 @@ def test_replace_keeps_what_was_not_given_open():
         canopy.replace(bron=0.3)
 
 
-def test_over_has_precedence_where_it_was_given():
-    own, scene = Canopy(brown=0.0, background=0.1), Canopy(brown=0.3, hotspot=0.1, moisture=RASTER)
-    both = own.over(scene)
+def test_given_fields_take_precedence_in_over():
+    first, scene = Canopy(brown=0.0, background=0.1), Canopy(brown=0.3, hotspot=0.1, moisture=RASTER)
+    both = first.over(scene)
     assert both.given == {"brown", "background", "hotspot", "moisture"}
     assert (both.brown, both.background, both.hotspot, both.moisture is RASTER) == (0.0, 0.1, 0.1, True)
-    assert given_by(Canopy().over(own)) == given_by(own) == given_by(own.over(Canopy()))
+    assert given_by(Canopy().over(first)) == given_by(first) == given_by(first.over(Canopy()))
 
 
-def test_text_of_a_canopy_makes_it_again():
+def test_repr_recreates_a_canopy():
     canopy = Canopy(leaf_optics=fifesim.Leaf(chlorophyll=40), leaf_angles="erectophile", brown=0.0, soil=-0.1)
     again = eval(repr(canopy), {"Canopy": Canopy, "Leaf": fifesim.Leaf})
     assert given_by(again) == given_by(canopy)
     assert repr(Canopy(brown=RASTER, hotspot=0.1)) == "Canopy(hotspot=0.1, brown=<an xarray.DataArray (y: 2, x: 3)>)"
 
 
-def test_a_canopy_is_frozen_and_goes_to_other_processes():
+def test_canopy_is_frozen_and_can_be_pickled():
     canopy = Canopy(brown=RASTER, leaf_optics=fifesim.Leaf(), hotspot=0.0)
     with pytest.raises(AttributeError, match="brown"):
         canopy.brown = 0.2
@@ -176,7 +165,7 @@ def test_a_canopy_is_frozen_and_goes_to_other_processes():
 
 
 @pytest.mark.parametrize("name", list(PROPERTIES))
-def test_a_loose_property_says_where_it_belongs(lai, name):
+def test_a_property_passed_outside_a_canopy_names_the_remedy(lai, name):
     message = re.escape(f"has no argument '{name}': type canopy=fifesim.Canopy({name}=...)")
     for call in (
         lambda: lai.fifesim.surface_reflectance("TM", **{name: 0.3}),
@@ -188,8 +177,8 @@ def test_a_loose_property_says_where_it_belongs(lai, name):
             call()
 
 
-def test_rasters_over_time_go_date_by_date(lai):
-    """Those within a mapping as well; and what was not given stays so, also for classes."""
+def test_rasters_over_time_are_evaluated_date_by_date(lai):
+    """Also rasters in a mapping."""
     days = xr.Variable("time", np.array(["1987-06-06T16:35", "1987-07-06T16:35"], "M8[ns]"))
     season = xr.concat([lai, 1.1 * lai], dim=days, combine_attrs="override")
     share = xr.concat([lai / 10, lai / 20], dim=days, combine_attrs="override").drop_attrs(deep=False)
@@ -197,40 +186,40 @@ def test_rasters_over_time_go_date_by_date(lai):
     found = season.fifesim.surface_reflectance("TM", bands=TM34, canopy=canopy)
     absorbed = season.fifesim.fpar(canopy=canopy, leaves="green")
     for date in (0, 1):
-        own = Canopy(background={"TM3": share[date], "TM4": 0.3}, brown=share[date], hotspot=0.1)
-        alone = season[date].fifesim.surface_reflectance("TM", bands=TM34, canopy=own)
+        one = Canopy(background={"TM3": share[date], "TM4": 0.3}, brown=share[date], hotspot=0.1)
+        alone = season[date].fifesim.surface_reflectance("TM", bands=TM34, canopy=one)
         np.testing.assert_array_equal(found[date], alone)
-        np.testing.assert_array_equal(absorbed[date], season[date].fifesim.fpar(canopy=own, leaves="green"))
+        np.testing.assert_array_equal(absorbed[date], season[date].fifesim.fpar(canopy=one, leaves="green"))
     with pytest.raises(ValueError, match="has dates and the raster of surface_reflectance has none"):
         lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=Canopy(brown=share))
 
 
 @pytest.fixture(scope="module")
 def classes():
-    """One class that leaves dead leaves open, and one that has none."""
+    """A class without a given dead share, and a class with a dead share of 0."""
     return {
         "open": fifesim.CoverClass(lai="burned-grazed", canopy=Canopy(hotspot=0.1)),
         "green": fifesim.CoverClass(lai="burned-grazed", canopy=Canopy(brown=0.0, moisture=0.0)),
     }
 
 
-def test_a_class_takes_the_scenes_value_only_where_it_leaves_a_field_open(site, classes):
-    """A default that is given wins over the scene."""
+def test_a_class_inherits_only_fields_that_it_does_not_give(site, classes):
+    """A class that gives the default value keeps it."""
     land = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=classes, seed=7)
     scene = Canopy(brown=0.3, moisture=0.4)
     rho = land.fifesim.surface_reflectance("TM", bands=TM34, canopy=scene)
     green = land.fifesim.fpar(canopy=scene, leaves="green")
-    for code, own in ((1, Canopy(brown=0.3, moisture=0.4, hotspot=0.1)), (2, Canopy())):
+    for code, canopy in ((1, Canopy(brown=0.3, moisture=0.4, hotspot=0.1)), (2, Canopy())):
         cells = (land.cover == code).values
         assert cells.sum() > 400
-        alone = land.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=own)
+        alone = land.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=canopy)
         np.testing.assert_array_equal(rho.values[:, cells], alone.values[:, cells])
-        absorbed = land.lai.fifesim.fpar(canopy=own, leaves="green")
+        absorbed = land.lai.fifesim.fpar(canopy=canopy, leaves="green")
         np.testing.assert_array_equal(green.values[cells], absorbed.values[cells])
 
 
 @pytest.mark.parametrize("name", list(NUMERIC_PROPERTIES))
-def test_every_number_is_a_key_of_the_ground_and_of_a_class(name):
+def test_every_number_is_a_scenario_key_of_ground_and_classes(name):
     known = NUMERIC_PROPERTIES[name]
     for section in (GroundKeys, ClassKeys):
         field = section.model_fields[name]
@@ -249,7 +238,7 @@ def vars_of(limit):
     return {name: getattr(limit, name) for name in ("ge", "le") if hasattr(limit, name)}
 
 
-def test_keys_of_the_ground_and_of_a_class_are_its_canopy():
+def test_scenario_keys_give_the_canopies_of_scene_and_classes():
     ground = {"brown": 0.3, "soil": -0.05, "moisture": 0.2, "leaf_angles": "planophile"}
     case = parse_scenario(
         {"ground": ground, "landscape": {"cover": "voronoi"}, "classes": {"green": {"brown": 0.0}, "open": {}}}
@@ -261,7 +250,7 @@ def test_keys_of_the_ground_and_of_a_class_are_its_canopy():
     assert table["green"].canopy.over(scene).moisture == 0.2
 
 
-def test_the_table_of_the_howto_is_that_of_the_fields():
+def test_table_in_the_howto_page_matches_the_fields():
     page = (ROOT / "docs/howto/canopy.md").read_text(encoding="utf-8")
     rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in re.findall(r"^\| `.*\|$", page, re.MULTILINE)]
     shown = {row[0].strip("`"): row[1:] for row in rows}
@@ -274,7 +263,7 @@ def test_the_table_of_the_howto_is_that_of_the_fields():
             assert found == (known.default, f"{known.lowest:g} to {known.highest:g}", known.by_cell)
 
 
-def test_numbers_have_these_defaults_and_ranges():
+def test_defaults_and_ranges_of_numbers():
     known = {name: (each.default, each.lowest, each.highest) for name, each in NUMERIC_PROPERTIES.items()}
     assert known == {
         "hotspot": (0.0, 0, 10),
@@ -285,20 +274,11 @@ def test_numbers_have_these_defaults_and_ranges():
         "soil": (0.0, -1, 1),
         "moisture": (0.0, 0, 1),
     }
-    assert set(PROPERTIES) - set(NUMERIC_PROPERTIES) == {
-        "leaf_optics",
-        "leaf_angles",
-        "model",
-        "brown_leaf",
-        "background",
-    }
+    others = {"leaf_optics", "leaf_angles", "model", "brown_leaf", "background"}
+    assert set(PROPERTIES) - set(NUMERIC_PROPERTIES) == others
     assert set(BY_CELL) == {"brown", "dissociation", "crown_cover", "soil", "moisture"}
-    assert {name: each.effect for name, each in DRAWN.items()} == {
-        "brown": "dead leaves",
-        "crown_cover": "clumping",
-        "soil": "soil",
-        "moisture": "soil",
-    }
+    effects = {"brown": "dead leaves", "crown_cover": "clumping", "soil": "soil", "moisture": "soil"}
+    assert {name: each.effect for name, each in DRAWN.items()} == effects
 
 
 # A property that no model uses yet.
@@ -349,8 +329,8 @@ print(fifesim.__file__)
 """
 
 
-def test_one_more_property_is_two_lines(tmp_path):
-    """It is a field of classes too, a key of the scenario and an axis of sweeps, without other edits."""
+def test_adding_a_property_takes_two_lines(tmp_path):
+    """The new property works in classes, scenarios and sweeps without other edits."""
     for folder in ("fifesim", "data"):
         copytree(ROOT / folder, tmp_path / folder)
     for name, (place, line) in ONE_MORE.items():

@@ -1,4 +1,4 @@
-"""Discrete ordinates against doubling with many directions, conservation, reciprocity, and use in a Canopy."""
+"""Tests of discrete ordinates against doubling with many directions, of energy and reciprocity, and in a Canopy."""
 
 from pathlib import Path
 
@@ -24,14 +24,14 @@ BRF = pd.read_csv(Path(__file__).parents[3] / "data" / "verification" / "canopy_
 GREEN = 0.45, 0.42
 
 
-def test_reflectance_of_the_table():
+def test_reflectance_agrees_with_the_doubling_table():
     keys = ["sza", "vza", "raa", "leaf_reflectance", "leaf_transmittance", "background"]
     for (sza, vza, raa, rho, tau, soil), rows in BRF.groupby(keys):
         canopy = discrete_ordinates(rows["lai"].to_numpy(), rho, tau, sza=sza, vza=vza, raa=raa)
         np.testing.assert_allclose(with_background(canopy, soil).rso, rows["reflectance"], rtol=0, atol=1e-4)
 
 
-def test_fluxes_of_the_table():
+def test_fluxes_agree_with_the_doubling_table():
     optics = BRF.groupby("band")[["leaf_reflectance", "leaf_transmittance", "background"]].first()
     for (band, sza), rows in TABLE.groupby(["band", "sza"]):
         rho, tau, soil = optics.loc[band]
@@ -49,7 +49,7 @@ def test_leaves_without_absorption_conserve_energy(leaf_angles):
     np.testing.assert_allclose(canopy.rdd + canopy.tdd, 1, rtol=0, atol=1e-8)
 
 
-def test_sun_and_view_may_be_exchanged():
+def test_discrete_ordinates_are_reciprocal():
     there, back = (
         discrete_ordinates(2.0, *GREEN, sza=sza, vza=vza, raa=50, hotspot=0.1) for sza, vza in ((20, 55), (55, 20))
     )
@@ -63,8 +63,8 @@ def test_dark_leaves_scatter_once_as_in_sail():
     assert exact == pytest.approx(four, rel=2e-4)
 
 
-def test_hom45():
-    """Discs of RAMI, radius 0.025 of the height, under the isotropic sky of the same flux; nothing is fitted."""
+def test_rami_hom45():
+    """RAMI case of discs with radius 0.025 of the canopy height under an isotropic sky, without fitted parameters."""
     table, _ = hom45()
     _, down, _, _ = _rami_air(table, RAMI_AEROSOL)
     sunlight = np.exp(-(RAMI_MOLECULES + RAMI_AEROSOL) / np.cos(np.radians(RAMI_SZA))) / down
@@ -81,18 +81,18 @@ def test_hom45():
     assert abs(away[abs(table["vza"]) <= 60]).max() < 3.0
 
 
-def test_canopy_takes_the_model():
+def test_canopy_uses_the_model():
     lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 40), (0, 50))), seed=7)
     given = {"bands": ["TM3", "TM4"], "geometry": fifesim.Geometry(sza=28.5, saa=117.0)}
-    own = {"leaf_optics": {"TM3": (0.11, 0.07), "TM4": GREEN}, "background": {"TM3": 0.1, "TM4": 0.16}}
+    optics = {"leaf_optics": {"TM3": (0.11, 0.07), "TM4": GREEN}, "background": {"TM3": 0.1, "TM4": 0.16}}
     four, exact = (
-        lai.fifesim.surface_reflectance("TM", canopy=fifesim.Canopy(model=model, **own), **given)
+        lai.fifesim.surface_reflectance("TM", canopy=fifesim.Canopy(model=model, **optics), **given)
         for model in ("sail", "discrete-ordinates")
     )
     assert "discrete ordinates" in exact.history and "SAIL" in four.history
     ratio = (exact / four).mean(["y", "x"])
     assert abs(float(ratio.sel(band="TM3")) - 1) < 0.01 < float(ratio.sel(band="TM4")) - 1 < 0.03
-    canopy = fifesim.Canopy(model="discrete-ordinates", **own)
+    canopy = fifesim.Canopy(model="discrete-ordinates", **optics)
     lazy = lai.chunk(y=11).fifesim.surface_reflectance("TM", canopy=canopy, **given)
     np.testing.assert_array_equal(lazy.compute(), exact)
     brown = canopy.replace(brown=0.3, dissociation=0.5)

@@ -1,4 +1,4 @@
-"""Tables over leaf area index, against the functions that they hold."""
+"""Tests of tables over leaf area index against the tabulated functions."""
 
 import numpy as np
 import pytest
@@ -18,21 +18,23 @@ from fifesim.ground.canopy.interpolation import (
 from fifesim.ground.canopy.sail_model import over_background
 
 
-def test_tables_meet_their_tolerance_or_say_so():
+def test_tables_meet_their_tolerance_or_raise():
     table = tabulate(lambda lai: np.stack([np.exp(-5 * lai), lai**2 / (1 + lai**2)]), rate=5.0)
     lai = np.random.default_rng(2).uniform(0, LARGEST_TABLE_LAI, 10_000)
     np.testing.assert_allclose(interpolate(table, lai), [np.exp(-5 * lai), lai**2 / (1 + lai**2)], atol=2.5e-7)
     with pytest.raises(ValueError, match="exact=True"):
         tabulate(lambda lai: np.floor(lai)[None], rate=1.0)
+    with pytest.raises(ValueError, match="exact=True"):
+        tabulate_foliage(lambda lai, _: np.floor(lai)[None], rate=1.0, by_brown=False)
 
 
-def test_outside_a_table_there_is_nothing():
+def test_values_outside_a_table_are_nan():
     table = tabulate(lambda lai: np.exp(-lai)[None], rate=1.0)
     assert np.all(np.isnan(interpolate(table, [np.nan, -1e-9, LARGEST_TABLE_LAI * 1.001, np.inf])))
 
 
-def test_terms_of_a_layer_are_joined_over_each_background():
-    """Functions that a cubic spline holds well, of two bands; NaN in the layer or below it is NaN."""
+def test_interpolate_over_combines_terms_with_the_background_of_each_cell():
+    """Sums of exponentials in two bands; NaN in leaf area or background gives NaN."""
 
     def terms(lai):
         return np.stack([np.exp(-k * lai) / k for k in (1.0, 2.0, 1.5, 3.0, 1.2, 2.5, 1.1, 4.0)])
@@ -47,13 +49,8 @@ def test_terms_of_a_layer_are_joined_over_each_background():
     assert holes[:, 2, 3].all() and holes[:, 4, 5].tolist() == [False, True] and holes.sum() == 3
 
 
-def test_a_table_that_cannot_be_says_so():
-    with pytest.raises(ValueError, match="exact=True"):
-        tabulate_foliage(lambda lai, _: np.floor(lai)[None], rate=1.0, by_brown=False)
-
-
 def terms_of(count, lai, brown):
-    """Terms of two bands: layers of dead leaves below others, as steep as those of a canopy."""
+    """Terms of two bands for dead leaves below green ones, with decay rates typical of canopies."""
     rates = np.linspace(0.5, 2.0, 2 * count)[:, None]
     return (np.exp(-rates * (1 - brown) * lai) + 0.5 * np.exp(-rates * brown * lai)) / (1 + rates)
 
@@ -77,7 +74,12 @@ def table():
     return tabulate_foliage(lambda lai, brown: terms_of(4, lai, brown), rate=2.0)
 
 
-def test_terms_of_cells_are_joined_over_their_ground(cells, table):
+@pytest.fixture(scope="module")
+def crowned():
+    return tabulate_foliage(lambda lai, brown: 0.5 * terms_of(8, lai, brown), rate=2.0)
+
+
+def test_interpolate_foliage_matches_its_terms(cells, table):
     lai, brown, _, ground = cells
     expected = over_background(*terms_of(4, lai, brown).reshape(2, 4, -1).swapaxes(0, 1), ground)
     np.testing.assert_allclose(interpolate_foliage(table, lai, brown, ground)[0], expected, rtol=0, atol=1e-6)
@@ -86,22 +88,21 @@ def test_terms_of_cells_are_joined_over_their_ground(cells, table):
 
 
 @pytest.mark.parametrize("view", [(28.5, 0, 0), (60, 58, 10), (85, 80, 180)])
-def test_crowns_of_cells_are_joined_with_their_gaps(cells, view):
+def test_interpolate_crowned_matches_its_terms(cells, crowned, view):
     lai, brown, cover, ground = cells
     cover[:4] = 0, 1, 1, 1
     lai = np.minimum(lai, 0.99 * LARGEST_FOLIAGE_LAI * cover)
-    table = tabulate_foliage(lambda lai, brown: 0.5 * terms_of(8, lai, brown), rate=2.0)
     shares = crown_shares(cover, 0.8, *view)
     of_crowns = cover, shares.sun, shares.view, shares.apart, shares.lit
     inside = np.divide(lai, cover, where=cover > 0, out=np.zeros_like(lai))
     terms = tuple(0.5 * terms_of(8, inside, brown).reshape(2, 8, -1).swapaxes(0, 1))
     expected = crowns_over_background(terms, of_crowns, ground)
-    found, wrong = interpolate_crowned(table, crown_table(0.8, *view), lai, brown, cover, ground)
+    found, wrong = interpolate_crowned(crowned, crown_table(0.8, *view), lai, brown, cover, ground)
     assert wrong == 0
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
 
 
-def test_leaves_of_one_kind_need_no_axis():
+def test_tables_of_one_dead_share_have_no_axis_over_it():
     table = tabulate_foliage(lambda lai, _: 0.5 * terms_of(8, lai, 0.3), rate=2.0, by_brown=False)
     assert table.coefficients.shape[1:] == (1, 16)
     lai, cover, shares = np.array([0.4, 3.0]), np.ones(2), (1.0, 1.0, 1.0, 0.0, 1.0)
@@ -110,23 +111,22 @@ def test_leaves_of_one_kind_need_no_axis():
     np.testing.assert_allclose(found, crowns_over_background(terms, shares, 0.2), rtol=0, atol=1e-6)
 
 
-def test_no_data_stay_and_what_is_beyond_is_marked(table):
+def test_foliage_is_nan_without_data_and_infinite_beyond_the_table(table):
     lai, brown = np.array([1, np.nan, 1, LARGEST_FOLIAGE_LAI + 1e-9]), np.array([0.2, 0.2, np.nan, 0.2])
     found, wrong = interpolate_foliage(table, lai, brown, np.array([[0.1], [0.2]]))
     assert np.isfinite(found[:, 0]).all() and np.isnan(found[:, 1:3]).all() and np.isinf(found[:, 3]).all()
     assert wrong == 0
 
 
-def test_crowns_without_data_stay_and_what_is_beyond_is_marked():
-    table = tabulate_foliage(lambda lai, brown: 0.5 * terms_of(8, lai, brown), rate=2.0)
+def test_crowned_is_nan_without_data_and_infinite_beyond_the_table(crowned):
     lai = np.array([1, np.nan, 1, 1, 1, 0.5 * LARGEST_FOLIAGE_LAI + 1e-9])
     brown, cover = np.array([0.2, 0.2, np.nan, 0.2, 0.2, 0.2]), np.array([0.5, 0.5, 0.5, np.nan, 1.5, 0.5])
-    found, wrong = interpolate_crowned(table, crown_table(1.0, 30, 0, 0), lai, brown, cover, np.full((2, 1), 0.2))
+    found, wrong = interpolate_crowned(crowned, crown_table(1.0, 30, 0, 0), lai, brown, cover, np.full((2, 1), 0.2))
     assert np.isfinite(found[:, 0]).all() and np.isnan(found[:, 1:5]).all() and np.isinf(found[:, 5]).all()
     assert wrong > 0
 
 
-def test_one_dead_share_is_that_of_all_cells(cells, table):
+def test_single_dead_share_applies_to_all_cells(cells, table):
     lai, _, _, ground = cells
     one, _ = interpolate_foliage(table, lai, np.array([0.3]), ground)
     np.testing.assert_array_equal(one, interpolate_foliage(table, lai, np.full(lai.size, 0.3), ground)[0])
@@ -134,15 +134,13 @@ def test_one_dead_share_is_that_of_all_cells(cells, table):
 
 @pytest.mark.parametrize("name", ["lai", "brown", "ground", "cover"])
 @pytest.mark.parametrize("value", [-0.1, 100.1])
-def test_values_that_no_canopy_has_are_counted(table, name, value):
-    """Wherever they are; NaN is none of them."""
+def test_invalid_values_are_counted(table, crowned, name, value):
+    """In any run of cells; NaN is not counted."""
     n = 600
-    given = {"lai": np.ones(n), "brown": np.full(n, 0.2), "ground": np.full((2, n), 0.2)}
-    crowned = given | {"cover": np.full(n, 0.5)}
-    for each in crowned.values():
+    given = {"lai": np.ones(n), "brown": np.full(n, 0.2), "cover": np.full(n, 0.5), "ground": np.full((2, n), 0.2)}
+    for each in given.values():
         each[..., 5] = np.nan
-    crowned[name].reshape(-1)[-10] = value
-    terms = tabulate_foliage(lambda lai, brown: 0.5 * terms_of(8, lai, brown), rate=2.0)
-    order = [crowned[each] for each in ("lai", "brown", "cover", "ground")]
-    assert interpolate_crowned(terms, crown_table(1.0, 30, 0, 0), *order)[1] > 0
+    given[name].reshape(-1)[-10] = value
+    assert interpolate_crowned(crowned, crown_table(1.0, 30, 0, 0), *given.values())[1] > 0
+    del given["cover"]
     assert bool(interpolate_foliage(table, *given.values())[1]) == (name != "cover")

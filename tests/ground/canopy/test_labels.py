@@ -1,4 +1,4 @@
-"""The canopy on labelled rasters: labels, laziness, properties by cell, and the kernel's numbers."""
+"""Tests of canopy reflectance and FPAR on labelled rasters: labels, laziness, properties by cell, and kernel values."""
 
 from types import SimpleNamespace
 
@@ -36,7 +36,7 @@ def reflectance(lai, background=(0.1, 0.2), **options):
     return level_reflectance(lai, BANDS, BandCanopy(Canopy(), LEAF, None, background), LIGHT, **options)
 
 
-def test_reflectance_keeps_its_word_and_equals_the_kernel(lai_with_hole):
+def test_reflectance_is_lazy_and_labelled_and_equals_the_kernel(lai_with_hole):
     result = check_raster_function(reflectance, lai_with_hole, quantity="surface_reflectance")
     kernel = canopy_reflectance(
         lai_with_hole.values, *LEAF, (0.1, 0.2), sza=SUN.sza, vza=SUN.vza, raa=SUN.raa, diffuse_fraction=SKY
@@ -56,29 +56,20 @@ def test_background_may_be_a_raster(lai):
         xr.DataArray(np.random.default_rng(0).uniform(0.05, 0.3, lai.shape), dims=("y", "x"), name="soil"),
         grids.geobox(lai),
     )
-    one = check_raster_function(
-        lambda lai, soil: reflectance(lai, soil), lai, soil, quantity="surface_reflectance"
-    )  # fmt: skip
+    one = check_raster_function(reflectance, lai, soil, quantity="surface_reflectance")
     expected = canopy_reflectance(
         lai.values, *LEAF, np.stack([soil, soil]), sza=SUN.sza, vza=SUN.vza, raa=SUN.raa, diffuse_fraction=SKY
     )
     np.testing.assert_array_equal(one, expected)
     by_band = xr.concat([soil + 0.1, soil], dim="band").assign_coords(band=["TM4", "TM3"])
-    two = check_raster_function(
-        lambda lai, soil: reflectance(lai, soil), lai, by_band, quantity="surface_reflectance"
-    )  # fmt: skip
+    two = check_raster_function(reflectance, lai, by_band, quantity="surface_reflectance")
     np.testing.assert_array_equal(two.sel(band="TM3"), one.sel(band="TM3"))
     assert (two.sel(band="TM4") > one.sel(band="TM4")).all()
     with pytest.raises(ValueError, match="the background lacks band TM4, it has TM3"):
         reflectance(lai, by_band.sel(band=["TM3"]))
 
 
-def test_background_in_percent_is_refused(lai):
-    with pytest.raises(ValueError, match="units '%', surface_reflectance needs '1'"):
-        reflectance(lai, xr.full_like(lai, 20.0).assign_attrs(units="%"))
-
-
-def test_hole_in_the_background_is_a_hole_in_the_reflectance(lai):
+def test_nan_in_the_background_is_nan_in_the_reflectance(lai):
     soil = xr.full_like(lai, 0.2)
     soil.attrs = {}
     soil[3, 4] = np.nan
@@ -86,7 +77,7 @@ def test_hole_in_the_background_is_a_hole_in_the_reflectance(lai):
     assert holes[:, 3, 4].all() and int(holes.sum()) == 2
 
 
-def test_fpar_keeps_its_word_and_equals_the_kernel(lai_with_hole):
+def test_fpar_is_lazy_and_labelled_and_equals_the_kernel(lai_with_hole):
     result = check_raster_function(
         lambda lai: fifesim.fpar(lai, geometry=SUN, canopy=Canopy(leaf_angles="planophile"), fpar_inf=0.9),
         lai_with_hole,
@@ -99,11 +90,11 @@ def test_fpar_keeps_its_word_and_equals_the_kernel(lai_with_hole):
     np.testing.assert_array_equal(np.isnan(result), np.isnan(lai_with_hole))
 
 
-def test_fpar_takes_the_sun_that_the_raster_carries(lai):
-    carried = fifesim.fpar(directions.with_geometry(lai, SUN))
-    np.testing.assert_array_equal(carried, fifesim.fpar(lai, geometry=SUN))
+def test_fpar_uses_the_sun_position_of_the_raster(lai):
+    with_sun = fifesim.fpar(directions.with_geometry(lai, SUN))
+    np.testing.assert_array_equal(with_sun, fifesim.fpar(lai, geometry=SUN))
     np.testing.assert_array_equal(fifesim.fpar(lai), fifesim.fpar(lai, geometry=fifesim.fife_geometry()))
-    assert not np.array_equal(carried, fifesim.fpar(lai))
+    assert not np.array_equal(with_sun, fifesim.fpar(lai))
 
 
 @pytest.mark.parametrize("function", [reflectance, fifesim.fpar])
@@ -124,7 +115,7 @@ def test_negative_leaf_area_raises_when_it_computes(lai, function):
         lazy.compute()
 
 
-def test_each_class_is_its_canopy_alone(lai, cover):
+def test_each_class_equals_a_scene_of_its_canopy(lai, cover):
     made = reflectance_of_classes(lai, cover, BANDS, STANDS, LIGHT, attrs={"atmosphere": "none"})
     for code, stand in STANDS.items():
         alone = level_reflectance(lai, BANDS, stand, LIGHT)
@@ -133,12 +124,6 @@ def test_each_class_is_its_canopy_alone(lai, cover):
     assert made.attrs["leaf_angles"] == alone.attrs["leaf_angles"] and made.attrs["background"] == "by class"
 
 
-NAMES = ["red", "nir"]
-LABELS = [SimpleNamespace(name="red", wavelength=0.66), SimpleNamespace(name="nir", wavelength=0.84)]
-SUN_BY_CELL = Geometry(30.0, 120.0, 10.0, 90.0)
-LIGHT_BY_CELL = Light(SUN_BY_CELL, [0.1, 0.05])
-CANOPY = BandCanopy(Canopy(), ([0.07, 0.46], [0.04, 0.41]), None, [0.1, 0.2])
-DEAD = [0.3, 0.4], [0.2, 0.3]
 TM34 = ["TM3", "TM4"]
 CELLS = [(0, 0), (10, 20), (44, 53)]
 
@@ -149,28 +134,28 @@ def cells(lai):
 
 
 def flat(raster):
-    """A raster by cells, shape (n, [band])."""
+    """Raster reshaped to cells, shape (n, [band])."""
     return np.moveaxis(raster.values, 0, -1).reshape(-1, 2) if "band" in raster.dims else raster.values.ravel()
 
 
 @pytest.mark.parametrize("kind", ["uniform", "background", "brown", "sun", "leaves"])
-def test_some_cells_have_the_bits_of_the_scene(lai, cells, kind):
-    """Whatever is a raster: the kernel takes it cell by cell, after the leaf area, and what is none as it is."""
-    light, canopy = LIGHT_BY_CELL, CANOPY
+def test_kernel_gives_the_same_bits_for_selected_cells(lai, cells, kind):
+    """Rasters are arguments of the kernel, by cell; numbers are passed unchanged."""
+    light, canopy = LIGHT, STANDS[3]
     if kind == "background":
-        canopy = CANOPY._replace(background=(0.1 + lai / 20).drop_attrs(deep=False))
+        canopy = canopy._replace(background=(0.1 + lai / 20).drop_attrs(deep=False))
     if kind == "brown":
-        own = Canopy(brown=(lai / 5).drop_attrs(deep=False), dissociation=0.5, crown_cover=0.8)
-        canopy = CANOPY._replace(canopy=own, dead=DEAD)
+        varied = Canopy(brown=(lai / 5).drop_attrs(deep=False), dissociation=0.5, crown_cover=0.8)
+        canopy = canopy._replace(canopy=varied, dead=([0.3, 0.4], [0.2, 0.3]))
     if kind == "leaves":
         rho = xr.concat([0.05 + lai / 50, 0.4 + lai / 50], "band").drop_attrs(deep=False)
-        canopy = CANOPY._replace(leaf=(rho, [0.04, 0.41]))
+        canopy = canopy._replace(leaf=(rho, [0.04, 0.41]))
     if kind == "sun":
         sza = (30 + lai).drop_attrs(deep=False).rename("sza").assign_attrs(units="degree")
         angles = xr.Dataset({"sza": sza, "saa": 120.0, "vza": 10.0, "vaa": 90.0, "earth_sun_distance": 1.0})
         light = Light(angles, [0.1, 0.05])
-    whole = level_reflectance(lai, LABELS, canopy, light)
-    kernel, rasters = canopy_kernel(lai, NAMES, canopy, light)
+    whole = level_reflectance(lai, BANDS, canopy, light)
+    kernel, rasters = canopy_kernel(lai, TM34, canopy, light)
     blocks = [flat(each)[cells] if "y" in each.dims else each.values for each in rasters]
     np.testing.assert_array_equal(kernel(lai.values.ravel()[cells], *blocks), whole.values.reshape(2, -1)[:, cells])
 
@@ -190,7 +175,7 @@ def shared_reflectance(lai, canopy, **options):
     return fifesim.surface_reflectance(lai, bands=TM34, canopy=canopy, **options)
 
 
-def test_rasters_of_shares_keep_their_word_and_are_the_models_at_each_cell(lai, rasters):
+def test_dead_share_and_crown_cover_by_cell_equal_uniform_scenes(lai, rasters):
     rest = Canopy(dissociation=0.6, crown_shape=0.5)
     found = check_raster_function(
         lambda area, brown, cover: shared_reflectance(area, rest.replace(brown=brown, crown_cover=cover)),
@@ -206,7 +191,7 @@ def test_rasters_of_shares_keep_their_word_and_are_the_models_at_each_cell(lai, 
     assert "brown by cell, dissociation 0.6, crown_cover by cell, sza" in found.attrs["history"]
 
 
-def test_leaves_of_each_cell_go_with_them(lai, rasters):
+def test_dead_leaves_by_cell_with_dead_share_and_crown_cover_by_cell(lai, rasters):
     brown, cover = rasters
     optics = {"TM3": (0.2 * cover, 0.04), "TM4": (0.45, 0.42)}
     found = check_raster_function(
@@ -221,13 +206,13 @@ def test_leaves_of_each_cell_go_with_them(lai, rasters):
     np.testing.assert_allclose(found[(slice(None), *cell)], alone[:, 0, 0], rtol=1e-12)
 
 
-def test_rows_from_south_to_north_are_turned(lai, rasters):
+def test_rasters_with_rows_from_south_to_north_are_flipped(lai, rasters):
     brown, _ = rasters
-    turned, straight = (shared_reflectance(lai, Canopy(brown=each)) for each in (brown[::-1], brown))
-    np.testing.assert_array_equal(turned, straight)
+    flipped, straight = (shared_reflectance(lai, Canopy(brown=each)) for each in (brown[::-1], brown))
+    np.testing.assert_array_equal(flipped, straight)
 
 
-def test_green_leaves_absorb_less_than_all(lai, rasters):
+def test_green_fpar_is_fpar_times_the_green_share(lai, rasters):
     brown, cover = rasters
     green = check_raster_function(
         lambda area, brown, cover: fifesim.fpar(area, leaves="green", canopy=Canopy(brown=brown, crown_cover=cover)),
@@ -248,14 +233,16 @@ def test_leaf_area_that_crowns_cannot_hold_is_refused(lai, by_cell, exact):
         shared_reflectance(lai, Canopy(crown_cover=cover), exact=exact)
 
 
-def test_one_band_has_one_layer(lai):
+def test_single_band_equals_the_band_of_two(lai):
     found = fifesim.surface_reflectance(lai, bands=["TM4"], canopy=Canopy(hotspot=0.1))
     np.testing.assert_array_equal(found[0], shared_reflectance(lai, Canopy(hotspot=0.1))[1])
 
 
-def test_shares_of_another_unit_are_refused(lai, rasters):
+def test_percent_and_unknown_leaves_are_refused(lai, rasters):
     brown, _ = rasters
     with pytest.raises(ValueError, match="units '%'"):
         shared_reflectance(lai, Canopy(brown=brown.assign_attrs(units="%")))
+    with pytest.raises(ValueError, match="units '%', surface_reflectance needs '1'"):
+        reflectance(lai, xr.full_like(lai, 20.0).assign_attrs(units="%"))
     with pytest.raises(ValueError, match="leaves must be 'all' or 'green', got 'dead'"):
         fifesim.fpar(lai, leaves="dead")

@@ -1,4 +1,4 @@
-"""Two layers of two kinds of leaf, FPAR, and the light that leaves and ground absorb."""
+"""Tests of two layers of green and dead leaves, of FPAR, and of the light absorbed by leaves and ground."""
 
 import numpy as np
 import pytest
@@ -44,8 +44,8 @@ def check_equal(found, expected, atol=1e-12):
         np.testing.assert_allclose(one, other, rtol=0, atol=atol, err_msg=name)
 
 
-def test_a_published_model_gives_the_same_reflectances():
-    """Its last digit is 1e-7; its leaf angle fractions are good to 1e-8."""
+def test_two_layers_agree_with_4sail2():
+    """Reference layers by prosail, added; seven decimals, and leaf angle fractions accurate to 1e-8."""
     for row in files.table("verification/two_layers.csv").itertuples():
         canopy = two_layers(
             row.lai, row.rho_green, row.tau_green, row.rho_brown, row.tau_brown, brown=row.brown, sza=row.sza,
@@ -58,20 +58,20 @@ def test_a_published_model_gives_the_same_reflectances():
 
 @pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("dissociation", [0.0, 0.4, 1.0])
-def test_leaves_that_are_alike_or_of_one_kind_are_one_canopy(view, dissociation):
+def test_equal_leaves_or_leaves_of_one_kind_equal_sail(view, dissociation):
     check_equal(canopies(BROWN, dissociation, view, dead=GREEN), leaves(GREEN, view))
     check_equal(canopies(0.0, dissociation, view), leaves(GREEN, view))
     check_equal(canopies(1.0, dissociation, view), leaves(DEAD, view))
 
 
 @pytest.mark.parametrize("view", VIEWS)
-def test_mixed_leaves_are_the_mean_leaf(view):
+def test_mixed_leaves_equal_sail_with_the_mean_leaf(view):
     mean = mixed(GREEN, DEAD, BROWN)
     check_equal(canopies(BROWN, 0.0, view), leaves(mean, view))
 
 
-def test_a_canopy_over_a_canopy_is_one_over_a_background():
-    """The lower one is made a background, order by order of light between both; no hot spot."""
+def test_added_layers_equal_a_sum_over_orders_of_reflection():
+    """Light reflected between two layers without hot spot, order by order."""
     view = (50, 20, 40, 0.0)
     top, bottom = leaves((0.1, 0.3), view, 1.5), leaves((0.5, 0.2), view, 2.0)
     down, up = top.tsd, 0.0
@@ -85,15 +85,15 @@ def test_a_canopy_over_a_canopy_is_one_over_a_background():
 
 
 @pytest.mark.parametrize("dissociation", [0.0, 0.5, 1.0])
-def test_layers_hold_all_leaves_of_both_kinds(dissociation):
+def test_layers_conserve_the_leaf_area_of_both_kinds(dissociation):
     layers = leaf_layers(LAI, BROWN, dissociation)
     np.testing.assert_allclose(layers.lai + layers.lai_below, LAI + 0 * BROWN, rtol=1e-14)
     dead = layers.lai * layers.brown + layers.lai_below * layers.brown_below
     np.testing.assert_allclose(dead, LAI * BROWN, rtol=1e-12, atol=1e-300)
 
 
-def test_hot_spot_goes_through_both_layers():
-    """What a hot spot adds to single scattering, with what both beams reach in each layer by quadrature."""
+def test_hot_spot_spans_both_layers():
+    """Single scattering of the hot spot in each layer, from the sunlit and visible leaf area by quadrature."""
     sza, vza, raa, hotspot, lai, brown = 40.0, 30.0, 20.0, 0.2, 3.0, 0.6
     angles = {"sza": sza, "vza": vza, "raa": raa}
     c = [leaf_scattering(*optics, *angles.values(), leaf_angle_classes("spherical")) for optics in (GREEN, DEAD)]
@@ -110,14 +110,14 @@ def test_hot_spot_goes_through_both_layers():
 
 
 @pytest.mark.parametrize("dissociation", [0.0, 0.5, 1.0])
-def test_sun_and_view_may_be_exchanged(dissociation):
+def test_two_layers_are_reciprocal(dissociation):
     there, back = (
         with_background(canopies(BROWN, dissociation, view), 0.2).rso for view in ((60, 25, 50, 0.1), (25, 60, 50, 0.1))
     )
     np.testing.assert_allclose(there, back, rtol=1e-11)
 
 
-def test_no_data_stay_where_they_are():
+def test_nan_stays_in_its_cell():
     lai, brown = np.array([1.0, np.nan, 1.0]), np.array([0.3, 0.3, np.nan])
     found = canopies(brown, 0.5, VIEWS[1], lai=lai)
     assert [np.isnan(getattr(found, name)).tolist() for name in ("rso", "rdd_below", "tdo")] == 3 * [
@@ -125,22 +125,22 @@ def test_no_data_stay_where_they_are():
     ]
 
 
-def test_spherical_leaves_have_half_over_the_cosine():
-    """Values by hand: 0.5 / cos."""
+def test_extinction_of_spherical_leaves():
+    """K = 0.5 / cos(sza), with values calculated by hand."""
     sza = np.array([0, 25, 28.5, 30, 45, 60])
     np.testing.assert_array_equal(extinction_coefficient(sza), 0.5 / np.cos(np.radians(sza)))
     np.testing.assert_allclose(extinction_coefficient(sza), [0.5, 0.5517, 0.5689, 0.5774, 0.7071, 1.0], atol=5e-5)
 
 
-def test_vertical_leaves_have_two_over_pi_times_the_tangent():
-    """Monteith and Unsworth (1990), vertical cylinders."""
+def test_extinction_of_vertical_leaves():
+    """Monteith and Unsworth (1990), vertical cylinders: K = 2 / pi tan(sza)."""
     sza = np.array([10, 45, 80])
     np.testing.assert_allclose(extinction_coefficient(sza, "90: 1"), 2 / np.pi * np.tan(np.radians(sza)), rtol=1e-12)
 
 
 @pytest.mark.parametrize("mean", [30, 45, 57.3, 75])
-def test_ellipsoidal_leaves_cast_the_shadow_of_an_ellipsoid(mean):
-    """Campbell (1986): K grows as sqrt(x^2 + tan^2 sza), so K^2 is linear in tan^2; classes are good to 1e-3."""
+def test_extinction_of_ellipsoidal_leaves(mean):
+    """Campbell (1986): K is proportional to sqrt(x^2 + tan^2 sza); leaf angle classes are accurate to 1e-3."""
     tangent = np.tan(np.radians([0, 10, 30, 50, 70]))
     square = extinction_coefficient(np.degrees(np.arctan(tangent)), ("campbell", mean)) ** 2
     slope = (square[1:] - square[0]) / tangent[1:] ** 2
@@ -149,26 +149,26 @@ def test_ellipsoidal_leaves_cast_the_shadow_of_an_ellipsoid(mean):
 
 
 @pytest.mark.parametrize("shape", ["planophile", "erectophile", "uniform"])
-def test_extinction_is_that_of_sail(shape):
+def test_extinction_equals_sail(shape):
     tss = sail(1.0, 0.1, 0.1, sza=40, leaf_angles=shape).tss
     np.testing.assert_allclose(extinction_coefficient(40.0, shape), -np.log(tss), rtol=1e-12)
 
 
-def test_fpar_integrates_the_light_that_each_leaf_layer_takes():
-    """Eq. 6 by quadrature of K exp(-K L)."""
+def test_fpar_is_the_integral_of_absorption_over_depth():
+    """Quadrature of K exp(-K L) for eq. 6 of the paper."""
     expected = 0.94 * quad(lambda depth: 0.569 * np.exp(-0.569 * depth), 0, 2.5)[0]
     np.testing.assert_allclose(beer_fpar(2.5, 0.569), expected, rtol=1e-12)
 
 
-def test_fpar_ends():
+def test_limits_of_fpar():
     assert beer_fpar(0.0, 0.5) == 0
     assert beer_fpar(np.inf, 0.5) == FPAR_INF == 0.94
     assert beer_fpar(1e4, 0.5, fpar_inf=0.9) == 0.9
 
 
 @pytest.mark.parametrize("dissociation", [0.0, 0.4, 1.0])
-def test_green_leaves_absorb_their_share_of_each_depth(dissociation):
-    """By quadrature: at each depth the light that is left meets green leaves by their share there."""
+def test_green_fpar_is_absorption_times_green_share_at_each_depth(dissociation):
+    """Quadrature over depth."""
     lai, brown, extinction = 3.0, 0.4, 0.6
     layers = leaf_layers(lai, brown, dissociation)
 
@@ -187,25 +187,25 @@ GREEN_LEAF, DEAD_LEAF, GROUND = (0.4, 0.3), (0.3, 0.1), 0.25
 
 
 def followed(lai, brown, dissociation, sza, inclination, beam, sky):
-    """Three streams and what leaves of unit absorptance take of them in each layer, by matrix exponentials."""
+    """Green, dead and ground absorption, and reflectance, by matrix exponentials of three streams."""
     sun, *_ = turned_leaves(inclination, sza, 0.0, 0.0)
     ks, bf = sun / np.cos(np.radians(sza)), np.cos(np.radians(inclination)) ** 2
-    layers, through, taken = leaf_layers(lai, brown, dissociation), np.eye(3), []
+    layers, through, intercepted = leaf_layers(lai, brown, dissociation), np.eye(3), []
     for depth, dead in ((layers.lai, layers.brown), (layers.lai_below, layers.brown_below)):
         rho, tau = ((1 - dead) * one + dead * other for one, other in zip(GREEN_LEAF, DEAD_LEAF, strict=True))
         forward, backward = ([((k + s * bf) * rho + (k - s * bf) * tau) / 2 for k in (ks, 1.0)] for s in (-1, 1))
         streams = np.array(
             [[-ks, 0, 0], [forward[0], forward[1] - 1, backward[1]], [-backward[0], -backward[1], 1 - forward[1]]]
         )
-        # The last row adds up what is met by leaves: beam by its extinction, diffuse light by 1.
+        # The last row sums the light intercepted by leaves, with coefficients ks for the beam and 1 for diffuse light.
         whole = expm(np.vstack([np.hstack([streams, np.zeros((3, 1))]), [[ks, 1, 1, 0]]]) * float(depth))
-        taken.append(whole[3, :3] @ through)
+        intercepted.append(whole[3, :3] @ through)
         through = whole[:3, :3] @ through
-    # The light up at the top is such that the ground sends up its share.
+    # Choose the upward light at the top so that the ground reflects its share of the light at the bottom.
     known, up = through @ [beam, sky, 0], through @ [0, 0, 1]
     top = -(known[2] - GROUND * (known[0] + known[1])) / (up[2] - GROUND * (up[0] + up[1]))
     streams = np.array([beam, sky, top])
-    met = [float(row @ streams) for row in taken]
+    met = [float(row @ streams) for row in intercepted]
     absorbed = [1 - sum(GREEN_LEAF), 1 - sum(DEAD_LEAF)]
     dead = [layers.brown, layers.brown_below]
     green = sum(each * (1 - share) for each, share in zip(met, dead, strict=True)) * absorbed[0]
@@ -215,7 +215,7 @@ def followed(lai, brown, dissociation, sza, inclination, beam, sky):
 
 
 @pytest.mark.parametrize("lai, brown, dissociation, sza", [(2, 0.4, 0.5, 30), (0.3, 0.1, 0.0, 60), (5, 0.7, 1.0, 45)])
-def test_budget_is_that_of_light_followed_through_the_layers(lai, brown, dissociation, sza):
+def test_light_budget_agrees_with_matrix_exponentials(lai, brown, dissociation, sza):
     for sky in (0.0, 0.3, 1.0):
         budget = light_budget(
             lai, *GREEN_LEAF, *DEAD_LEAF, GROUND, brown=brown, dissociation=dissociation, sza=sza, leaf_angles="35: 1",
@@ -225,7 +225,7 @@ def test_budget_is_that_of_light_followed_through_the_layers(lai, brown, dissoci
         np.testing.assert_allclose([float(each) for each in budget], expected, rtol=0, atol=1e-7)
 
 
-def test_nothing_is_lost():
+def test_light_budget_sums_to_1():
     lai, brown = np.array([0, 0.1, 3, 30])[:, None], np.array([0, 0.3, 1])
     for cover in (0.2, 1.0):
         budget = light_budget(

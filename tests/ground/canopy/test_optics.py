@@ -1,4 +1,4 @@
-"""Default and given optics, and what is refused."""
+"""Tests of leaf and background optics by band: defaults, given values, tables over leaf contents, and errors."""
 
 from dataclasses import replace
 
@@ -23,14 +23,14 @@ from fifesim.ground.canopy.sail_model import over_background, reflectance_factor
 TM = ["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]
 
 
-def test_defaults_of_the_paper_are_those_calibrated_to_table_2():
+def test_defaults_are_calibrated_to_table_2_of_the_paper():
     reflectance, transmittance = band_leaf_optics(["TM4", "TM3"])
     np.testing.assert_array_equal(reflectance, [0.45, 0.07])
     np.testing.assert_array_equal(transmittance, [0.42, 0.04])
     np.testing.assert_array_equal(band_background(["TM3", "TM4"]), [0.15, 0.19])
 
 
-def test_given_optics_are_taken_by_band_or_in_order():
+def test_given_optics_are_matched_by_band_name_or_order():
     given = {"B3": (0.1, 0.05), "B4": (0.5, 0.4)}
     np.testing.assert_array_equal(band_leaf_optics(["B4"], given), [[0.5], [0.4]])
     np.testing.assert_array_equal(band_leaf_optics(["a", "b"], ([0.1, 0.5], [0.05, 0.4])), [[0.1, 0.5], [0.05, 0.4]])
@@ -38,14 +38,14 @@ def test_given_optics_are_taken_by_band_or_in_order():
     np.testing.assert_array_equal(band_background(["a", "b"], 0.2), [0.2, 0.2])
 
 
-def test_results_are_free_to_change():
+def test_changing_a_result_does_not_change_the_defaults():
     reflectance, _ = band_leaf_optics(["TM3"])
     reflectance[:] = 0
     assert band_leaf_optics(["TM3"])[0] == 0.07
 
 
 @pytest.mark.parametrize("function", [band_leaf_optics, band_background])
-def test_unknown_bands_are_told_what_to_pass(function):
+def test_unknown_bands_are_refused_with_the_remedy(function):
     with pytest.raises(ValueError, match=r"band 'TM33', did you mean 'TM3'\? There are TM1, .*pass its own as {'TM33'"):
         function(["TM33"])
 
@@ -81,14 +81,15 @@ BANDS = tuple(band.response for band in fifesim.instrument("TM").select(["TM3", 
 
 
 def one_by_one(leaf, name, values):
+    """Leaf optics for each value of one content, by PROSPECT without a table."""
     return np.stack(
         [optics.band_leaf_optics(BANDS, replace(leaf, **{name: float(value)})) for value in values], axis=-1
     )
 
 
 @pytest.mark.parametrize("name", ["structure", *CONTENTS])
-def test_table_of_a_content_is_within_its_bound(name):
-    """Over the whole range, its ends and small values, where light decays fastest."""
+def test_table_over_a_content_is_within_its_tolerance(name):
+    """Over the whole range with its ends, and small contents, where optics change fastest."""
     low, high = (1.0, LARGEST_STRUCTURE) if name == "structure" else (0.0, CONTENTS[name][1])
     share = np.concatenate([[0, 1], np.random.default_rng(5).uniform(0, 1, 20) ** 4])
     values = np.minimum(low + share * (high - low), high)
@@ -96,14 +97,14 @@ def test_table_of_a_content_is_within_its_bound(name):
     np.testing.assert_allclose(found, one_by_one(Leaf(), name, values), rtol=0, atol=LEAF_TOLERANCE)
 
 
-def test_exact_leaves_are_those_of_prospect():
+def test_exact_leaves_equal_prospect():
     values = np.array([[5.0, 20.0, 20.0], [80.0, 5.0, 0.0]])
     found = leaf_means(BANDS, Leaf(chlorophyll=values), exact=True)
     expected = one_by_one(Leaf(), "chlorophyll", values.ravel()).reshape(2, 2, 2, 3)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
-def test_missing_content_is_missing_optics():
+def test_nan_content_gives_nan_optics():
     for leaf in (
         Leaf(water=np.array([0.01, np.nan])),
         Leaf(water=np.array([0.01, np.nan]), brown=np.array([0.1, 0.2])),
@@ -113,14 +114,14 @@ def test_missing_content_is_missing_optics():
     assert np.isnan(leaf_means(BANDS, Leaf(water=np.full(2, np.nan), brown=np.zeros(2)))).all()
 
 
-def test_leaves_almost_without_absorption_give_no_more_than_they_get():
-    """The table's error beside 1 is more than rounding here, and SAIL would refuse such a leaf."""
+def test_nearly_transparent_leaves_conserve_energy():
+    """SAIL refuses leaves that scatter more than 1, which the error of the table alone would exceed."""
     coastal = fifesim.instrument("MSI").select(["MSI1"])[0].response
     clear = dict.fromkeys(CONTENTS, 0.0) | {"brown": np.geomspace(1e-15, 0.1, 3000)}
     assert leaf_means((coastal,), Leaf(structure=1.0, **clear)).sum(axis=0).max() <= 1 + 1e-15
 
 
-def test_equal_columns_are_found():
+def test_distinct_columns_finds_equal_columns():
     rows = np.array([[1.0, 2.0, 1.0, np.nan, 2.0, np.nan], [5.0, 5.0, 5.0, 1.0, 6.0, 1.0]])
     first, kind = distinct_columns(rows)
     assert first.tolist() == [0, 1, 3, 4] and kind.tolist() == [0, 1, 0, 2, 3, 2]
@@ -134,19 +135,19 @@ VZA = np.array([0, 30, 75, 89.9])
 
 
 @pytest.mark.parametrize("r", [0.0, 0.15, 1.0])
-def test_bare_ground_shows_the_background_exactly(r):
+def test_reflectance_without_leaves_equals_the_background(r):
     for reflectance in with_background(sail(0.0, RHO, 1 - RHO, sza=SZA, vza=VZA, hotspot=0.05), r):
         assert np.all(reflectance == r)
 
 
-def test_skylight_mixes_the_two_reflectances():
+def test_diffuse_fraction_weights_the_two_reflectances():
     assert reflectance_factor(0.3, 0.5, 0.0) == 0.3
     assert reflectance_factor(0.3, 0.5, 1.0) == 0.5
 
 
 @pytest.mark.parametrize("r", [0.0, 0.15, 0.6, 1.0])
-def test_terms_of_the_layer_give_the_reflectance_of_both(r):
-    """What is reflected back and forth between leaves and ground, order by order."""
+def test_over_background_sums_reflections_between_leaves_and_ground(r):
+    """Compare with the sum over orders of reflection."""
     c = sail(2.0, RHO, 0.9 - 0.9 * RHO, sza=SZA, vza=VZA, raa=20, hotspot=0.1)
     terms = c.rso, c.tsstoo - c.tss * c.too, (c.tss + c.tsd) * (c.too + c.tdo), c.rdd
     found = over_background(*terms, r)

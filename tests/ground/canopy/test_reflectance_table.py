@@ -1,4 +1,4 @@
-"""The table against exact evaluation, wherever it may be used."""
+"""Tests of tabulated canopy reflectance against exact evaluation."""
 
 import numpy as np
 import pytest
@@ -47,24 +47,20 @@ def exact(lai, ground, scene):
     return reflectance_factor(surface.rso, surface.rdo, SKY[:, None])
 
 
+@pytest.mark.parametrize("by_cell", [False, True])
 @pytest.mark.parametrize("scene", SCENES)
-def test_table_is_within_the_bound_over_a_uniform_background(scene):
+def test_table_is_within_its_tolerance(scene, by_cell):
+    """Over a background by band, and over one by band and cell."""
     lai = cells()
-    table = canopy_reflectance(lai, RHO, TAU, GROUND, diffuse_fraction=SKY, **parameters(scene))
-    np.testing.assert_allclose(table, exact(lai, GROUND[:, None], scene), rtol=0, atol=1e-6)
-
-
-@pytest.mark.parametrize("scene", SCENES)
-def test_table_is_within_the_bound_over_a_background_raster(scene):
-    lai = cells()
-    ground = np.random.default_rng(9).choice([0, 0.2, 0.99, 1], (RHO.size, lai.size))
-    table = canopy_reflectance(lai, RHO, TAU, ground, diffuse_fraction=SKY, **parameters(scene))
-    np.testing.assert_allclose(table, exact(lai, ground, scene), rtol=0, atol=1e-6)
+    raster = np.random.default_rng(9).choice([0, 0.2, 0.99, 1], (RHO.size, lai.size))
+    table = canopy_reflectance(lai, RHO, TAU, raster if by_cell else GROUND, diffuse_fraction=SKY, **parameters(scene))
+    expected = exact(lai, raster if by_cell else GROUND[:, None], scene)
+    np.testing.assert_allclose(table, expected, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("exactly", [False, True])
 @pytest.mark.parametrize("ground", [0.15, np.full((2, 3, 4), 0.15), np.full((3, 4), 0.15), [0.15, 0.15]])
-def test_bare_ground_is_the_background_and_nan_stays_in_its_cell(ground, exactly):
+def test_reflectance_without_leaves_is_the_background_and_nan_stays_in_its_cell(ground, exactly):
     lai = np.zeros((3, 4))
     lai[1, 2] = np.nan
     result = canopy_reflectance(lai, [0.07, 0.45], [0.04, 0.42], ground, sza=28.5, hotspot=0.1, exact=exactly)
@@ -73,13 +69,13 @@ def test_bare_ground_is_the_background_and_nan_stays_in_its_cell(ground, exactly
     assert np.all(result[:, ~np.isnan(lai)] == 0.15)
 
 
-def test_a_background_without_data_gives_no_reflectance_there():
+def test_nan_background_gives_nan_reflectance():
     ground = np.array([[0.1, np.nan], [0.1, 0.1]])
     result = canopy_reflectance(np.ones(2), [0.1, 0.1], [0.1, 0.1], ground, sza=30)
     np.testing.assert_array_equal(np.isnan(result), np.isnan(ground))
 
 
-def test_any_layout_of_the_cells_gives_the_same_bits():
+def test_memory_layout_of_cells_changes_no_bit():
     lai = np.random.default_rng(1).gamma(2, 0.5, (30, 40))
     given = {"leaf_reflectance": [0.07, 0.45], "leaf_transmittance": [0.04, 0.42], "background": 0.2, "sza": 28.5}
     whole = canopy_reflectance(lai, **given)
@@ -98,8 +94,8 @@ def test_values_outside_their_range_are_refused(change, message):
         canopy_reflectance(**given, sza=30)
 
 
-def test_directions_of_each_cell_are_those_of_the_whole_scene_at_them():
-    """Cell by cell beside `exact`; the relative azimuth is folded, and an angle without data gives no reflectance."""
+def test_directions_by_cell_equal_scenes_with_these_directions():
+    """Also for azimuths above 180 degrees; an angle of NaN gives NaN."""
     rng = np.random.default_rng(3)
     lai, background = rng.gamma(2, 0.5, 12), rng.uniform(0.05, 0.4, (12, 2))
     sza, vza, raa = rng.uniform(0, [[85], [85], [360]], (3, 12))
@@ -151,7 +147,7 @@ def check_varied(lai, ground, scene):
     np.testing.assert_allclose(varied_reflectance(lai, ground, scene), exact, rtol=0, atol=1e-6)
 
 
-def test_tables_of_varied_leaves_are_within_the_bound(varied_cells):
+def test_tables_over_dead_share_and_crowns_are_within_their_tolerance(varied_cells):
     lai, brown, cover, ground = varied_cells
     view, kinds = (40, 38, 5, 0.05, "spherical"), {"brown": brown, "dissociation": 0.7}
     check_varied(lai, ground, varied_scene(*view, **kinds))
@@ -161,13 +157,13 @@ def test_tables_of_varied_leaves_are_within_the_bound(varied_cells):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("view", [(85, 80, 0, 0.01, "erectophile"), (0, 0, 0, 0, "90: 1")])
-def test_tables_are_within_the_bound_at_the_horizon_and_overhead(varied_cells, view):
+def test_tables_are_within_their_tolerance_at_the_horizon_and_overhead(varied_cells, view):
     lai, brown, cover, ground = varied_cells
     check_varied(lai, ground, varied_scene(*view, brown=brown, dissociation=1.0, crown_cover=cover))
     check_varied(lai, ground[:, :1], varied_scene(*view, brown=brown, dissociation=0.5, crown_cover=0.6))
 
 
-def test_canopies_beyond_the_table_are_the_models_themselves(varied_cells):
+def test_canopies_outside_the_table_are_evaluated_exactly(varied_cells):
     lai, brown, cover, ground = (each[..., :6].copy() for each in varied_cells)
     lai[2:4], cover[3] = interpolation.LARGEST_FOLIAGE_LAI + 1, 1
     given = varied_scene(28.5, 0, 0, 0, "spherical", brown=brown, dissociation=0.9, crown_cover=np.maximum(cover, 0.7))
@@ -179,7 +175,7 @@ def test_canopies_beyond_the_table_are_the_models_themselves(varied_cells):
 
 @pytest.mark.parametrize("part", ["all", "green", "light"])
 @pytest.mark.parametrize("by_cell", [False, True])
-def test_absorbed_light_of_cells_is_the_budget_of_each_averaged_over_bands(varied_cells, part, by_cell):
+def test_absorbed_light_is_the_light_budget_averaged_over_bands(varied_cells, part, by_cell):
     lai, brown, _, ground = (each[..., :40] for each in varied_cells)
     brown, below = (brown, ground) if by_cell else (0.3, np.array([[0.1], [0.25]]))
     scene, weights = varied_scene(35, 0, 0, 0, "spherical", brown=brown, dissociation=0.4), (0.3, 0.7)

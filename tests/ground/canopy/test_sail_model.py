@@ -1,4 +1,4 @@
-"""SAIL against other solutions of its equations, what must hold for any canopy, and upright plants on slopes."""
+"""Tests of SAIL against other solutions of its equations, of invariants, and of upright plants on slopes."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ VZA = np.array([0, 30, 75, 89.9])
 
 
 def test_sail_agrees_with_prosail_without_a_hot_spot():
-    """Same leaf angle fractions; 1e-11 leaves room for prosail's subtraction of nearly equal squares."""
+    """Layer terms and surface reflectances agree to 1e-11, since prosail subtracts nearly equal squares."""
     oracle = pytest.importorskip("prosail.FourSAIL")
     layer = ["tss", "too", "tsstoo", "rdd", "tdd", "rsd", "tsd", "rdo", "tdo", "rso"]
     rng = np.random.default_rng(20)
@@ -60,7 +60,7 @@ CASES = [(1.0, 28.5, 0, 0), (3.0, 60, 45, 120), (0.01, 89.9, 80, 30), (5.0, 0, 0
 @pytest.mark.parametrize("rho, tau", OPTICS)
 @pytest.mark.parametrize("lai, sza, vza, raa", CASES)
 def test_sail_solves_the_four_stream_equations(rho, tau, lai, sza, vza, raa):
-    """A matrix exponential over leaves turned one by one; their sum over azimuth is good to 1e-9."""
+    """Compare with a matrix exponential whose coefficients are sums over leaf azimuth, accurate to 1e-9."""
     canopy = sail(lai, rho, tau, sza=sza, vza=vza, raa=raa, leaf_angles="35: 1")
     expected = four_streams(lai, rho, tau, sza, vza, raa, 35.0)
     for name, value in expected.items():
@@ -69,7 +69,7 @@ def test_sail_solves_the_four_stream_equations(rho, tau, lai, sza, vza, raa):
 
 @pytest.mark.parametrize("inclination", [0, 5, 45, 70, 89.5, 90])
 @pytest.mark.parametrize("sza, vza, raa", [(0, 0, 0), (28.5, 0, 77), (60, 45, 0), (60, 45, 180), (85, 70, 110)])
-def test_leaf_projection_and_scattering_match_leaves_turned_one_by_one(inclination, sza, vza, raa):
+def test_leaf_projection_and_scattering_match_sums_over_leaf_azimuth(inclination, sza, vza, raa):
     sun, view, reflected, transmitted = turned_leaves(inclination, sza, vza, raa)
     np.testing.assert_allclose(leaf_projection(inclination, [sza, vza]), [sun, view], atol=1e-9)
     scattered = np.pi * np.array(volume_scattering(inclination, sza, vza, raa))
@@ -78,7 +78,7 @@ def test_leaf_projection_and_scattering_match_leaves_turned_one_by_one(inclinati
 
 @pytest.mark.parametrize("sza, vza, raa", [(28.5, 0, 0), (60, 45, 90), (75, 75, 180), (30, 30, 0)])
 def test_spherical_leaves_scatter_by_ross_closed_form(sza, vza, raa):
-    """Ross (1981), by the angle between sun and view; 900 classes of inclination are good to 1e-5."""
+    """Ross (1981), as a function of the angle between sun and view; 900 leaf angle classes are accurate to 1e-5."""
     leaves = leaf_angle_classes("spherical", classes=900)
     reflected, transmitted = volume_scattering(np.array(leaves.inclination), sza, vza, raa) @ np.array(leaves.fraction)
     s, v, azimuth = np.radians([sza, vza, raa])
@@ -89,7 +89,7 @@ def test_spherical_leaves_scatter_by_ross_closed_form(sza, vza, raa):
 
 
 def test_hot_spot_matches_the_converged_integral():
-    """It changes single scattering alone; 1e-9 of the integral is what the quadrature is good to."""
+    """The hot spot changes single scattering only; the reference quadrature is accurate to 1e-9."""
     rng = np.random.default_rng(4)
     leaves = leaf_angle_classes("spherical")
     inclination, fraction = np.array(leaves.inclination), np.array(leaves.fraction)
@@ -109,6 +109,7 @@ def test_hot_spot_matches_the_converged_integral():
 
 
 def test_sun_and_observer_share_every_gap_in_the_hot_spot():
+    """If the sun is behind the observer, every sunlit gap is visible."""
     canopy = sail(3.0, 0.1, 0.05, sza=40, vza=40, raa=0, hotspot=0.1)
     np.testing.assert_allclose(canopy.tsstoo, canopy.tss, rtol=1e-12)
 
@@ -144,15 +145,15 @@ def test_nan_stays_in_its_cell_and_nothing_warns():
     np.testing.assert_array_equal(surface.rso[2], with_background(sail(3.0, 0.5, 0.5, sza=30, hotspot=0.1), 0.2).rso)
 
 
-def test_nothing_singular_happens_where_extinction_meets_the_eigenvalue():
-    """Black-to-white steps of leaf optics sweep m through ks and ko; neighbours differ by no more than the step."""
+def test_results_are_smooth_where_the_eigenvalue_equals_the_extinction():
+    """Small steps from black to white leaves sweep the eigenvalue m through ks and ko."""
     rho = np.linspace(0, 0.5, 20_001)
     canopy = sail(3.0, rho, rho, sza=60, vza=20, raa=30, leaf_angles="50: 1")
     for values in canopy[:4]:
         assert np.abs(np.diff(values, 2)).max() < 1e-6 and np.all(np.isfinite(values))
 
 
-def test_everything_broadcasts_at_once():
+def test_arguments_broadcast():
     lai, rho = np.ones((4, 1, 1, 1)), np.full((3, 1, 1), 0.1)
     canopy = sail(lai, rho, 0.1, sza=[[10.0], [20.0]], vza=[0, 5, 9, 20, 30], hotspot=0.1)
     assert with_background(canopy, 0.1).rso.shape == (4, 3, 2, 5)
@@ -160,14 +161,9 @@ def test_everything_broadcasts_at_once():
     np.testing.assert_allclose(canopy.rso[2, 1, 1, 2], alone.rso, rtol=1e-14)
 
 
-def test_relative_azimuth_is_folded():
-    first, second = (sail(1.0, 0.1, 0.1, sza=20, vza=40, raa=raa).rso for raa in (50, 310))
-    np.testing.assert_allclose(first, second, rtol=1e-14)
-
-
 @pytest.mark.parametrize("alpha", [0.0, 1e-3, 1.0, 40.0, np.inf])
 @pytest.mark.parametrize("lai", [0.01, 2.0, 30.0])
-def test_gap_and_leaf_area_are_those_of_quadrature(lai, alpha):
+def test_gap_and_sunlit_visible_leaf_area_match_quadrature(lai, alpha):
     ks, ko = 0.7, 0.55
     tsstoo, seen = bidirectional_gap(lai, ks, ko, alpha)
     if np.isinf(alpha):
@@ -179,8 +175,8 @@ def test_gap_and_leaf_area_are_those_of_quadrature(lai, alpha):
     np.testing.assert_allclose([seen, tsstoo], [expected, gap], rtol=1e-9)
 
 
-def test_directions_are_as_far_apart_as_their_tangents():
-    """By complex numbers on the plane; 0 in the hot spot, and no hot spot without size."""
+def test_direction_distance_and_hot_spot_decay():
+    """Distance by complex numbers; the decay is 0 in the hot spot and infinite for a hot-spot size of 0."""
     sza, vza, raa = np.array([30, 60, 45]), np.array([50, 0, 45]), np.array([70, 10, 180])
     sun, view = np.tan(np.radians(sza)), np.tan(np.radians(vza)) * np.exp(1j * np.radians(raa))
     np.testing.assert_allclose(direction_distance(sza, vza, raa), np.abs(sun - view), rtol=1e-13)
@@ -192,16 +188,20 @@ def test_directions_are_as_far_apart_as_their_tangents():
 FIELDS = ("rso", "rdo", "rsd", "rdd", "tss", "too", "tsd", "tdo", "tdd")
 
 
-def by_chains(monkeypatch, *args, **options):
+def check_slab(monkeypatch, *args, **options):
+    """Check that the closed form of the slab equals the sum of exponential chains, which is never singular."""
+    found = sail(*args, **options)
     with monkeypatch.context() as patch:
         patch.setattr(sail_model, "_slabs", lambda *given: given[-1].fill(True))
-        return sail(*args, **options)
+        expected = sail(*args, **options)
+    for name in FIELDS:
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=0, atol=1e-14, err_msg=name)
 
 
 @pytest.mark.parametrize("leaf_angles", ["spherical", "planophile", "campbell(80)", "0: 1", "90: 1"])
 @pytest.mark.parametrize("angles", [(28.5, 10, 40), (0, 0, 0), (60, 60, 0), (75, 50, 180)])
-def test_slab_is_the_sum_of_its_chains(leaf_angles, angles, monkeypatch):
-    """From almost no leaves to LAI 60, from black to conservative ones."""
+def test_closed_form_of_the_slab_equals_exponential_chains(leaf_angles, angles, monkeypatch):
+    """LAI from 1e-8 to 60, black to non-absorbing leaves."""
     random = np.random.default_rng(7)
     lai = np.concatenate([random.uniform(0, 8, 200), 10 ** random.uniform(-8, 1.8, 200), [0.0]])
     absorbed = 10 ** random.uniform(-9, 0, lai.size)
@@ -209,13 +209,11 @@ def test_slab_is_the_sum_of_its_chains(leaf_angles, angles, monkeypatch):
     rho = (1 - absorbed) * random.uniform(0, 1, lai.size)
     tau = np.maximum(1 - absorbed - rho, 0)
     given = dict(zip(("sza", "vza", "raa"), angles, strict=True), leaf_angles=leaf_angles)
-    found, expected = sail(lai, rho, tau, **given), by_chains(monkeypatch, lai, rho, tau, **given)
-    for name in FIELDS:
-        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=0, atol=1e-14, err_msg=name)
+    check_slab(monkeypatch, lai, rho, tau, **given)
 
 
-def test_rates_that_are_nearly_equal_are_not_singular(monkeypatch):
-    """Sun, view and diffuse light that fade at the same rate, to 1e-14 of it and to a hundredth."""
+def test_nearly_equal_attenuation_rates_are_not_singular(monkeypatch):
+    """Attenuation rates of sun, view and diffuse light differ relatively by 1e-14 to 0.01."""
     classes = leaf_angle_classes("spherical")
     angles = 40.0, 40.0, 30.0
     rate = float(leaf_scattering(0.1, 0.1, *angles, classes).ks)
@@ -224,12 +222,11 @@ def test_rates_that_are_nearly_equal_are_not_singular(monkeypatch):
     rho = leaf + 10 ** random.uniform(-14, -2, 2000) * random.choice([-1, 1], 2000)
     lai = 10 ** random.uniform(-4, 1.5, 2000)
     given = {"sza": 40.0, "vza": 40.0 + 10 ** random.uniform(-12, -1, 2000), "raa": 30.0}
-    found, expected = sail(lai, rho, rho, **given), by_chains(monkeypatch, lai, rho, rho, **given)
-    for name in FIELDS:
-        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=0, atol=1e-14, err_msg=name)
+    check_slab(monkeypatch, lai, rho, rho, **given)
 
 
-def test_directions_of_cells_that_are_equal_are_summed_once_and_stay_in_their_place():
+def test_angles_by_cell_equal_separate_calls_with_folded_azimuth():
+    """Repeated angles are grouped; results stay in their cells."""
     sza = np.array([[30.0, 50.0], [50.0, np.nan]])
     found = sail(1.0, 0.07, 0.04, sza=sza, vza=20.0, raa=200.0, hotspot=0.1)
     for place in np.ndindex(2, 2):
@@ -238,16 +235,16 @@ def test_directions_of_cells_that_are_equal_are_summed_once_and_stay_in_their_pl
 
 
 @pytest.mark.parametrize("gap", [0, 1e-12, 1e-6, 0.01, 0.66, 0.67, 0.68, 1, 10, 1000])
-def test_chain_matches_a_triangular_matrix_exponential(gap):
-    """Opitz: the corner of exp of a bidiagonal matrix is the divided difference. Across the series' limit too."""
+def test_chain_matches_a_bidiagonal_matrix_exponential(gap):
+    """Opitz' theorem: the corner of the exponential of a bidiagonal matrix is the divided difference."""
     rates = np.array([0.3, 0.3 + gap, 0.1, 0.3, 0.2 + 2 * gap])
     corner = expm(3.0 * (np.diag(-rates) + np.diag(np.ones(4), 1)))[0, -1]
     np.testing.assert_allclose(exponential_chain(3.0, *rates), corner, rtol=1e-11)
 
 
 @pytest.mark.parametrize("gap", [0, 0.01, 10])
-def test_compiled_chains_stay_within_their_arrays(gap):
-    """Beside the same in plain Python, which would notice a place beyond."""
+def test_recursion_stays_within_its_arrays(gap):
+    """Plain Python raises IndexError where compiled code would read beyond an array."""
     x, difference, homogeneous = np.sort([-0.9, -0.9 - 3 * gap, -0.3, -0.9]), np.empty(4), np.empty(4)
     sail_model._recursion.py_func(x, difference, homogeneous)
     assert 3.0**3 * difference[0] == pytest.approx(exponential_chain(3.0, *(-x / 3)), rel=1e-12)
@@ -257,7 +254,7 @@ GREEN = 0.45, 0.42
 
 
 def on(slope, sza, vza, raa, aspect=0.0):
-    """Arguments of a slope that faces the azimuth `aspect`, with the sun at azimuth 0 and the sensor at `raa`."""
+    """Geometry of a slope that faces the azimuth `aspect`, with the sun at azimuth 0 and the sensor at `raa`."""
     tilt, sun, view = np.radians([slope, sza, vza])
     local = [
         np.cos(z) * np.cos(tilt) + np.sin(z) * np.sin(tilt) * np.cos(np.radians(azimuth - aspect))
@@ -270,16 +267,16 @@ def on(slope, sza, vza, raa, aspect=0.0):
 
 @pytest.mark.parametrize("hotspot", [0.0, 0.1])
 @pytest.mark.parametrize("leaf_angles", ["spherical", "planophile"])
-def test_level_ground_is_sail(hotspot, leaf_angles):
-    own = {"leaf_angles": leaf_angles, "hotspot": hotspot}
+def test_upright_canopy_on_level_ground_equals_sail(hotspot, leaf_angles):
+    canopy = {"leaf_angles": leaf_angles, "hotspot": hotspot}
     lai = np.array([0.0, 0.5, 3.0])
-    surface = with_background(sail(lai, *GREEN, sza=40.0, vza=25.0, raa=60.0, **own), 0.15)
-    found = upright_reflectance(lai, *GREEN, 0.15, **on(0.0, 40.0, 25.0, 60.0), diffuse_fraction=0.2, **own)
+    surface = with_background(sail(lai, *GREEN, sza=40.0, vza=25.0, raa=60.0, **canopy), 0.15)
+    found = upright_reflectance(lai, *GREEN, 0.15, **on(0.0, 40.0, 25.0, 60.0), diffuse_fraction=0.2, **canopy)
     np.testing.assert_allclose(found, reflectance_factor(surface.rso, surface.rdo, 0.2), rtol=1e-12)
 
 
-def test_slope_along_its_normal_is_level_with_the_leaf_area_of_the_slope():
-    """Spherical leaves have no upright axis: the slope is a level canopy turned round."""
+def test_slope_seen_along_its_normal_equals_level_canopy():
+    """Spherical leaves have no preferred axis: a slope is a rotated level canopy."""
     slope = on(30.0, 30.0, 30.0, 0.0)
     level = with_background(sail(2.0 * np.cos(np.radians(30.0)), *GREEN, sza=0.0), 0.15)
     found = upright_reflectance(2.0, *GREEN, 0.15, **slope)
@@ -288,19 +285,19 @@ def test_slope_along_its_normal_is_level_with_the_leaf_area_of_the_slope():
 
 
 def test_dark_leaves_have_the_path_length_of_the_slope():
-    """Single scattering by horizontal leaves: L rho over the path of both beams, in closed form."""
+    """Closed form of single scattering by horizontal leaves over the paths of both beams."""
     slope = on(35.0, 50.0, 10.0, 120.0, aspect=40.0)
     rho, lai = 1e-7, 1.7
     k = [np.cos(np.radians(z)) / slope[mu] * slope["cosine"] for z, mu in ((50.0, "mu_s_local"), (10.0, "mu_v_local"))]
-    mu_s, mu_v = np.cos(np.radians([50.0, 10.0]))
-    # Radiance along the view: leaves of projection mu_s mu_v per volume, over the slant path of the slope.
+    mu_v = np.cos(np.radians(10.0))
+    # Integral along the slant path of the slope; the projection of horizontal leaves is the cosine of the zenith angle.
     expected = rho * mu_v * slope["cosine"] / slope["mu_v_local"] * -np.expm1(-sum(k) * lai) / sum(k)
     found = upright_reflectance(lai, rho, 0.0, 0.0, **slope, leaf_angles="0: 1")
     assert found == pytest.approx(expected, rel=1e-5)
-    assert mu_s > 0
 
 
-def test_light_between_slopes_is_summed():
+def test_reflections_between_slopes_are_summed():
+    """Bare ground: geometric series of the reflections between the slope and the terrain around it."""
     rho, sky, land = 0.4, 0.7, 0.25
     given = on(20.0, 40.0, 0.0, 0.0) | {"sky_view": sky, "terrain_view": land}
     found = upright_reflectance(0.0, *GREEN, rho, **given, diffuse_fraction=0.3)
@@ -308,7 +305,7 @@ def test_light_between_slopes_is_summed():
     assert found == pytest.approx(rho * first / (1 - rho * land), rel=1e-12)
 
 
-def test_shadow_and_hidden_slopes():
+def test_shaded_slopes_get_skylight_and_hidden_slopes_are_black():
     given = on(20.0, 40.0, 0.0, 0.0)
     dark = upright_reflectance(1.0, *GREEN, 0.1, **given | {"mu_s_local": 0.0}, diffuse_fraction=0.2)
     sky = upright_reflectance(1.0, *GREEN, 0.1, **given, diffuse_fraction=1.0)
@@ -326,7 +323,8 @@ def scene(dem, lai=HILL_LAI, slopes="upright", **canopy):
     )
 
 
-def test_scene_of_a_dem():
+def test_upright_canopy_on_a_dem():
+    """A flat DEM gives the level result, lazy equals eager, each class equals its canopy alone; errors."""
     level = HILL_LAI.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
     upright, kt = scene(DEM), scene(DEM, slopes="kt")
     np.testing.assert_allclose(scene(0 * DEM + 400.0), level, rtol=0, atol=1e-6)

@@ -1,4 +1,4 @@
-"""Mixtures of spectra, means over bands, and the defaults of bands without a calibrated value."""
+"""Tests of mixtures of spectra, means over bands, and the defaults of bands without a calibrated value."""
 
 import dataclasses
 import os
@@ -27,13 +27,13 @@ def written(tmp_path, text):
     return str(path)
 
 
-def test_mean_is_the_integral_over_response_and_sun():
-    """Quadrature over pieces on which each of the three is a straight line, so that it is exact."""
+def test_band_mean_is_weighted_by_response_and_sun():
+    """Compare with quadrature between nodes, where response, sun and spectrum are straight lines."""
     band = Band("red", (0.61, 0.645, 0.69), (0.1, 1.0, 0.0))
     wavelength, values = np.array([0.5, 0.62, 0.66, 0.8]), np.array([0.1, 0.3, 0.2, 0.6])
     sun_wavelength, sun = solar_spectrum()
-    # The trapezoidal rule misses a sixth of the product of changes between nodes 1 nm apart: the sun's, up to 10 % at a
-    # Fraunhofer line, and the spectrum's, 1 %.
+    # Error of the trapezoidal rule: a sixth of the product of the relative changes between nodes 1 nm apart, 10 % for
+    # the sun at a Fraunhofer line and 1 % for the spectrum.
     nodes = np.union1d(np.union1d(sun_wavelength, wavelength), band.wavelength)
     nodes = nodes[(nodes >= 0.61) & (nodes <= 0.69)]
 
@@ -47,8 +47,8 @@ def test_mean_is_the_integral_over_response_and_sun():
     assert spectra.band_means([band], wavelength, values)[0] == pytest.approx(expected, rel=0.1 * 0.01 / 6)
 
 
-def test_default_spectra_meet_the_calibrated_bands():
-    """The one leaf and soil that the table of TM bands was modelled with: within .001 and .0006, README.md of data."""
+def test_default_spectra_agree_with_the_calibrated_bands():
+    """TM bands were modelled with this leaf and soil, within 0.001 and 0.0006 (data/README.md)."""
     wavelength, *leaf = leaf_spectrum(fifesim.Leaf())
     means = spectra.band_means(TM, wavelength, leaf)
     np.testing.assert_allclose(means, optics.band_leaf_optics(NAMES), rtol=0, atol=1e-3)
@@ -56,7 +56,7 @@ def test_default_spectra_meet_the_calibrated_bands():
     np.testing.assert_allclose(soil, optics.band_background(NAMES), rtol=0, atol=6e-4)
 
 
-def test_tm_keeps_its_table_and_other_bands_have_spectra():
+def test_tm_uses_the_calibrated_table_and_other_bands_use_spectra():
     red = [fifesim.instrument("OLI").bands[3].response]
     np.testing.assert_array_equal(optics.band_leaf_optics(TM), optics.band_leaf_optics(NAMES))
     np.testing.assert_array_equal(optics.band_background(TM), optics.band_background(NAMES))
@@ -72,8 +72,8 @@ def test_mixture_is_linear_in_its_parts():
     np.testing.assert_array_equal(pure["shade"], 0)
 
 
-def test_names_of_bands_are_bands_although_spectra_have_them_too():
-    """Shares of a mixture add up to 1 and reflectances of bands do not: .2 and .3 are no mixture."""
+def test_numbers_by_name_are_a_mixture_only_if_they_sum_to_1():
+    """Otherwise the names are bands, also if spectra have the same names."""
     given = {"soil_dry": 0.2, "dead_grass": 0.3}
     np.testing.assert_array_equal(optics.band_background(list(given), given), [0.2, 0.3])
     with pytest.raises(ValueError, match="no background for band 'soil_dry'"):
@@ -83,7 +83,7 @@ def test_names_of_bands_are_bands_although_spectra_have_them_too():
     np.testing.assert_array_equal(optics.band_background([dry], mixture), optics.band_background(TM[2:3], mixture))
 
 
-def test_own_spectrum_is_a_file_or_a_dataset(tmp_path, lai):
+def test_background_spectrum_from_file_dataset_or_mixture(tmp_path, lai):
     path = written(tmp_path, "# my soil\nwavelength,reflectance\n0.4,0.1\n1.4,0.6\n2.5,0.6\n")
     data = xr.Dataset({"reflectance": ("wavelength", [0.1, 0.6, 0.6])}, {"wavelength": [0.4, 1.4, 2.5]})
     by_file, by_data, by_mixture = (
@@ -93,7 +93,7 @@ def test_own_spectrum_is_a_file_or_a_dataset(tmp_path, lai):
     xr.testing.assert_identical(by_file, by_data)
     xr.testing.assert_identical(by_file, by_mixture)
     red, nir = optics.band_background(TM[2:4], path)
-    # The spectrum is a straight line there: its mean is its value at the sun-weighted wavelength, inside the band.
+    # The spectrum is a straight line within each band, so its mean is its value at a wavelength inside the band.
     assert 0.1 + 0.5 * (0.63 - 0.4) < red < 0.1 + 0.5 * (0.69 - 0.4)
     assert 0.1 + 0.5 * (0.76 - 0.4) < nir < 0.1 + 0.5 * (0.9 - 0.4)
 
@@ -107,7 +107,7 @@ def test_own_spectrum_is_a_file_or_a_dataset(tmp_path, lai):
         ({"no_such.csv": 1.0}, "cannot read the spectrum no_such.csv"),
     ],
 )
-def test_impossible_mixture_is_refused(given, message):
+def test_impossible_mixtures_are_refused(given, message):
     with pytest.raises(ValueError, match=message):
         optics.band_background(TM, fifesim.Background(given))
 
@@ -122,7 +122,7 @@ def test_impossible_mixture_is_refused(given, message):
         ("wavelength,reflectance\n0.5,0.1\n1.0,0.2\n", "no leaf or background spectrum for band TM1.*by band"),
     ],
 )
-def test_unusable_spectrum_is_refused(tmp_path, text, message):
+def test_unusable_background_spectra_are_refused(tmp_path, text, message):
     with pytest.raises(ValueError, match=message):
         optics.band_background(TM, written(tmp_path, text))
 
@@ -140,18 +140,17 @@ def at(wavelength):
     return spectra[..., np.argmin(abs(known - wavelength))]
 
 
-def test_spectra_are_those_of_land():
+def test_library_covers_bare_soil_to_closed_canopies():
     wavelength, spectra = library_spectra()
     assert spectra.shape == (LEAVES, SPECTRA, wavelength.size) == (600, 8, 411)
     assert (wavelength[0], round(wavelength[-1], 9)) == (0.4, 2.45)
     assert spectra.min() > 0.004 and spectra.max() < 0.9
     ndvi = (at(0.84) - at(0.66)) / (at(0.84) + at(0.66))
-    # From bare soil to closed canopies.
     assert ndvi.min() < 0.1 and ndvi.max() > 0.9 and 0.25 < np.mean(ndvi < 0.5) < 0.35
 
 
-def test_first_spectrum_of_a_leaf_is_bare_ground():
-    """Measured spectra times a brightness, which keeps the ratio of wavelengths."""
+def test_first_spectrum_of_each_leaf_in_the_library_is_bare_ground():
+    """The ratio of two wavelengths equals the ratio of a measured spectrum; only the brightness differs."""
     table = files.table("library_ground.csv").set_index("wavelength")
     measured = (table.loc[1.65] / table.loc[0.66]).to_numpy()
     found = (at(1.65) / at(0.66))[:, 0]
@@ -177,8 +176,8 @@ def leaf_dataset(wavelength=(0.4, 0.7, 0.8, 2.5), units=None, transmittance=(0.0
     return xr.Dataset(values, {"wavelength": axis})
 
 
-def test_leaf_spectra_are_a_file_or_a_dataset(tmp_path, lai):
-    """Headers may be in capitals, and nanometres are converted where the unit says so."""
+def test_leaf_spectra_from_file_or_dataset(tmp_path, lai):
+    """Column names may be capitalised; a Dataset in nanometres is converted."""
     path = written(tmp_path, LEAF)
     given = path, tmp_path / "mine.csv", leaf_dataset(), leaf_dataset((400, 700, 800, 2500), "nm")
     for name in ("leaf_optics", "brown_leaf"):
@@ -191,7 +190,7 @@ def test_leaf_spectra_are_a_file_or_a_dataset(tmp_path, lai):
         for other in made[1:]:
             xr.testing.assert_allclose(made[0], other, rtol=1e-12)
     reflectance, transmittance = optics.band_leaf_optics(TM[2:4], path)
-    # The spectra are straight lines within the red band: the means are values inside the band.
+    # The spectra are straight lines within the red band, so their means are values inside the band.
     assert 0.05 + 0.05 * (0.63 - 0.4) / 0.3 < reflectance[0] < 0.05 + 0.05 * (0.69 - 0.4) / 0.3
     assert 0.01 + 0.04 * (0.63 - 0.4) / 0.3 < transmittance[0] < 0.01 + 0.04 * (0.69 - 0.4) / 0.3
     numbers = {"TM3": (reflectance[0], transmittance[0]), "TM4": (reflectance[1], transmittance[1])}
@@ -218,8 +217,8 @@ def test_unusable_leaf_spectra_are_refused(lai, given, message):
 
 
 @pytest.mark.parametrize("name", ["leaf_optics", "background"])
-def test_a_spectrum_is_read_from_a_regular_file_only(tmp_path, lai, name, monkeypatch):
-    """An address would be fetched, and reading a pipe or a device waits for ever."""
+def test_spectra_are_read_from_regular_files_only(tmp_path, lai, name, monkeypatch):
+    """URLs must not be fetched, and reading a pipe or a device would block."""
     monkeypatch.setattr(urllib.request, "urlopen", lambda *_: pytest.fail("an address was opened"))
     os.mkfifo(tmp_path / "pipe.csv")
     (tmp_path / "folder.csv").mkdir()

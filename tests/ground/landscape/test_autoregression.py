@@ -1,4 +1,4 @@
-"""The autoregressive process: its spectrum, its variance and its lengths by other routes."""
+"""Tests of the autoregressive process: spectrum, variance and correlation length by other methods."""
 
 import numpy as np
 import pytest
@@ -27,25 +27,21 @@ ARPS = [0.05, 0.1, 0.15, 0.2, 0.24]
 
 
 @pytest.mark.parametrize("arp", ARPS)
-def test_variance_is_the_integral_of_the_squared_response(arp):
-    assert field_variance(arp) == pytest.approx(covariances(arp)[0, 0], rel=1e-12)
-
-
-@pytest.mark.parametrize("arp", ARPS)
-def test_autocorrelation_is_the_transform_of_the_squared_response(arp):
+def test_variance_and_autocorrelation_are_transforms_of_the_squared_response(arp):
     expected = covariances(arp)
+    assert field_variance(arp) == pytest.approx(expected[0, 0], rel=1e-12)
     np.testing.assert_allclose(autocorrelation(arp, np.arange(60)), expected[0, :60] / expected[0, 0], atol=1e-12)
 
 
-def test_correlation_has_fallen_to_5_percent_at_the_correlation_length():
-    """Where the length is a whole number of cells, nothing is interpolated."""
+def test_autocorrelation_is_5_percent_at_the_correlation_length():
+    """Correlation lengths of whole numbers of cells, which need no interpolation."""
     for cells in (1, 2, 5, 9, 20):
         arp = fifesim.arp_for_length(cells)
         assert autocorrelation(arp, cells) == pytest.approx(0.05, abs=1e-9)
 
 
 @pytest.mark.parametrize("cell", [1.0, 10 / 3])
-def test_length_and_arp_are_inverse(cell):
+def test_arp_for_length_inverts_correlation_length(cell):
     arps = np.array([0.001, 0.05, 0.15, 0.24, 0.249, LARGEST_STREAMING_ARP])
     lengths = [fifesim.correlation_length(arp, cell) for arp in arps]
     assert np.all(np.diff(lengths) > 0)
@@ -53,20 +49,20 @@ def test_length_and_arp_are_inverse(cell):
     assert fifesim.correlation_length(0.0) == fifesim.arp_for_length(0.0) == 0.0
 
 
-def test_margin_holds_the_response():
-    """What a unit impulse leaves at the margin, by quadrature of the response along a row at the lowest frequency."""
+def test_response_has_decayed_at_the_margin():
+    """Response to a unit impulse along a row at frequency zero of the other axis, by an inverse FFT."""
     for arp in ARPS:
         cells = margin(arp)
         impulse = np.fft.ifft(1 / (1 - 2 * arp * (1 + np.cos(2 * np.pi * np.fft.fftfreq(4096))))).real
         assert impulse[cells] < 2e-8 * impulse[0]
 
 
-def test_length_beyond_streaming_is_refused():
+def test_correlation_lengths_beyond_the_streaming_method_are_refused():
     with pytest.raises(ValueError, match="use larger cells for a longer range"):
         fifesim.arp_for_length(1e6)
 
 
-# kat_vectors of Random123 1.14: counter, key, answer.
+# Counter, key and answer from kat_vectors of Random123 1.14.
 KNOWN = [
     ("00000000 00000000 00000000 00000000", "00000000 00000000", "6627e8d5 e169c58d bc57ac4c 9b00dbd8"),
     ("ffffffff ffffffff ffffffff ffffffff", "ffffffff ffffffff", "408f276d 41c83b0e a20bc7c6 6d5451fd"),
@@ -79,12 +75,12 @@ def words(text):
 
 
 @pytest.mark.parametrize(("counter", "key", "answer"), KNOWN)
-def test_generator_gives_the_known_answers(counter, key, answer):
+def test_philox_gives_the_published_answers(counter, key, answer):
     np.testing.assert_array_equal(philox(*words(counter), *words(key)), words(answer))
 
 
-def test_normals_are_those_of_box_and_muller():
-    """Beside double precision: rounding of u near 1 leaves 6e-8 under the root, 6e-6 where the root is 0.01."""
+def test_box_muller_agrees_with_double_precision():
+    """Rounding of u near 1 is 6e-8 under the root, and 6e-6 where the root is 0.01."""
     rng = np.random.default_rng(4)
     one, other = (rng.integers(0, 2**32, 20_000, dtype=np.uint32) for _ in range(2))
     one[:3] = 0, 1, 2**32 - 1
@@ -94,13 +90,13 @@ def test_normals_are_those_of_box_and_muller():
     clear = expected > 0.01
     np.testing.assert_allclose(np.hypot(*found.astype(float))[clear], expected[clear], rtol=0, atol=6e-6)
     assert np.isfinite(found).all()
-    # A whole turn holds each angle once: the quarter is from two bits and the place in it from the others.
+    # Angles are uniform over the circle: two bits give the quadrant and the other bits the angle within it.
     angle = np.arctan2(*found.astype(float))[clear] / (2 * np.pi)
     assert stats.kstest(angle % 1, "uniform").pvalue > 0.001
 
 
 def test_noise_is_standard_normal():
-    """Four standard errors of the moments; the Kolmogorov-Smirnov distance at 1 in a thousand."""
+    """Moments within four standard errors; Kolmogorov-Smirnov distance at a significance of 0.001."""
     noise = white_noise(3, -700, 5, (2000, 1500)).astype(float).ravel()
     n = noise.size
     assert noise.mean() == pytest.approx(0, abs=4 / np.sqrt(n))
@@ -111,8 +107,8 @@ def test_noise_is_standard_normal():
 
 
 @pytest.mark.parametrize("shift", [(0, 1), (0, 2), (0, 3), (0, 4), (1, 0), (1, 1), (4, 1)])
-def test_neighbours_are_independent(shift):
-    """In their values and in their squares: the four numbers of a block come from two pairs."""
+def test_neighbouring_noise_is_independent(shift):
+    """Values and squares, since the four numbers of a block come from two pairs."""
     noise = white_noise(3, 0, 0, (1000, 1000)).astype(float)
     down, across = shift
     here, there = noise[down:, across:], noise[: 1000 - down, : 1000 - across]
@@ -121,7 +117,7 @@ def test_neighbours_are_independent(shift):
 
 
 @pytest.mark.parametrize("column", [-9, -1, 0, 1, 2, 3, 2**33])
-def test_window_is_a_slice_at_any_column(column):
+def test_noise_windows_equal_slices_at_any_column(column):
     whole = white_noise(2**63, -2, column, (6, 21))
     for skip in range(5):
         np.testing.assert_array_equal(white_noise(2**63, 0, column + skip, (3, 8)), whole[2:5, skip : skip + 8])
@@ -132,10 +128,9 @@ SIZE = 4 * FIELD_TILE
 
 def standard_error(arp, cells):
     """
-    Largest standard error of a covariance or variance estimated from so many cells, in variances.
-
-    Bartlett's: the variance of an estimated covariance is (sum of c(h)**2 + c(h + d) c(h - d)) / cells over all lags h,
-    at most 2 / (independent cells), with cells / sum of squared correlations of them.
+    Upper bound of the standard error of a covariance estimated from this number of cells, relative to the variance.
+    Bartlett: the variance of an estimated covariance is (sum of c(h)**2 + c(h + d) c(h - d)) / cells over all lags h,
+    at most 2 (sum of c(h)**2) / cells.
     """
     correlations = covariances(arp) / covariances(arp)[0, 0]
     return np.sqrt(2 * np.sum(correlations**2) / cells)
@@ -147,7 +142,7 @@ def arp_and_field(request):
 
 
 def test_field_agrees_with_the_analytic_moments(arp_and_field):
-    """Four standard errors: with 60 comparisons a false alarm has a probability of 0.4 %."""
+    """Four standard errors: with 65 comparisons a false alarm has a probability of 0.4 %."""
     arp, field = arp_and_field
     error = standard_error(arp, field.size)
     assert np.mean(field**2) == pytest.approx(1, abs=4 * error)
@@ -157,21 +152,15 @@ def test_field_agrees_with_the_analytic_moments(arp_and_field):
     columns = [np.mean(field[:, :-lag] * field[:, lag:]) for lag in lags]
     np.testing.assert_allclose(rows, expected, rtol=0, atol=4 * error)
     np.testing.assert_allclose(columns, expected, rtol=0, atol=4 * error)
-
-
-def test_mean_is_zero(arp_and_field):
-    """The variance of the mean is the spectrum at frequency zero over the number of cells."""
-    arp, field = arp_and_field
+    # The variance of the mean is the spectral density at frequency zero over the number of cells.
     error = np.sqrt(response(arp, 0, 0) ** 2 / field_variance(arp) / field.size)
     assert field.mean() == pytest.approx(0, abs=4 * error)
 
 
 def test_spectrum_follows_the_response(arp_and_field):
     """
-    Power over squared response, averaged in rings of frequency, is 1.
-
-    A Hann window keeps the ends from leaking. It ties (3/2)**2 neighbouring frequencies along each axis to each other.
-    Half of the plane mirrors the other, and is not looked at.
+    Power over squared response, averaged in rings of frequency, is 1. A Hann window reduces leakage; it correlates
+    (3/2)**2 neighbouring frequencies along each axis. Only half of the plane is used, since the other half mirrors it.
     """
     arp, field = arp_and_field
     window = np.hanning(SIZE + 1)[:-1]
@@ -185,12 +174,11 @@ def test_spectrum_follows_the_response(arp_and_field):
 
 
 @pytest.mark.parametrize("arp", [0.1, 0.15, 0.24])
-def test_seams_of_tiles_solve_the_equation(arp):
+def test_field_solves_its_equation_across_tiles(arp):
     """
-    The linear system x = e + arp (sum of four neighbours) on a patch across four tiles, away from its own borders.
-
-    The noise is the field without interaction. Borders reach in as exp(-d arccosh(1 / (2 arp) - 1)): 5e-13 after 70
-    cells at arp 0.24. Single precision leaves 3e-7 of the standard deviation rms, 2e-6 at most.
+    Linear system x = e + arp (sum of four neighbours) on a patch across four tiles, away from its edges. The noise e is
+    the field without interaction. The effect of edges decays as exp(-d arccosh(1 / (2 arp) - 1)): 5e-13 after 70 cells
+    at arp 0.24. Errors of single precision are 3e-7 of the standard deviation rms and 2e-6 at most.
     """
     half, reach = 110, 70
     first, size = FIELD_TILE - half, 2 * half
@@ -205,38 +193,31 @@ def test_seams_of_tiles_solve_the_equation(arp):
 
 
 @pytest.mark.parametrize("arp", [0.05, 0.24])
-def test_single_precision_moves_cells_by_as_little_as_is_said(arp):
-    """The same noise on the same torus, filtered in double precision."""
+def test_errors_of_single_precision(arp):
+    """The same noise on the same torus, filtered in double precision; rms and largest error."""
     around = margin(arp)
     size = fft.next_fast_len(FIELD_TILE + 2 * around, real=True)
     noise = white_noise(3, -around, -around, (size, size)).astype(float)
     u = 2 * np.pi * np.fft.fftfreq(size)
     double = np.fft.ifft2(np.fft.fft2(noise) * response(arp, u[:, None], u)).real / np.sqrt(field_variance(arp))
-    double, single = (
-        double[around : around + FIELD_TILE, around : around + FIELD_TILE],
-        streaming_field(3, arp, 0, 0, (FIELD_TILE, FIELD_TILE)),
-    )
+    double = double[around : around + FIELD_TILE, around : around + FIELD_TILE]
+    single = streaming_field(3, arp, 0, 0, (FIELD_TILE, FIELD_TILE))
     assert np.sqrt(np.mean((single - double) ** 2)) < 3e-7
     np.testing.assert_allclose(single, double, rtol=0, atol=2e-6)
 
 
 @pytest.mark.parametrize("arp", [0.15, LARGEST_STREAMING_ARP])
-def test_window_is_a_slice_of_the_whole(arp):
-    """Across tile seams, on both sides of the lattice's origin."""
+def test_field_windows_equal_slices(arp):
+    """Across tile edges, on both sides of the lattice's origin."""
     whole = streaming_field(7, arp, -40, FIELD_TILE - 60, (100, 130))
-    for row, column, height, width in [
-        (0, 0, 100, 130),
-        (39, 59, 3, 3),
-        (40, 60, 1, 1),
-        (99, 0, 1, 130),
-        (7, 11, 60, 90),
-    ]:
+    windows = [(0, 0, 100, 130), (39, 59, 3, 3), (40, 60, 1, 1), (99, 0, 1, 130), (7, 11, 60, 90)]
+    for row, column, height, width in windows:
         part = streaming_field(7, arp, row - 40, column + FIELD_TILE - 60, (height, width))
         np.testing.assert_array_equal(part, whole[row : row + height, column : column + width])
 
 
-def test_seeds_give_unrelated_fields():
-    """The last three are the same number in double precision."""
+def test_seeds_give_uncorrelated_fields():
+    """The last three seeds are equal if rounded to double precision."""
     seeds = (0, 1, 2**63 - 3, 2**63 - 2, 2**63 - 1)
     for fields in (
         [streaming_field(seed, 0.0, 0, 0, (400, 400)) for seed in seeds],
@@ -246,8 +227,8 @@ def test_seeds_give_unrelated_fields():
         np.testing.assert_allclose(correlations, np.eye(5), rtol=0, atol=4 / 400)
 
 
-def test_opposite_places_are_not_the_same():
-    """Block numbers below zero are counters from 2**64 down."""
+def test_noise_at_opposite_places_is_uncorrelated():
+    """Negative block numbers become counters from 2**64 down."""
     here, there = streaming_field(7, 0.0, 0, 0, (200, 200)), streaming_field(7, 0.0, -200, -200, (200, 200))
     assert abs(np.corrcoef(here.ravel(), there.ravel())[0, 1]) < 4 / 200
     assert abs(np.corrcoef(here.ravel(), there[::-1, ::-1].ravel())[0, 1]) < 4 / 200
@@ -263,7 +244,7 @@ def test_periodic_field_solves_the_equation_on_a_torus(arp):
 
 
 @pytest.mark.parametrize("arp", [-0.01, 0.25, 0.3, np.nan])
-def test_process_that_is_not_stationary_is_refused(arp):
+def test_arp_of_a_process_that_is_not_stationary_is_refused(arp):
     for call in (
         lambda: streaming_field(1, arp, 0, 0, (2, 2)),
         lambda: periodic_field(1, arp, (2, 2)),
@@ -273,14 +254,14 @@ def test_process_that_is_not_stationary_is_refused(arp):
             call()
 
 
-def test_streaming_stops_before_its_margin_grows_without_bound():
+def test_streaming_refuses_arps_with_too_large_a_margin():
     with pytest.raises(ValueError, match=r"at most 0\.2498.*method=\"periodic\""):
         streaming_field(1, 0.2499, 0, 0, (2, 2))
     assert np.isfinite(periodic_field(1, 0.2499, (50, 50))).all()
 
 
-def test_field_of_mixed_noise_is_the_mixture_of_fields():
-    """The filter is linear; single precision rounds each by 3e-7 rms."""
+def test_field_of_mixed_noise_equals_mixed_fields():
+    """The filter is linear; single precision rounds each field by 3e-7 rms."""
     window = 0.15, FIELD_TILE - 20, -30, (50, 60)
     one, other = (streaming_field(seed, *window) for seed in (7, 8))
     found = mixed_field({7: 0.6, 8: -0.8}, *window)
@@ -289,7 +270,7 @@ def test_field_of_mixed_noise_is_the_mixture_of_fields():
 
 
 @pytest.mark.parametrize("arp", [0.0, 0.15, 0.24])
-def test_window_filtered_by_itself_has_the_cells_of_the_tiles(arp):
+def test_window_field_equals_the_tiled_field(arp):
     """Across the corner of four tiles."""
     found = window_field(20, arp, -50, FIELD_TILE - 40, (90, 70))
     np.testing.assert_allclose(found, streaming_field(20, arp, -50, FIELD_TILE - 40, (90, 70)), rtol=0, atol=1e-5)

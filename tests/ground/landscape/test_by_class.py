@@ -1,4 +1,4 @@
-"""Kernels of classes on labelled rasters: each on its own cells, in any chunks."""
+"""Tests of kernels by cover class on labelled rasters, in any chunks."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def kernels(lai):
 
 @pytest.mark.parametrize("at_once", [7, 2**17])
 @pytest.mark.parametrize("chunks", [None, CHUNKS, ODD_CHUNKS], ids=str)
-def test_each_class_has_what_its_kernel_gives(monkeypatch, lai, cover, kernels, chunks, at_once):
+def test_each_class_has_the_values_of_its_kernel(monkeypatch, lai, cover, kernels, chunks, at_once):
     monkeypatch.setattr(classes, "_AT_ONCE", at_once)
     expected = np.full((2, *lai.shape), np.nan)
     values, rows = lai.values, np.broadcast_to(np.arange(lai.sizes["y"])[:, None], lai.shape)
@@ -45,7 +45,7 @@ def test_each_class_has_what_its_kernel_gives(monkeypatch, lai, cover, kernels, 
 
 
 @pytest.mark.parametrize("codes", [[1, 5], [-1, 1, 5], [1, 5, 9], [-1, 1, 5, 9]], ids=str)
-def test_classes_of_one_kernel_are_evaluated_together(lai, codes):
+def test_classes_with_the_same_kernel_are_evaluated_together(lai, codes):
     calls = []
     both = (lambda cells: calls.append(cells.size) or np.sqrt(cells), [])
     cover = lai.copy(data=np.random.default_rng(3).choice(codes, lai.shape).astype(np.int16))
@@ -55,7 +55,7 @@ def test_classes_of_one_kernel_are_evaluated_together(lai, codes):
     assert calls == [int(cover.isin([1, 5]).sum())]
 
 
-def test_code_without_a_kernel_is_an_error_when_it_computes(lai, cover):
+def test_code_without_a_kernel_raises_when_computed(lai, cover):
     lazy = by_class({1: (np.sqrt, []), 5: (np.sqrt, [])}, in_chunks(cover, CHUNKS), lai)
     with pytest.raises(ValueError, match="codes without a class: 9"):
         lazy.compute()
@@ -69,39 +69,39 @@ def many_codes():
     return np.random.default_rng(1).choice([-1, *TABLE], 1000).astype(np.int16)
 
 
-def test_cells_of_each_class_are_its_own_in_order(many_codes):
+def test_cells_by_class_are_in_order(many_codes):
     for code, cells in zip(TABLE, cells_by_class(many_codes, TABLE), strict=True):
         np.testing.assert_array_equal(cells, np.flatnonzero(many_codes == code))
 
 
 @pytest.mark.parametrize("dtype", [np.int16, np.int64, float, np.uint16])
-def test_codes_of_the_table_pass_in_any_numbers(many_codes, dtype):
+def test_known_codes_pass_in_any_number_type(many_codes, dtype):
     known = many_codes[many_codes >= 0]
     np.testing.assert_array_equal(check_codes(known.astype(dtype), TABLE), known)
     assert check_codes(known.astype(dtype), TABLE).dtype == np.int16
 
 
-def test_missing_is_no_class():
+def test_nan_and_minus_1_have_no_class():
     assert check_codes(np.array([np.nan, 40.0, -1.0]), TABLE).tolist() == [-1, 40, -1]
 
 
 @pytest.mark.parametrize("dtype", [np.int16, np.int32, float])
 @pytest.mark.parametrize("wrong", [-5, 7, 32765])
-def test_other_codes_are_named(dtype, wrong):
-    """-5 is 32764 to an index that counts from the end."""
+def test_unknown_codes_are_named(dtype, wrong):
+    """As an index from the end of an array, -5 would be 32764."""
     with pytest.raises(ValueError, match=rf"codes without a class: {wrong}, in 2 of 3 cells. Classes are 40, 0, 32764"):
         check_codes(np.array([wrong, 40, wrong], dtype), TABLE)
 
 
-def test_fractions_and_many_codes_are_told_in_a_line():
+def test_fractional_codes_and_many_codes_give_a_short_message():
     with pytest.raises(ValueError, match=r"codes without a class: 1\.5, in 1 of 1"):
         check_codes(np.array([1.5]), (1, 2))
-    with pytest.raises(ValueError, match=r"1, 2, 3, 4, 5, 6, 7, 8, \.\.\., in") as told:
+    with pytest.raises(ValueError, match=r"1, 2, 3, 4, 5, 6, 7, 8, \.\.\., in") as caught:
         check_codes(np.arange(1, 1001), tuple(range(2000, 3000)))
-    assert len(str(told.value)) < 500
+    assert len(str(caught.value)) < 500
 
 
-def test_numbers_are_places_in_the_table():
+def test_numbers_are_positions_in_the_table():
     codes = np.random.default_rng(1).choice([-1, 3, 9, 700], (30, 40)).astype(np.int16)
     numbers, present = numbers_of(codes, (9, 5, 3))
     assert (np.array([9, 5, 3, -2])[numbers] == np.where(np.isin(codes, [3, 9]), codes, -2)).all()

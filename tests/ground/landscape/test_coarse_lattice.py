@@ -1,4 +1,4 @@
-"""Fields on a coarser lattice: normal in every cell, one of place, and as far correlated as their splines make them."""
+"""Tests of fields on a coarser lattice, and of the variance that remains in means over pixels."""
 
 import numpy as np
 import pytest
@@ -25,10 +25,10 @@ from fifesim.ground.landscape.downscaling import (
 
 @pytest.mark.parametrize("coarser", [2, 3, 4])
 def test_cells_are_splines_of_the_lattice(coarser):
-    """scipy's B-splines over the centres of the lattice's cells, scaled."""
+    """Compare with scaled B-splines of scipy, centred on the cells of the lattice."""
     lattice = mixed_field({7: 1.0}, 0.1, -5, -5, (16, 16), tile=COARSE_TILE)
     place = (np.arange(4 * coarser) + 0.5) / coarser - 0.5
-    # Knots lie so that spline k is centred on the cell k - 5.
+    # With these knots, spline k is centred on the cell k - 5.
     basis = interpolate.BSpline(np.arange(-7.0, 13.0), np.eye(16), 3)(place)
     along, factor = spline_weights(0.1, coarser)
     expected = basis @ lattice @ basis.T * np.tile(factor, (4, 4))
@@ -37,8 +37,8 @@ def test_cells_are_splines_of_the_lattice(coarser):
 
 
 @pytest.mark.parametrize(("arp", "coarser"), [(0.0, 2), (0.05, 4), (0.24, 3)])
-def test_variance_is_one_wherever_a_cell_lies(arp, coarser):
-    """By the covariance of the process, from another transform than production's."""
+def test_variance_is_one_at_every_place_between_lattice_points(arp, coarser):
+    """From the covariance of the process, by another Fourier transform than in the package."""
     along, factor = spline_weights(arp, coarser)
     covariance = covariances(arp) / covariances(arp)[0, 0]
     lag = np.subtract.outer(np.arange(4), np.arange(4))
@@ -51,12 +51,12 @@ def test_variance_is_one_wherever_a_cell_lies(arp, coarser):
             assert variance == pytest.approx(1.0, abs=1e-9)
 
 
-def test_lattice_of_the_ground_is_the_streaming_field():
+def test_lattice_of_single_cells_is_the_streaming_field():
     np.testing.assert_array_equal(coarse_field(7, 0.2, 1, -3, 5, (9, 8)), streaming_field(7, 0.2, -3, 5, (9, 8)))
 
 
 @pytest.mark.parametrize("coarser", [2, 3, 5])
-def test_windows_are_slices_of_the_whole_across_tiles(coarser):
+def test_coarse_windows_equal_slices_across_tiles(coarser):
     first = COARSE_TILE * coarser - 31
     whole = coarse_field(7, 0.15, coarser, -23, first, (60, 70))
     for row, column, shape in ((0, 0, (1, 1)), (17, 5, (20, 63)), (59, 69, (1, 1)), (22, 28, (8, 9))):
@@ -74,13 +74,13 @@ def test_windows_are_slices_of_the_whole_across_tiles(coarser):
         (True, TypeError, "whole number"),
     ],
 )
-def test_what_is_no_size_is_refused(coarser, error, message):
+def test_invalid_coarsening_factors_are_refused(coarser, error, message):
     with pytest.raises(error, match=message):
         coarse_field(7, 0.1, coarser, 0, 0, (2, 2))
 
 
 @pytest.mark.parametrize("arp, ratio", [(0.0, (3, 3)), (0.15, (3, 3)), (0.24, (2, 5))])
-def test_means_over_pixels_keep_the_mean_correlation_of_all_pairs(arp, ratio):
+def test_variance_of_means_is_the_mean_correlation_of_all_pairs(arp, ratio):
     correlation = covariances(arp) / covariances(arp)[0, 0]
     places = list(np.ndindex(*ratio))
     pairs = [correlation[abs(i - k), abs(j - m)] for i, j in places for k, m in places]
@@ -88,7 +88,7 @@ def test_means_over_pixels_keep_the_mean_correlation_of_all_pairs(arp, ratio):
     assert pair_correlations(arp, ratio)[1].sum() == pytest.approx(1.0, rel=1e-14)
 
 
-def test_sample_has_the_variances_of_the_process():
+def test_pixel_sample_has_the_variances_of_the_process():
     sample = pixel_sample(0.2, (3, 4))
     assert sample.shape == (168 * 126, 12)
     assert sample.mean(axis=1).var() == pytest.approx(kept_variance(0.2, (3, 4)), rel=1e-12)
@@ -96,28 +96,28 @@ def test_sample_has_the_variances_of_the_process():
 
 
 @pytest.mark.parametrize("arp", [0.0, 0.2])
-def test_variation_of_two_cells_is_an_integral(arp):
-    """The square of tanh(s d / 2), for d the difference of two cells: over its normal distribution, by quadrature."""
+def test_variation_of_two_cells_equals_quadrature(arp):
+    """Mean of tanh(s d / 2)^2 over the normal distribution of the difference d of two cells."""
     variations, deviations = deviation_table(arp, (1, 2))
     nodes, weights = np.polynomial.hermite_e.hermegauss(80)
     spread = np.sqrt(2 * (1 - covariances(arp)[0, 1] / covariances(arp)[0, 0]))
     squared = np.tanh(deviations[:, None] * spread * nodes / 2) ** 2 @ weights / np.sqrt(2 * np.pi)
-    # The sample of 127000 pixels has its variance right; what is left is that of its fourth moment.
+    # The sample of 127000 pixels has the exact variance; the tolerance covers the sampling error of its fourth moment.
     np.testing.assert_allclose(variations, np.sqrt(squared), rtol=5e-3, atol=1e-12)
 
 
-def test_levels_of_a_normal_distribution_vary_as_its_field():
+def test_level_deviations_of_a_normal_distribution():
     normal = Marginal.of(stats.norm(10.0, 0.5), kept_variance(0.15, (3, 3)))
     np.testing.assert_allclose(level_deviations(normal, [0.5, 1.0], 0.15, (3, 3)), [0.5, 1.0], rtol=1e-4)
 
 
-def test_levels_of_two_log_normal_cells_vary_by_what_moves_within_them():
-    """ln m = y + ln cosh a of independent y and a, whose variances add."""
+def test_level_deviations_of_two_log_normal_cells():
+    """ln m = y + ln cosh a with independent y and a, whose variances are summed."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(80)
     inside = np.log(np.cosh(0.8 * np.sqrt(0.5) * nodes))
     weights = weights / weights.sum()
     variance = 0.8**2 / 2 + weights @ inside**2 - (weights @ inside) ** 2
     found = level_deviations(LogNormal(), [0.8], 0.0, (1, 2))
-    # 127000 pixels, whose means have their variance right.
+    # The sample of 127000 pixels has the exact variance of means.
     np.testing.assert_allclose(found, np.sqrt(2 * variance), rtol=2e-3)
     assert found > 0.81

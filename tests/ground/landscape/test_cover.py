@@ -1,4 +1,4 @@
-"""Patches of cover: places and shares."""
+"""Tests of patches of land cover: location, size and fractions of classes."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def axes(rows, columns, cell=10.0):
     return 4334220.0 - (np.arange(rows) + 0.5) * cell, 704970.0 + (np.arange(columns) + 0.5) * cell
 
 
-def test_window_is_a_slice_and_cells_of_another_size_show_the_same_patches(pattern):
+def test_patches_do_not_depend_on_the_window_or_cell_size(pattern):
     north, east = axes(90, 110)
     patches = Patches(pattern, 137.0)
     whole = patch_classes(patches, SHARES, 7, north, east)
@@ -45,18 +45,18 @@ def test_window_is_a_slice_and_cells_of_another_size_show_the_same_patches(patte
     np.testing.assert_array_equal(coded, codes[whole])
 
 
-def test_shares_are_as_asked_within_their_sampling_error(pattern):
-    """Some 3600 patches of unequal areas: the standard error of a share is below sqrt(.25 * 3 / 3600)."""
+def test_fractions_of_classes_agree_within_their_sampling_error(pattern):
+    """With about 3600 patches of unequal areas, the standard error is below sqrt(0.25 * 3 / 3600)."""
     counts = np.bincount(patch_classes(Patches(pattern, 100.0), SHARES, 3, *axes(600, 600)).ravel(), minlength=3)
     np.testing.assert_allclose(counts / counts.sum(), SHARES, rtol=0, atol=3 * np.sqrt(0.25 * 3 / 3600))
 
 
-def test_whole_shares_leave_nothing_to_others(pattern):
+def test_fraction_of_1_leaves_no_other_class(pattern):
     assert (patch_classes(Patches(pattern, 50.0), (0.0, 1.0, 0.0), 1, *axes(60, 60)) == 1).all()
 
 
-def test_levels_follow_each_other_in_the_order_of_the_classes():
-    """A smooth field passes through the class between: fences of the first and the last class do not meet."""
+def test_neighbouring_levels_differ_by_one_class():
+    """A smooth field takes all values between, so the first and the last class do not touch."""
     classes = patch_classes(Patches("levels", 400.0), (0.3, 0.4, 0.3), 4, *axes(300, 300, 5.0))
     assert set(np.unique(np.abs(np.diff(classes, axis=1)))) == {0, 1}
     assert np.unique(classes).size == 3
@@ -77,7 +77,7 @@ def test_impossible_patches_are_refused(arguments, message):
         Patches(*arguments)
 
 
-def test_shares_go_by_name_or_in_order():
+def test_fractions_are_matched_by_name_or_order():
     named = Patches("voronoi", 10, {"wood": 0.75, "grass": 0.25})
     assert named.shares_of(["grass", "wood"]) == (0.25, 0.75)
     assert Patches("voronoi", 10).shares_of(["a", "b", "c", "d"]) == (0.25,) * 4
@@ -88,8 +88,8 @@ def test_shares_go_by_name_or_in_order():
 
 
 @pytest.mark.parametrize("make", [voronoi, pastures])
-def test_patches_have_the_mean_area_asked_for(make):
-    """1600 patches of area 1: those that the border cuts count by half, and their squared sizes vary by half."""
+def test_patches_have_unit_mean_area(make):
+    """1600 patches, and about half as many more that the edge cuts; areas have a relative variance of about 0.5."""
     place = (np.arange(1200) + 0.5) / 30
     numbers = make(5, place, place)
     assert 1600 < np.unique(numbers).size < 1600 + 4 * 40 * 1.3
@@ -100,7 +100,7 @@ def test_patches_have_the_mean_area_asked_for(make):
     assert areas.std() > 0.15
 
 
-def test_voronoi_cells_are_those_of_a_search_tree():
+def test_voronoi_cells_agree_with_a_kd_tree():
     down, across = np.arange(200) * 0.37 - 40, np.arange(200) * 0.37 + 30
     (top, rows), (left, columns) = (_blocks(each, 2) for each in (down, across))
     points = _drawn(11, 8, top, left, (rows, columns), 3)
@@ -112,8 +112,8 @@ def test_voronoi_cells_are_those_of_a_search_tree():
     np.testing.assert_array_equal(voronoi(11, down, across).ravel(), points[2].ravel()[nearest])
 
 
-def test_nearest_point_may_lie_two_squares_away():
-    """As it seldom does: here those of the squares between turn their backs."""
+def test_nearest_point_is_found_two_squares_away():
+    """Points in the squares between lie at their far sides."""
     points = np.empty((3, 5, 5))
     points[2] = np.arange(25).reshape(5, 5)
     points[:2] = np.indices((5, 5)) + np.where(np.indices((5, 5)) < 2, 0.0, 0.99)
@@ -124,11 +124,11 @@ def test_nearest_point_may_lie_two_squares_away():
     assert away.argmin() == 10 and number[0, 0] == 10
 
 
-def test_smooth_field_is_standard_normal_and_has_its_length():
-    """300 x 300 lengths; the correlation of a Gaussian is 1/e at distance 1, the same down and across."""
+def test_smooth_field_is_standard_normal_with_gaussian_correlation():
+    """300 x 300 correlation lengths; the correlation is 1/e at distance 1 along both axes."""
     place = np.arange(1200) / 4
     field = smooth_field(3, place - 30, place + 800)
-    # A field of area A has some A / pi independent values.
+    # A field of area A has about A / pi independent values.
     independent = 300**2 / np.pi
     assert abs(field.mean()) < 4 / np.sqrt(independent)
     assert abs(field.var() - 1) < 4 * np.sqrt(2 / independent)
@@ -143,7 +143,7 @@ def test_pastures_are_rectangles_that_fill_their_block():
     parts = [part for part, _ in _fenced(7, 3, -4)]
     areas = [(bottom - top) * (right - left) for top, left, bottom, right in parts]
     assert len(parts) == 9 and abs(sum(areas) - 1) < 1e-12
-    # The largest is parted first, at 3/8 to 5/8: no pasture is 8 / 3 as large as one that was parted.
+    # The largest rectangle is split first, at 3/8 to 5/8 of its length, which bounds the ratio of areas.
     assert max(areas) / min(areas) < (8 / 3) ** 2
     place = (np.arange(90) + 0.5) / 30
     inside = pastures(7, place + 9, place - 12)

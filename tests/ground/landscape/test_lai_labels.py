@@ -1,4 +1,4 @@
-"""Leaf area of the ground scene on labelled rasters: labels, laziness, and the kernel's numbers."""
+"""Tests of leaf area rasters: labels, laziness, values of the kernels, and maps of other quantities or scales."""
 
 import warnings
 
@@ -25,7 +25,7 @@ def test_scene_is_the_field_mapped_to_the_distribution(site):
     np.testing.assert_array_equal(lai, quantile_map(field, table))
 
 
-def test_scene_is_labelled_and_placed(site, lai):
+def test_scene_has_labels_and_georeferencing(site, lai):
     check_place(lai, site.crs)
     assert lai.name == "lai" and cf.attributes("lai").items() <= lai.attrs.items()
     assert lai.attrs["arp"] == 0.15 and lai.attrs["rng_seed"] == "7"
@@ -41,12 +41,12 @@ def test_scene_has_the_same_bits_in_any_chunks(site, lai, chunks):
     xr.testing.assert_identical(lazy.compute(), lai)
 
 
-def test_window_of_the_site_is_a_slice_of_it(lai):
+def test_window_of_the_site_equals_a_slice(lai):
     larger = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((80, 140), (170, 240))), arp=0.15, seed=7)
     xr.testing.assert_identical(larger[10:55, 10:64].assign_coords(spatial_ref=lai["spatial_ref"]), lai)
 
 
-def test_periodic_scene_is_made_at_once_and_its_chunks_change_nothing(site):
+def test_periodic_scene_has_the_same_bits_in_chunks(site):
     whole = fifesim.lai_scene(site, method="periodic", seed=3)
     xr.testing.assert_identical(fifesim.lai_scene(site, method="periodic", seed=3, chunks=11).compute(), whole)
 
@@ -62,7 +62,7 @@ def test_periodic_scene_is_made_at_once_and_its_chunks_change_nothing(site):
         ({"chunks": {"band": 1}}, "y and x"),
     ],
 )
-def test_impossible_scene_is_refused_before_it_computes(site, options, message):
+def test_impossible_lai_scenes_are_refused(site, options, message):
     with pytest.raises(ValueError, match=message):
         fifesim.lai_scene(site, **options)
 
@@ -73,7 +73,7 @@ def test_scene_too_large_for_memory_names_the_streaming_method():
         fifesim.lai_scene(grid, method="periodic")
 
 
-def test_map_of_leaf_area_is_labelled_and_checked(tmp_path, site):
+def test_map_has_labels_and_its_range_is_checked(tmp_path, site):
     values = np.random.default_rng(1).uniform(0, 4, site.shape)
     values[3, 4] = np.nan
     lai = fifesim.open_lai(write(tmp_path / "lai.tif", values, site.affine), site)
@@ -89,7 +89,7 @@ def test_map_of_leaf_area_is_labelled_and_checked(tmp_path, site):
         lazy.compute()
 
 
-def test_map_in_another_scale_or_without_data_says_what_to_type(tmp_path, site):
+def test_map_with_another_scale_or_without_data_is_refused_with_the_remedy(tmp_path, site):
     values = np.full(site.shape, 35.0)
     with pytest.raises(ValueError, match=r"up to 35, canopies have at most 20: .* type lai \* 0.1, or gdal_edit"):
         fifesim.open_lai(write(tmp_path / "modis.tif", values, site.affine), site)
@@ -97,7 +97,7 @@ def test_map_in_another_scale_or_without_data_says_what_to_type(tmp_path, site):
         fifesim.open_lai(write(tmp_path / "none.tif", np.full(site.shape, np.nan), site.affine), site)
 
 
-def test_map_that_is_open_is_taken_as_its_file(tmp_path, site):
+def test_open_raster_equals_its_file(tmp_path, site):
     path = write(tmp_path / "lai.tif", np.random.default_rng(1).uniform(0, 4, site.shape), site.affine)
     opened = rioxarray.open_rasterio(path, masked=True)
     xr.testing.assert_equal(fifesim.open_lai(opened, site), fifesim.open_lai(path, site))
@@ -113,7 +113,7 @@ MAP = fifesim.fife_site(10, window=((0, 60), (0, 60)))
 WEST = fifesim.fife_site(5, window=((0, 120), (0, 60)))
 
 
-def own_map(values=2.0, **attrs):
+def map_of(values=2.0, **attrs):
     cells = np.broadcast_to(np.asarray(values), MAP.shape).copy()
     return grids.place(xr.DataArray(cells, dims=("y", "x"), attrs=attrs), MAP)
 
@@ -121,18 +121,18 @@ def own_map(values=2.0, **attrs):
 @pytest.mark.parametrize("fill", [-1.0, -9999.0, 255.0, 32767.0])
 @pytest.mark.parametrize("form", ["file", "array", "lazy"])
 def test_undeclared_fill_values_next_to_the_grid_are_refused(tmp_path, fill, form):
-    """Interpolated with 2, -1 in the first column outside would give 1.25 at the edge of the grid."""
+    """If -1 was interpolated with 2, the first column outside would give 1.25 at the edge of the grid."""
     values = np.full(MAP.shape, 2.0)
     values[20:25, 30:] = fill
     path = write(tmp_path / "map.tif", values, MAP.affine, nodata=None)
-    given = path if form == "file" else own_map(values)
+    given = path if form == "file" else map_of(values)
     chunks = 25 if form == "lazy" else None
     with pytest.raises(ValueError, match=rf"on the grid or next to it: .*got {fill:g} |up to {fill:g}, .*-a_nodata"):
         fifesim.open_lai(given, WEST, chunks=chunks).compute()
-    declared = own_map(values).rio.write_nodata(fill)
+    declared = map_of(values).rio.write_nodata(fill)
     assert float(abs(fifesim.open_lai(declared, WEST, chunks=chunks) - 2.0).max()) == 0
     values[20:25, 30:40] = 2.0
-    assert float(abs(fifesim.open_lai(own_map(values), WEST, chunks=chunks) - 2.0).max()) == 0
+    assert float(abs(fifesim.open_lai(map_of(values), WEST, chunks=chunks) - 2.0).max()) == 0
 
 
 @pytest.mark.parametrize(
@@ -147,8 +147,8 @@ def test_undeclared_fill_values_next_to_the_grid_are_refused(tmp_path, fill, for
         ("b1", {"units": "%"}, "has units '%', where leaf area index is needed, in '1'"),
     ],
 )
-def test_a_map_that_is_named_as_another_quantity_is_refused(tmp_path, name, attrs, message):
-    given = own_map(**attrs).rename(name)
+def test_map_with_the_name_of_another_quantity_is_refused(tmp_path, name, attrs, message):
+    given = map_of(**attrs).rename(name)
     with pytest.raises(ValueError, match=message):
         fifesim.open_lai(given, WEST)
     if "units" not in attrs and "standard_name" not in attrs:
@@ -162,14 +162,14 @@ def test_a_map_that_is_named_as_another_quantity_is_refused(tmp_path, name, attr
 
 
 @pytest.mark.parametrize("name", ["lai", "Lai_500m", "Leaf area index", "b1", "MOD15A2H Fpar and Lai", None])
-def test_a_map_that_is_named_as_leaf_area_or_not_at_all_is_taken(name):
+def test_map_with_a_name_of_leaf_area_or_none_is_accepted(name):
     with warnings.catch_warnings(action="error", category=UserWarning):
-        found = fifesim.open_lai(own_map(long_name=str(name), units="m2 m-2").rename(name), WEST)
+        found = fifesim.open_lai(map_of(long_name=str(name), units="m2 m-2").rename(name), WEST)
     assert found.name == "lai" and found.notnull().any()
 
 
-def test_integers_without_a_scale_are_a_warning(tmp_path):
-    counts = own_map(np.full(MAP.shape, 4, np.int16))
+def test_integers_without_a_scale_cause_a_warning(tmp_path):
+    counts = map_of(np.full(MAP.shape, 4, np.int16))
     path = tmp_path / "counts.tif"
     counts.rio.to_raster(path)
     for given, name in ((counts, "the raster"), (path, "counts.tif")):
@@ -179,8 +179,9 @@ def test_integers_without_a_scale_are_a_warning(tmp_path):
         assert float(fifesim.open_lai(counts.assign_attrs(scale_factor=0.5), WEST).mean()) == 2
 
 
-def test_leaf_area_in_tenths_is_a_warning_also_when_it_is_lazy():
-    tenths = own_map(np.linspace(0, 18, 3600).reshape(MAP.shape))
+def test_leaf_area_in_tenths_causes_a_warning():
+    """Also for lazy maps, when they are computed."""
+    tenths = map_of(np.linspace(0, 18, 3600).reshape(MAP.shape))
     known = {"geometry": fifesim.Geometry(30, 120)}
     lazy = fifesim.open_lai(tenths, MAP, chunks=60)
     for function in (lambda: fifesim.open_lai(tenths, MAP), lazy.compute, lambda: tenths.fifesim.fpar(**known)):
