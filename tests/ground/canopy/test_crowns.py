@@ -4,15 +4,8 @@ import numpy as np
 import pytest
 
 from fifesim.base import files
-from fifesim.ground.canopy.crowns import (
-    check_crowns,
-    clumped,
-    crown_shares,
-    crown_terms,
-    crowns_over_background,
-    lai_in_crowns,
-)
-from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
+from fifesim.ground.canopy.crowns import check_crowns, clumped, crown_shares, lai_in_crowns
+from fifesim.ground.canopy.sail_model import sail, with_background
 
 COVER = np.array([0, 1e-9, 0.3, 0.8, 1 - 1e-9, 1])
 VIEWS = [(28.5, 0, 0), (28.5, 28.5, 0), (60, 45, 120), (75, 60, 180)]
@@ -73,15 +66,6 @@ def test_crowns_are_reciprocal():
         for view in ((60, 25, 50), (25, 60, 50))
     )
     np.testing.assert_allclose(there, back, rtol=1e-11)
-
-
-@pytest.mark.parametrize("view", VIEWS)
-def test_terms_of_crowns_give_the_clumped_canopy_over_its_background(view):
-    canopy, shares, sky = crowns(np.array([0.0, 0.5, 6])[:, None], view), crown_shares(COVER, 0.8, *view), 0.3
-    surface = with_background(clumped(canopy, shares), 0.4)
-    of_crowns = COVER, shares.sun, shares.view, shares.apart, shares.lit
-    found = crowns_over_background(crown_terms(canopy, sky), of_crowns, 0.4)
-    np.testing.assert_allclose(found, reflectance_factor(surface.rso, surface.rdo, sky), rtol=0, atol=1e-14)
 
 
 def test_crowns_agree_with_rami_het01_better_than_a_plain_canopy():

@@ -165,7 +165,7 @@ def test_canopy_is_frozen_and_can_be_pickled():
 
 
 @pytest.mark.parametrize("name", list(PROPERTIES))
-def test_a_property_passed_outside_a_canopy_names_the_remedy(lai, name):
+def test_error_for_a_property_outside_a_canopy_names_the_remedy(lai, name):
     message = re.escape(f"has no argument '{name}': type canopy=fifesim.Canopy({name}=...)")
     for call in (
         lambda: lai.fifesim.surface_reflectance("TM", **{name: 0.3}),
@@ -251,6 +251,7 @@ def test_scenario_keys_give_the_canopies_of_scene_and_classes():
 
 
 def test_table_in_the_howto_page_matches_the_fields():
+    """Meanings, defaults, ranges, and the properties that may be rasters."""
     page = (ROOT / "docs/howto/canopy.md").read_text(encoding="utf-8")
     rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in re.findall(r"^\| `.*\|$", page, re.MULTILINE)]
     shown = {row[0].strip("`"): row[1:] for row in rows}
@@ -261,22 +262,6 @@ def test_table_in_the_howto_page_matches_the_fields():
         if name in NUMERIC_PROPERTIES:
             found = (float(default), limits, raster == "yes")
             assert found == (known.default, f"{known.lowest:g} to {known.highest:g}", known.by_cell)
-
-
-def test_defaults_and_ranges_of_numbers():
-    known = {name: (each.default, each.lowest, each.highest) for name, each in NUMERIC_PROPERTIES.items()}
-    assert known == {
-        "hotspot": (0.0, 0, 10),
-        "brown": (0.0, 0, 1),
-        "dissociation": (0.0, 0, 1),
-        "crown_cover": (1.0, 0, 1),
-        "crown_shape": (1.0, 0, 10),
-        "soil": (0.0, -1, 1),
-        "moisture": (0.0, 0, 1),
-    }
-    others = {"leaf_optics", "leaf_angles", "model", "brown_leaf", "background"}
-    assert set(PROPERTIES) - set(NUMERIC_PROPERTIES) == others
-    assert set(BY_CELL) == {"brown", "dissociation", "crown_cover", "soil", "moisture"}
     effects = {"brown": "dead leaves", "crown_cover": "clumping", "soil": "soil", "moisture": "soil"}
     assert {name: each.effect for name, each in DRAWN.items()} == effects
 

@@ -11,11 +11,9 @@ from fifesim.ground.canopy.interpolation import (
     interpolate,
     interpolate_crowned,
     interpolate_foliage,
-    interpolate_over,
     tabulate,
     tabulate_foliage,
 )
-from fifesim.ground.canopy.sail_model import over_background
 
 
 def test_tables_meet_their_tolerance_or_raise():
@@ -33,40 +31,10 @@ def test_values_outside_a_table_are_nan():
     assert np.all(np.isnan(interpolate(table, [np.nan, -1e-9, LARGEST_TABLE_LAI * 1.001, np.inf])))
 
 
-def test_interpolate_over_combines_terms_with_the_background_of_each_cell():
-    """Sums of exponentials in two bands; NaN in leaf area or background gives NaN."""
-
-    def terms(lai):
-        return np.stack([np.exp(-k * lai) / k for k in (1.0, 2.0, 1.5, 3.0, 1.2, 2.5, 1.1, 4.0)])
-
-    table = tabulate(terms, rate=4.0, tolerance=1e-7)
-    rng = np.random.default_rng(5)
-    lai, background = rng.uniform(0, 8, (30, 40)), rng.uniform(0, 1, (2, 30, 40))
-    expected = over_background(*terms(lai).reshape(2, 4, 30, 40).swapaxes(0, 1), background)
-    np.testing.assert_allclose(interpolate_over(table, lai, background), expected, rtol=0, atol=2e-7)
-    lai[2, 3], background[1, 4, 5] = np.nan, np.nan
-    holes = np.isnan(interpolate_over(table, lai, background))
-    assert holes[:, 2, 3].all() and holes[:, 4, 5].tolist() == [False, True] and holes.sum() == 3
-
-
 def terms_of(count, lai, brown):
     """Terms of two bands for dead leaves below green ones, with decay rates typical of canopies."""
     rates = np.linspace(0.5, 2.0, 2 * count)[:, None]
     return (np.exp(-rates * (1 - brown) * lai) + 0.5 * np.exp(-rates * brown * lai)) / (1 + rates)
-
-
-@pytest.fixture(scope="module")
-def cells():
-    rng = np.random.default_rng(3)
-    lai = np.concatenate(
-        [
-            [0, 0, LARGEST_FOLIAGE_LAI, LARGEST_FOLIAGE_LAI],
-            rng.gamma(1.5, 1.5, 500),
-            rng.uniform(0, LARGEST_FOLIAGE_LAI, 500),
-        ]
-    )
-    brown = np.concatenate([[0, 1, 0, 1], rng.uniform(0, 1, 1000)])
-    return lai, brown, rng.uniform(0.1, 1, lai.size), rng.uniform(0, 0.4, (2, lai.size))
 
 
 @pytest.fixture(scope="module")
@@ -79,19 +47,13 @@ def crowned():
     return tabulate_foliage(lambda lai, brown: 0.5 * terms_of(8, lai, brown), rate=2.0)
 
 
-def test_interpolate_foliage_matches_its_terms(cells, table):
-    lai, brown, _, ground = cells
-    expected = over_background(*terms_of(4, lai, brown).reshape(2, 4, -1).swapaxes(0, 1), ground)
-    np.testing.assert_allclose(interpolate_foliage(table, lai, brown, ground)[0], expected, rtol=0, atol=1e-6)
-    one, _ = interpolate_foliage(table, lai, brown, ground[:, :1])
-    np.testing.assert_array_equal(one[:, 0], interpolate_foliage(table, lai, brown, ground)[0][:, 0])
-
-
 @pytest.mark.parametrize("view", [(28.5, 0, 0), (60, 58, 10), (85, 80, 180)])
-def test_interpolate_crowned_matches_its_terms(cells, crowned, view):
-    lai, brown, cover, ground = cells
-    cover[:4] = 0, 1, 1, 1
-    lai = np.minimum(lai, 0.99 * LARGEST_FOLIAGE_LAI * cover)
+def test_interpolate_crowned_matches_its_terms(crowned, view):
+    rng = np.random.default_rng(3)
+    lai = np.concatenate([[0, 0, 50, 50], rng.gamma(1.5, 1.5, 500), rng.uniform(0, LARGEST_FOLIAGE_LAI, 500)])
+    brown, cover = rng.uniform(0, 1, 1004), rng.uniform(0.1, 1, 1004)
+    brown[:4], cover[:4] = [0, 1, 0, 1], [0, 1, 1, 1]
+    lai, ground = np.minimum(lai, 0.99 * LARGEST_FOLIAGE_LAI * cover), rng.uniform(0, 0.4, (2, 1004))
     shares = crown_shares(cover, 0.8, *view)
     of_crowns = cover, shares.sun, shares.view, shares.apart, shares.lit
     inside = np.divide(lai, cover, where=cover > 0, out=np.zeros_like(lai))
@@ -100,15 +62,6 @@ def test_interpolate_crowned_matches_its_terms(cells, crowned, view):
     found, wrong = interpolate_crowned(crowned, crown_table(0.8, *view), lai, brown, cover, ground)
     assert wrong == 0
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
-
-
-def test_tables_of_one_dead_share_have_no_axis_over_it():
-    table = tabulate_foliage(lambda lai, _: 0.5 * terms_of(8, lai, 0.3), rate=2.0, by_brown=False)
-    assert table.coefficients.shape[1:] == (1, 16)
-    lai, cover, shares = np.array([0.4, 3.0]), np.ones(2), (1.0, 1.0, 1.0, 0.0, 1.0)
-    found, _ = interpolate_crowned(table, crown_table(1.0, 30, 0, 0), lai, np.array([0.3]), cover, np.full((2, 1), 0.2))
-    terms = tuple(0.5 * terms_of(8, lai, 0.3).reshape(2, 8, -1).swapaxes(0, 1))
-    np.testing.assert_allclose(found, crowns_over_background(terms, shares, 0.2), rtol=0, atol=1e-6)
 
 
 def test_foliage_is_nan_without_data_and_infinite_beyond_the_table(table):
@@ -124,12 +77,6 @@ def test_crowned_is_nan_without_data_and_infinite_beyond_the_table(crowned):
     found, wrong = interpolate_crowned(crowned, crown_table(1.0, 30, 0, 0), lai, brown, cover, np.full((2, 1), 0.2))
     assert np.isfinite(found[:, 0]).all() and np.isnan(found[:, 1:5]).all() and np.isinf(found[:, 5]).all()
     assert wrong > 0
-
-
-def test_single_dead_share_applies_to_all_cells(cells, table):
-    lai, _, _, ground = cells
-    one, _ = interpolate_foliage(table, lai, np.array([0.3]), ground)
-    np.testing.assert_array_equal(one, interpolate_foliage(table, lai, np.full(lai.size, 0.3), ground)[0])
 
 
 @pytest.mark.parametrize("name", ["lai", "brown", "ground", "cover"])

@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from oracles_canopy import sunlit_and_seen, turned_leaves
+from oracles_canopy import turned_leaves
 from scipy.integrate import quad
 from scipy.linalg import expm
 
 from fifesim.base import files
 from fifesim.ground.canopy.layers import (
     FPAR_INF,
-    added,
     beer_fpar,
     extinction_coefficient,
     green_fpar,
@@ -19,7 +18,7 @@ from fifesim.ground.canopy.layers import (
     two_layers,
 )
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.sail_model import direction_distance, leaf_scattering, sail, with_background
+from fifesim.ground.canopy.sail_model import sail, with_background
 
 LAI = np.array([0, 1e-6, 0.5, 3, 20, 100])[:, None]
 BROWN = np.array([0, 1e-9, 0.2, 0.7, 1 - 1e-9, 1])
@@ -58,55 +57,11 @@ def test_two_layers_agree_with_4sail2():
 
 @pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("dissociation", [0.0, 0.4, 1.0])
-def test_equal_leaves_or_leaves_of_one_kind_equal_sail(view, dissociation):
+def test_equal_leaves_or_leaves_of_one_kind_or_mixed_leaves_equal_sail(view, dissociation):
     check_equal(canopies(BROWN, dissociation, view, dead=GREEN), leaves(GREEN, view))
     check_equal(canopies(0.0, dissociation, view), leaves(GREEN, view))
     check_equal(canopies(1.0, dissociation, view), leaves(DEAD, view))
-
-
-@pytest.mark.parametrize("view", VIEWS)
-def test_mixed_leaves_equal_sail_with_the_mean_leaf(view):
-    mean = mixed(GREEN, DEAD, BROWN)
-    check_equal(canopies(BROWN, 0.0, view), leaves(mean, view))
-
-
-def test_added_layers_equal_a_sum_over_orders_of_reflection():
-    """Light reflected between two layers without hot spot, order by order."""
-    view = (50, 20, 40, 0.0)
-    top, bottom = leaves((0.1, 0.3), view, 1.5), leaves((0.5, 0.2), view, 2.0)
-    down, up = top.tsd, 0.0
-    total = top.rso + top.tss * bottom.rso * top.too
-    for order in range(200):
-        sunlight = top.tss if order == 0 else 0.0
-        up = sunlight * bottom.rsd + down * bottom.rdd
-        total += down * bottom.rdo * top.too + up * top.tdo
-        down = up * top.rdd
-    np.testing.assert_allclose(added(top, bottom).rso, total, rtol=1e-13)
-
-
-@pytest.mark.parametrize("dissociation", [0.0, 0.5, 1.0])
-def test_layers_conserve_the_leaf_area_of_both_kinds(dissociation):
-    layers = leaf_layers(LAI, BROWN, dissociation)
-    np.testing.assert_allclose(layers.lai + layers.lai_below, LAI + 0 * BROWN, rtol=1e-14)
-    dead = layers.lai * layers.brown + layers.lai_below * layers.brown_below
-    np.testing.assert_allclose(dead, LAI * BROWN, rtol=1e-12, atol=1e-300)
-
-
-def test_hot_spot_spans_both_layers():
-    """Single scattering of the hot spot in each layer, from the sunlit and visible leaf area by quadrature."""
-    sza, vza, raa, hotspot, lai, brown = 40.0, 30.0, 20.0, 0.2, 3.0, 0.6
-    angles = {"sza": sza, "vza": vza, "raa": raa}
-    c = [leaf_scattering(*optics, *angles.values(), leaf_angle_classes("spherical")) for optics in (GREEN, DEAD)]
-    ks, ko = float(c[0].ks), float(c[0].ko)
-    alpha = 2 * direction_distance(sza, vza, raa) / (hotspot * (ks + ko))
-    seen = sunlit_and_seen(lai, ks, ko, alpha)
-    above = sunlit_and_seen((1 - brown) * lai, ks, ko, (1 - brown) * alpha)
-    plain = [-np.expm1(-(ks + ko) * depth) / (ks + ko) for depth in (lai, (1 - brown) * lai)]
-    added_light = c[0].w * (above - plain[1]) + c[1].w * (seen - above - plain[0] + plain[1])
-    with_it, without = (
-        two_layers(lai, *GREEN, *DEAD, brown=brown, dissociation=1.0, hotspot=h, **angles).rso for h in (hotspot, 0.0)
-    )
-    np.testing.assert_allclose(with_it - without, added_light, rtol=0, atol=1e-9)
+    check_equal(canopies(BROWN, 0.0, view), leaves(mixed(GREEN, DEAD, BROWN), view))
 
 
 @pytest.mark.parametrize("dissociation", [0.0, 0.5, 1.0])
@@ -155,12 +110,9 @@ def test_extinction_equals_sail(shape):
 
 
 def test_fpar_is_the_integral_of_absorption_over_depth():
-    """Quadrature of K exp(-K L) for eq. 6 of the paper."""
+    """Quadrature of K exp(-K L) for eq. 6 of the paper; limits without leaves and with infinitely many."""
     expected = 0.94 * quad(lambda depth: 0.569 * np.exp(-0.569 * depth), 0, 2.5)[0]
     np.testing.assert_allclose(beer_fpar(2.5, 0.569), expected, rtol=1e-12)
-
-
-def test_limits_of_fpar():
     assert beer_fpar(0.0, 0.5) == 0
     assert beer_fpar(np.inf, 0.5) == FPAR_INF == 0.94
     assert beer_fpar(1e4, 0.5, fpar_inf=0.9) == 0.9
@@ -172,11 +124,11 @@ def test_green_fpar_is_absorption_times_green_share_at_each_depth(dissociation):
     lai, brown, extinction = 3.0, 0.4, 0.6
     layers = leaf_layers(lai, brown, dissociation)
 
-    def taken(depth):
+    def absorbed(depth):
         share = layers.brown if depth < layers.lai else layers.brown_below
         return 0.94 * extinction * np.exp(-extinction * depth) * (1 - share)
 
-    expected = quad(taken, 0, layers.lai)[0] + quad(taken, layers.lai, lai)[0]
+    expected = quad(absorbed, 0, layers.lai)[0] + quad(absorbed, layers.lai, lai)[0]
     np.testing.assert_allclose(green_fpar(lai, extinction, brown, dissociation), expected, rtol=1e-12)
     for share, all_of_it in ((0.0, beer_fpar(lai, extinction)), (1.0, 0.0)):
         found = green_fpar(lai, extinction, share, dissociation)

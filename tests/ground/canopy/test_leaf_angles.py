@@ -80,11 +80,9 @@ def test_text_of_a_distribution_recreates_it(given):
     assert hash(leaves) == hash(leaf_angle_classes(str(leaves)))
 
 
-def test_a_sequence_is_equal_classes_from_0_to_90_degrees():
+def test_sequence_gives_equal_classes_whose_fractions_are_normalised():
+    """Only rounding is corrected."""
     assert leaf_angle_classes(np.array([0.5, 0.5])).inclination == (22.5, 67.5)
-
-
-def test_fractions_are_normalised_if_only_rounding_is_missing():
     assert abs(sum(leaf_angle_classes([0.3333333, 0.3333333, 0.3333334]).fraction) - 1) < 1e-15
     with pytest.raises(ValueError, match=r"sum to 1, got a sum of 0.9 .* divide them by their sum"):
         leaf_angle_classes([0.5, 0.4])

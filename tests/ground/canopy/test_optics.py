@@ -18,16 +18,16 @@ from fifesim.ground.canopy.optics import (
     leaf_means,
 )
 from fifesim.ground.canopy.prospect import CONTENTS, LARGEST_STRUCTURE, Leaf
-from fifesim.ground.canopy.sail_model import over_background, reflectance_factor, sail, with_background
-
-TM = ["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]
 
 
 def test_defaults_are_calibrated_to_table_2_of_the_paper():
+    """Changing a result does not change the defaults."""
     reflectance, transmittance = band_leaf_optics(["TM4", "TM3"])
     np.testing.assert_array_equal(reflectance, [0.45, 0.07])
     np.testing.assert_array_equal(transmittance, [0.42, 0.04])
     np.testing.assert_array_equal(band_background(["TM3", "TM4"]), [0.15, 0.19])
+    reflectance[:] = 0
+    assert band_leaf_optics(["TM3"])[0] == 0.07
 
 
 def test_given_optics_are_matched_by_band_name_or_order():
@@ -36,12 +36,6 @@ def test_given_optics_are_matched_by_band_name_or_order():
     np.testing.assert_array_equal(band_leaf_optics(["a", "b"], ([0.1, 0.5], [0.05, 0.4])), [[0.1, 0.5], [0.05, 0.4]])
     np.testing.assert_array_equal(band_background(["B4"], {"B4": 0.2}), [0.2])
     np.testing.assert_array_equal(band_background(["a", "b"], 0.2), [0.2, 0.2])
-
-
-def test_changing_a_result_does_not_change_the_defaults():
-    reflectance, _ = band_leaf_optics(["TM3"])
-    reflectance[:] = 0
-    assert band_leaf_optics(["TM3"])[0] == 0.07
 
 
 @pytest.mark.parametrize("function", [band_leaf_optics, band_background])
@@ -115,7 +109,7 @@ def test_nan_content_gives_nan_optics():
 
 
 def test_nearly_transparent_leaves_conserve_energy():
-    """SAIL refuses leaves that scatter more than 1, which the error of the table alone would exceed."""
+    """The error of the table is larger than rounding, and SAIL refuses leaves that scatter more than 1."""
     coastal = fifesim.instrument("MSI").select(["MSI1"])[0].response
     clear = dict.fromkeys(CONTENTS, 0.0) | {"brown": np.geomspace(1e-15, 0.1, 3000)}
     assert leaf_means((coastal,), Leaf(structure=1.0, **clear)).sum(axis=0).max() <= 1 + 1e-15
@@ -127,32 +121,3 @@ def test_distinct_columns_finds_equal_columns():
     assert first.tolist() == [0, 1, 3, 4] and kind.tolist() == [0, 1, 0, 2, 3, 2]
     np.testing.assert_array_equal(rows[:, first][:, kind], rows)
     assert [each.tolist() for each in distinct_columns(np.empty((2, 0)))] == [[], []]
-
-
-RHO = np.linspace(0, 1, 6)[:, None, None]
-SZA = np.array([0, 28.5, 60, 85, 89.9])[:, None]
-VZA = np.array([0, 30, 75, 89.9])
-
-
-@pytest.mark.parametrize("r", [0.0, 0.15, 1.0])
-def test_reflectance_without_leaves_equals_the_background(r):
-    for reflectance in with_background(sail(0.0, RHO, 1 - RHO, sza=SZA, vza=VZA, hotspot=0.05), r):
-        assert np.all(reflectance == r)
-
-
-def test_diffuse_fraction_weights_the_two_reflectances():
-    assert reflectance_factor(0.3, 0.5, 0.0) == 0.3
-    assert reflectance_factor(0.3, 0.5, 1.0) == 0.5
-
-
-@pytest.mark.parametrize("r", [0.0, 0.15, 0.6, 1.0])
-def test_over_background_sums_reflections_between_leaves_and_ground(r):
-    """Compare with the sum over orders of reflection."""
-    c = sail(2.0, RHO, 0.9 - 0.9 * RHO, sza=SZA, vza=VZA, raa=20, hotspot=0.1)
-    terms = c.rso, c.tsstoo - c.tss * c.too, (c.tss + c.tsd) * (c.too + c.tdo), c.rdd
-    found = over_background(*terms, r)
-    np.testing.assert_allclose(found, with_background(c, r).rso, rtol=1e-13)
-    alone, hot, through, rdd = terms
-    orders = sum(through * r * (r * rdd) ** n for n in range(4000))
-    converged = r * np.broadcast_to(rdd, found.shape) < 0.99
-    np.testing.assert_allclose(found[converged], (alone + hot * r + orders)[converged], rtol=1e-12)

@@ -166,8 +166,7 @@ def test_fractions_of_a_mixture_by_cell(lai, share):
 
 def test_background_of_numbers_refers_to_background_by_cell_for_rasters(share):
     with pytest.raises(
-        TypeError,
-        match=r"fraction of 'soil_dry' must be a number, .*: rasters of fractions are backgr",
+        TypeError, match=r"fraction of 'soil_dry' must be a number, .*: rasters of fractions are backgr"
     ):
         fifesim.Background({"soil_dry": share, "shade": 1 - share})
 

@@ -3,7 +3,6 @@
 import numpy as np
 import prosail
 import pytest
-from prosail.prospect_d import calctav
 from scipy.integrate import quad
 
 import fifesim
@@ -27,14 +26,6 @@ def test_random_leaves_agree_with_prosail(seed):
     )  # fmt: skip
     np.testing.assert_allclose(wavelength, nanometres / 1000, rtol=1e-14)
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("angle", [10.0, 40.0, 59.0, 90.0])
-def test_interface_transmissivity_agrees_with_prosail(angle):
-    """Both use the closed form of Stern and Allen."""
-    index = np.linspace(1.2, 1.6, 9)
-    ours = prospect.interface_transmissivity(index, angle)
-    np.testing.assert_allclose(ours, calctav(angle, index), rtol=1e-11)
 
 
 @pytest.mark.parametrize("k", [1e-6, 0.01, 0.3, 2.0, 20.0])
@@ -65,15 +56,12 @@ def test_pile_equals_layers_added_one_by_one(k, layers):
     np.testing.assert_allclose(prospect.pile(r, t, layers), (reflectance, transmittance), rtol=1e-9)
 
 
-def test_reflectance_of_an_infinite_pile_does_not_change_under_another_layer():
-    """R = r + t^2 R / (1 - r R), and nothing is transmitted."""
+def test_pile_of_infinitely_many_or_opaque_layers_transmits_nothing():
+    """Another layer does not change an infinite pile, R = r + t^2 R / (1 - r R); an opaque pile is its first layer."""
     r, t = 0.3, 0.6
     reflectance, transmittance = prospect.pile(r, t, 1000.0)
     assert transmittance == pytest.approx(0, abs=1e-100)
     assert reflectance == pytest.approx(r + t**2 * reflectance / (1 - r * reflectance), rel=1e-13)
-
-
-def test_pile_of_opaque_layers_reflects_like_one_layer():
     np.testing.assert_allclose(prospect.pile(0.1, 0.0, 2.5), (0.1, 0.0), rtol=1e-14)
 
 

@@ -133,6 +133,7 @@ def varied_cells():
     lai, brown, cover = rng.gamma(1.2, 1.5, n), rng.beta(0.6, 0.8, n), rng.uniform(0.05, 1, n)
     lai[:8], brown[:8], cover[:8] = [0, 1, 1, 8, 8, 1e-9, 15, 20], [0.5, 0, 1, 0, 1, 0.3, 1e-6, 0.999], [1, 1] * 4
     cover = np.maximum(cover, lai / 90)
+    cover[8] = 0
     return lai, brown, cover, rng.choice([0, 0.2, 0.99, 1], (2, n))
 
 
@@ -151,8 +152,10 @@ def test_tables_over_dead_share_and_crowns_are_within_their_tolerance(varied_cel
     lai, brown, cover, ground = varied_cells
     view, kinds = (40, 38, 5, 0.05, "spherical"), {"brown": brown, "dissociation": 0.7}
     check_varied(lai, ground, varied_scene(*view, **kinds))
+    check_varied(lai, ground[:, :1], varied_scene(*view, **kinds))
     check_varied(lai, ground, varied_scene(*view, **kinds, crown_cover=cover))
     check_varied(lai, ground, varied_scene(*view, crown_cover=cover, crown_shape=0.4))
+    check_varied(lai, ground[:, :1], varied_scene(*view, crown_cover=cover, crown_shape=0.4))
 
 
 @pytest.mark.slow

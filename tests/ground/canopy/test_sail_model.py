@@ -11,10 +11,9 @@ from fifesim.ground.canopy import sail_model
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes, leaf_projection
 from fifesim.ground.canopy.sail_model import (
     bidirectional_gap,
-    direction_distance,
     exponential_chain,
-    hotspot_decay,
     leaf_scattering,
+    over_background,
     reflectance_factor,
     sail,
     upright_reflectance,
@@ -30,7 +29,7 @@ VZA = np.array([0, 30, 75, 89.9])
 
 
 def test_sail_agrees_with_prosail_without_a_hot_spot():
-    """Layer terms and surface reflectances agree to 1e-11, since prosail subtracts nearly equal squares."""
+    """Layer terms and surface reflectances agree to 1e-11; prosail loses digits in differences of equal squares."""
     oracle = pytest.importorskip("prosail.FourSAIL")
     layer = ["tss", "too", "tsstoo", "rdd", "tdd", "rsd", "tsd", "rdo", "tdo", "rso"]
     rng = np.random.default_rng(20)
@@ -131,6 +130,26 @@ def test_bidirectional_reflectance_is_reciprocal(shape, hotspot):
     np.testing.assert_allclose(there.rso, back.rso, rtol=1e-12)
 
 
+@pytest.mark.parametrize("r", [0.0, 0.15, 1.0])
+def test_reflectance_without_leaves_equals_the_background(r):
+    for reflectance in with_background(sail(0.0, RHO, 1 - RHO, sza=SZA, vza=VZA, hotspot=0.05), r):
+        assert np.all(reflectance == r)
+    assert (reflectance_factor(0.3, 0.5, 0.0), reflectance_factor(0.3, 0.5, 1.0)) == (0.3, 0.5)
+
+
+@pytest.mark.parametrize("r", [0.0, 0.15, 0.6, 1.0])
+def test_over_background_sums_reflections_between_leaves_and_ground(r):
+    """Compare with the sum over orders of reflection."""
+    c = sail(2.0, RHO, 0.9 - 0.9 * RHO, sza=SZA, vza=VZA, raa=20, hotspot=0.1)
+    terms = c.rso, c.tsstoo - c.tss * c.too, (c.tss + c.tsd) * (c.too + c.tdo), c.rdd
+    found = over_background(*terms, r)
+    np.testing.assert_allclose(found, with_background(c, r).rso, rtol=1e-13)
+    alone, hot, through, rdd = terms
+    orders = sum(through * r * (r * rdd) ** n for n in range(4000))
+    converged = r * np.broadcast_to(rdd, found.shape) < 0.99
+    np.testing.assert_allclose(found[converged], (alone + hot * r + orders)[converged], rtol=1e-12)
+
+
 def test_black_leaves_reflect_nothing():
     canopy = sail(LAI, 0.0, 0.0, sza=SZA, vza=VZA, hotspot=0.1)
     for scattered in (canopy.rso, canopy.rdo, canopy.rsd, canopy.rdd, canopy.tsd, canopy.tdo):
@@ -173,16 +192,6 @@ def test_gap_and_sunlit_visible_leaf_area_match_quadrature(lai, alpha):
         overlap = 1.0 if alpha == 0 else -np.expm1(-alpha) / alpha
         gap = np.exp(-(ks + ko) * lai + np.sqrt(ks * ko) * lai * overlap)
     np.testing.assert_allclose([seen, tsstoo], [expected, gap], rtol=1e-9)
-
-
-def test_direction_distance_and_hot_spot_decay():
-    """Distance by complex numbers; the decay is 0 in the hot spot and infinite for a hot-spot size of 0."""
-    sza, vza, raa = np.array([30, 60, 45]), np.array([50, 0, 45]), np.array([70, 10, 180])
-    sun, view = np.tan(np.radians(sza)), np.tan(np.radians(vza)) * np.exp(1j * np.radians(raa))
-    np.testing.assert_allclose(direction_distance(sza, vza, raa), np.abs(sun - view), rtol=1e-13)
-    assert hotspot_decay(40.0, 40.0, 0.0, 1.2, np.array(0.1)) == 0
-    assert hotspot_decay(40.0, 10.0, 0.0, 1.2, np.array(0.0)) == np.inf
-    np.testing.assert_allclose(hotspot_decay(60.0, 0.0, 0.0, 1.2, np.array(0.1)), 2 * np.sqrt(3) / (1.2 * 0.1))
 
 
 FIELDS = ("rso", "rdo", "rsd", "rdd", "tss", "too", "tsd", "tdo", "tdd")
@@ -324,7 +333,7 @@ def scene(dem, lai=HILL_LAI, slopes="upright", **canopy):
 
 
 def test_upright_canopy_on_a_dem():
-    """A flat DEM gives the level result, lazy equals eager, each class equals its canopy alone; errors."""
+    """A flat DEM gives the level result, chunks change nothing, a class equals its canopy; invalid input raises."""
     level = HILL_LAI.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
     upright, kt = scene(DEM), scene(DEM, slopes="kt")
     np.testing.assert_allclose(scene(0 * DEM + 400.0), level, rtol=0, atol=1e-6)

@@ -7,15 +7,7 @@ from scipy import stats
 import fifesim
 from fifesim.base import files
 from fifesim.base.bands import Band
-from fifesim.ground.canopy.soil import (
-    FILM,
-    below_film,
-    brightened,
-    grains_in_water,
-    moistened,
-    soil_line,
-    water_films,
-)
+from fifesim.ground.canopy.soil import FILM, below_film, brightened, grains_in_water, moistened, soil_line, water_films
 
 TM = tuple(band.response for band in fifesim.instrument("TM").select(None))
 FILMS = water_films(TM)

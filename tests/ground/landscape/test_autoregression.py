@@ -57,11 +57,6 @@ def test_response_has_decayed_at_the_margin():
         assert impulse[cells] < 2e-8 * impulse[0]
 
 
-def test_correlation_lengths_beyond_the_streaming_method_are_refused():
-    with pytest.raises(ValueError, match="use larger cells for a longer range"):
-        fifesim.arp_for_length(1e6)
-
-
 # Counter, key and answer from kat_vectors of Random123 1.14.
 KNOWN = [
     ("00000000 00000000 00000000 00000000", "00000000 00000000", "6627e8d5 e169c58d bc57ac4c 9b00dbd8"),
@@ -127,11 +122,8 @@ SIZE = 4 * FIELD_TILE
 
 
 def standard_error(arp, cells):
-    """
-    Upper bound of the standard error of a covariance estimated from this number of cells, relative to the variance.
-    Bartlett: the variance of an estimated covariance is (sum of c(h)**2 + c(h + d) c(h - d)) / cells over all lags h,
-    at most 2 (sum of c(h)**2) / cells.
-    """
+    """Upper bound of the standard error of a covariance over the variance, by Bartlett's formula."""
+    # The variance of a covariance at lag d is (sum over lags h of c(h)**2 + c(h + d) c(h - d)) / cells.
     correlations = covariances(arp) / covariances(arp)[0, 0]
     return np.sqrt(2 * np.sum(correlations**2) / cells)
 
@@ -142,7 +134,7 @@ def arp_and_field(request):
 
 
 def test_field_agrees_with_the_analytic_moments(arp_and_field):
-    """Four standard errors: with 65 comparisons a false alarm has a probability of 0.4 %."""
+    """Four standard errors: with 70 comparisons a false alarm has a probability of 0.4 %."""
     arp, field = arp_and_field
     error = standard_error(arp, field.size)
     assert np.mean(field**2) == pytest.approx(1, abs=4 * error)
@@ -158,11 +150,9 @@ def test_field_agrees_with_the_analytic_moments(arp_and_field):
 
 
 def test_spectrum_follows_the_response(arp_and_field):
-    """
-    Power over squared response, averaged in rings of frequency, is 1. A Hann window reduces leakage; it correlates
-    (3/2)**2 neighbouring frequencies along each axis. Only half of the plane is used, since the other half mirrors it.
-    """
+    """Power over squared response is 1 in rings of frequency, computed from half of the symmetric plane."""
     arp, field = arp_and_field
+    # The Hann window reduces leakage, and correlates (3/2)**2 neighbouring frequencies along each axis.
     window = np.hanning(SIZE + 1)[:-1]
     power = np.abs(fft.rfft2(field * window[:, None] * window)) ** 2 / np.sum(window**2) ** 2
     down, across = 2 * np.pi * fft.fftfreq(SIZE)[:, None], 2 * np.pi * fft.rfftfreq(SIZE)
@@ -176,9 +166,9 @@ def test_spectrum_follows_the_response(arp_and_field):
 @pytest.mark.parametrize("arp", [0.1, 0.15, 0.24])
 def test_field_solves_its_equation_across_tiles(arp):
     """
-    Linear system x = e + arp (sum of four neighbours) on a patch across four tiles, away from its edges. The noise e is
-    the field without interaction. The effect of edges decays as exp(-d arccosh(1 / (2 arp) - 1)): 5e-13 after 70 cells
-    at arp 0.24. Errors of single precision are 3e-7 of the standard deviation rms and 2e-6 at most.
+    Linear system x = e + arp (sum of four neighbours) across four tiles; the noise e is the field at arp 0. Edges decay
+    as exp(-d arccosh(1 / (2 arp) - 1)): 5e-13 after 70 cells at arp 0.24. Errors of single precision are 3e-7 of the
+    standard deviation rms and 2e-6 at most.
     """
     half, reach = 110, 70
     first, size = FIELD_TILE - half, 2 * half
@@ -254,10 +244,12 @@ def test_arp_of_a_process_that_is_not_stationary_is_refused(arp):
             call()
 
 
-def test_streaming_refuses_arps_with_too_large_a_margin():
+def test_streaming_refuses_arps_and_lengths_with_too_large_a_margin():
     with pytest.raises(ValueError, match=r"at most 0\.2498.*method=\"periodic\""):
         streaming_field(1, 0.2499, 0, 0, (2, 2))
     assert np.isfinite(periodic_field(1, 0.2499, (50, 50))).all()
+    with pytest.raises(ValueError, match="use larger cells for a longer range"):
+        fifesim.arp_for_length(1e6)
 
 
 def test_field_of_mixed_noise_equals_mixed_fields():

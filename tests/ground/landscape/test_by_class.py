@@ -76,12 +76,10 @@ def test_cells_by_class_are_in_order(many_codes):
 
 @pytest.mark.parametrize("dtype", [np.int16, np.int64, float, np.uint16])
 def test_known_codes_pass_in_any_number_type(many_codes, dtype):
+    """NaN and -1 have no class."""
     known = many_codes[many_codes >= 0]
     np.testing.assert_array_equal(check_codes(known.astype(dtype), TABLE), known)
     assert check_codes(known.astype(dtype), TABLE).dtype == np.int16
-
-
-def test_nan_and_minus_1_have_no_class():
     assert check_codes(np.array([np.nan, 40.0, -1.0]), TABLE).tolist() == [-1, 40, -1]
 
 

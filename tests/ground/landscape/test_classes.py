@@ -1,4 +1,4 @@
-"""Classes of cover: what is refused when they are made, and their names and codes."""
+"""Tests of cover classes: names, codes, stored tables, ranges of properties, and errors."""
 
 import json
 from dataclasses import fields
@@ -13,20 +13,13 @@ from fifesim.ground.canopy.description import Canopy
 from fifesim.ground.canopy.properties import PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background, Spectrum
-from fifesim.ground.landscape.classes import (
-    SHARES,
-    CoverClass,
-    Field,
-    class_table,
-    read_table,
-    table_text,
-)
+from fifesim.ground.landscape.classes import SHARES, CoverClass, Field, class_table, read_table, table_text
 from fifesim.ground.landscape.distribution import kernel_density
 
 RASTER = xr.DataArray(np.full((2, 2), 0.2), dims=("y", "x"))
 
 
-def of_canopy(**fields):
+def with_canopy(**fields):
     return {"canopy": Canopy(**fields)}
 
 
@@ -46,21 +39,21 @@ def varies(name):
         ({"arp": 0.2499}, ValueError, "class 'wood': arp must be at most 0.2498"),
         ({"arp": "0.2"}, TypeError, "class 'wood': arp must be a number, got '0.2'"),
         ({"canopy": 0.4}, TypeError, "class 'wood': canopy must be a fifesim.Canopy, got 0.4"),
-        *((of_canopy(**{name: RASTER}), TypeError, varies(name)) for name in ("brown", "moisture", "background")),
-        (of_canopy(background={"soil_dry": RASTER}), TypeError, varies("background")),
-        (of_canopy(leaf_optics=Leaf(chlorophyll=RASTER)), TypeError, varies("leaf_optics")),
-        (of_canopy(brown_leaf={"TM3": (RASTER, 0.1)}), TypeError, varies("brown_leaf")),
+        *((with_canopy(**{name: RASTER}), TypeError, varies(name)) for name in ("brown", "moisture", "background")),
+        (with_canopy(background={"soil_dry": RASTER}), TypeError, varies("background")),
+        (with_canopy(leaf_optics=Leaf(chlorophyll=RASTER)), TypeError, varies("leaf_optics")),
+        (with_canopy(brown_leaf={"TM3": (RASTER, 0.1)}), TypeError, varies("brown_leaf")),
         ({"code": -1}, ValueError, "class 'wood': code must be in 0 to 32767, got -1"),
         ({"code": 1.5}, TypeError, "class 'wood': code must be a whole number, got 1.5"),
     ],
 )
-def test_impossible_class_is_refused_by_name(fields, error, message):
-    with pytest.raises(error, match=message) as told:
+def test_impossible_classes_are_refused_by_name(fields, error, message):
+    with pytest.raises(error, match=message) as caught:
         CoverClass(**{"name": "wood"} | fields)
-    assert len(str(told.value)) <= 500
+    assert len(str(caught.value)) <= 500
 
 
-def test_codes_count_from_one_or_are_given():
+def test_codes_are_given_or_count_from_one():
     assert [each.code for each in class_table([CoverClass("a"), CoverClass("b")])] == [1, 2]
     assert [each.code for each in class_table({"a": CoverClass(code=0), "b": CoverClass("b", code=7)})] == [0, 7]
     assert class_table(CoverClass("a"))[0].code == 1
@@ -79,7 +72,7 @@ def test_codes_count_from_one_or_are_given():
         ({"a": CoverClass("b")}, ValueError, "class 'a' has another name, 'b'"),
     ],
 )
-def test_impossible_table_is_refused(classes, error, message):
+def test_impossible_class_tables_are_refused(classes, error, message):
     with pytest.raises(error, match=message):
         class_table(classes)
 
@@ -103,7 +96,7 @@ FULL = CoverClass(
 )
 
 
-def test_table_comes_back_as_it_was():
+def test_stored_class_table_is_read_back():
     (read,) = read_table(table_text([FULL]))
     for each in fields(CoverClass):
         was, now = getattr(FULL, each.name), getattr(read, each.name)
@@ -117,31 +110,32 @@ def test_table_comes_back_as_it_was():
         assert np.array_equal(now, was) if name == "leaf_angles" else now == was, name
 
 
-@pytest.mark.parametrize("background", [0.2, "dead_grass", {"TM3": 0.1}, Spectrum((0.4, 2.5), (0.1, 0.3))])
-def test_backgrounds_come_back(background):
-    (read,) = read_table(table_text([CoverClass("a", canopy=Canopy(background=background))]))
-    assert read.canopy.background == background and read.canopy.given == {"background"}
+@pytest.mark.parametrize(
+    ("name", "given", "expected"),
+    [
+        *(("background", each, each) for each in (0.2, "dead_grass", {"TM3": 0.1}, Spectrum((0.4, 2.5), (0.1, 0.3)))),
+        ("leaf_optics", (0.1, [0.2, 0.3]), (0.1, (0.2, 0.3))),
+    ],
+)
+def test_stored_background_and_leaf_optics_are_read_back(name, given, expected):
+    (read,) = read_table(table_text([CoverClass("a", canopy=Canopy(**{name: given}))]))
+    assert getattr(read.canopy, name) == expected and read.canopy.given == {name}
 
 
-def test_leaf_optics_of_all_bands_come_back():
-    (read,) = read_table(table_text([CoverClass("a", canopy=Canopy(leaf_optics=(0.1, [0.2, 0.3])))]))
-    assert read.canopy.leaf_optics == (0.1, (0.2, 0.3))
-
-
-def test_distribution_of_samples_is_left_out():
+def test_distributions_of_samples_are_not_stored():
     text = table_text([CoverClass("a", lai=kernel_density([1.0, 2.0, 2.5, 3.0, 3.1]))])
     assert json.loads(text) == [{"name": "a"}]
 
 
 @pytest.mark.parametrize("text", ["grass", "[1]", '[{"height": 3}]'])
-def test_other_text_is_refused(text):
+def test_invalid_stored_tables_are_refused(text):
     with pytest.raises(ValueError, match="class table of the cover is invalid"):
         read_table(text)
 
 
 @pytest.mark.parametrize("name", SHARES)
 @pytest.mark.parametrize(("mean", "sd"), [(0.2, 0.1), (0.2, 0.39), (0.5, 0.02), (0.9, 0.05), (0.01, 0.005)])
-def test_share_has_exactly_its_mean_and_deviation(name, mean, sd):
+def test_share_has_the_given_mean_and_deviation(name, mean, sd):
     found = Field(mean=mean, sd=sd).distribution(name)
     assert found.support() == (0, 1)
     assert (found.mean(), found.std()) == pytest.approx((mean, sd), rel=1e-12)
@@ -149,7 +143,7 @@ def test_share_has_exactly_its_mean_and_deviation(name, mean, sd):
 
 
 @pytest.mark.parametrize(
-    ("mean", "sd", "said"),
+    ("mean", "sd", "message"),
     [
         (0.2, 0.4, "below 0.4, got 0.4"),
         (0.2, 0.5, "brown lies between 0 and 1: with a mean of 0.2 its sd must be above 0 and below 0.4, got 0.5"),
@@ -159,13 +153,13 @@ def test_share_has_exactly_its_mean_and_deviation(name, mean, sd):
         (-0.2, 0.1, "for it to vary .*, got -0.2$"),
     ],
 )
-def test_what_no_share_has_is_refused(mean, sd, said):
-    with pytest.raises(ValueError, match=said):
+def test_impossible_shares_are_refused(mean, sd, message):
+    with pytest.raises(ValueError, match=message):
         Field(mean=mean, sd=sd).distribution("brown")
     assert Field(mean=0.2, sd=0.3999).distribution("brown").std() == pytest.approx(0.3999, rel=1e-12)
 
 
-def test_field_is_that_of_the_paper_without_a_word_and_takes_limits():
+def test_default_field_and_limits_of_its_numbers():
     assert Field() == Field(mean=0.0, sd=0.0, arp=0.15)
     assert fifesim.Field is Field
     for limit in ({"mean": 1}, {"mean": -1}, {"sd": np.int64(0)}, {"arp": 0}, {"arp": 0.2498}, {"sd": np.float32(3)}):
@@ -173,7 +167,7 @@ def test_field_is_that_of_the_paper_without_a_word_and_takes_limits():
 
 
 @pytest.mark.parametrize(
-    ("values", "error", "said"),
+    ("values", "error", "message"),
     [
         ({"sd": -0.1}, ValueError, "Field: sd must be at least 0, got -0.1"),
         ({"sd": np.inf}, ValueError, "sd must be at least 0"),
@@ -192,6 +186,6 @@ def test_field_is_that_of_the_paper_without_a_word_and_takes_limits():
         ({"mean": np.zeros((2, 2))}, TypeError, "mean must be a number"),
     ],
 )
-def test_number_out_of_range_is_named(values, error, said):
-    with pytest.raises(error, match=said):
+def test_invalid_fields_are_refused_by_name(values, error, message):
+    with pytest.raises(error, match=message):
         Field(**values)

@@ -1,4 +1,4 @@
-"""LAI distributions."""
+"""Tests of LAI distributions: moments, densities of samples, quantile and rank maps, and errors."""
 
 import numpy as np
 import pandas as pd
@@ -23,8 +23,8 @@ ROWS = [pytest.param(row, id=row.treatment) for row in files.table("lai_distribu
 
 
 @pytest.mark.parametrize("row", ROWS)
-def test_treatment_has_its_moments(row):
-    """By quadrature of the density; the table's own digits are what solving for them must give back."""
+def test_treatments_have_the_tabulated_moments(row):
+    """By quadrature of the density, to the digits of the table."""
     distribution = lai_distribution(row.treatment)
 
     def moment(function):
@@ -48,7 +48,7 @@ def test_kernel_density_agrees_with_scipy_reflected_at_zero():
     np.testing.assert_allclose(kernel_density(SAMPLES).pdf(x), plain(x) + plain(-x), rtol=1e-12)
 
 
-def test_reflection_keeps_all_mass_above_zero():
+def test_kernel_density_has_no_mass_below_zero():
     distribution = kernel_density(SAMPLES)
     high = distribution.support()[1]
     assert distribution.cdf(0.0) == 0
@@ -58,15 +58,15 @@ def test_reflection_keeps_all_mass_above_zero():
         assert distribution.cdf(x) == pytest.approx(integrate.quad(distribution.pdf, 0, x)[0], abs=1e-10)
 
 
-def test_quantiles_of_the_kernel_density_are_its_inverse():
-    """Within the curvature of one 8192th of the support: the density's slope times half its square, below 1e-6."""
+def test_quantiles_of_the_kernel_density_invert_its_cdf():
+    """Errors from nodes at 1/8192 of the support: slope of the density times half the squared step, below 1e-6."""
     distribution = kernel_density(SAMPLES)
     q = np.array([1e-9, 1e-4, 0.1, 0.5, 0.9, 0.9999, 1 - 1e-9])
     np.testing.assert_allclose(distribution.cdf(distribution.ppf(q)), q, rtol=0, atol=1e-6)
     np.testing.assert_allclose(distribution.sf(distribution.isf(1 - q)), 1 - q, rtol=0, atol=1e-6)
 
 
-def test_density_needs_some_spread():
+def test_kernel_density_of_equal_samples_is_refused():
     with pytest.raises(ValueError, match="all 6 LAI samples are 2: a density needs some spread"):
         kernel_density(np.full(6, 2.0))
 
@@ -76,7 +76,7 @@ def write(path, table):
     return path
 
 
-def test_samples_come_from_a_csv(tmp_path):
+def test_samples_are_read_from_csv_files(tmp_path):
     samples = pd.DataFrame({"plot": range(60), "lai": SAMPLES})
     several, one = tmp_path / "several.csv", tmp_path / "one.CSV"
     samples.to_csv(several, index=False)
@@ -116,13 +116,13 @@ def test_unusable_samples_are_refused(tmp_path, table, message):
         (3.0, TypeError, "a name, a CSV file or a frozen scipy distribution"),
     ],
 )
-def test_what_is_no_distribution_is_refused(source, error, message):
+def test_invalid_distributions_are_refused(source, error, message):
     with pytest.raises(error, match=message):
         lai_distribution(source)
 
 
 def kolmogorov_distance(values, distribution):
-    """Largest difference of the empirical and the given distribution function."""
+    """Largest difference between the empirical and the given distribution function."""
     ordered = np.sort(values, axis=None)
     below = distribution.cdf(ordered)
     steps = np.arange(ordered.size + 1) / ordered.size
@@ -130,13 +130,13 @@ def kolmogorov_distance(values, distribution):
 
 
 @pytest.mark.parametrize("name", fifesim.treatments())
-def test_no_leaf_area_is_negative(name):
+def test_quantile_map_is_monotone_and_within_the_support(name):
     field = np.array([[-40.0, -8.5, -1.0, 0.0, 1.0, 8.5, 40.0]])
     distribution = lai_distribution(name)
     values = quantile_map(field, quantile_table(distribution))
     assert values.min() >= 0
     assert (np.diff(values[0]) >= 0).all()
-    # scipy's quantiles near the end of the support are good to a few units in the last place.
+    # Quantiles by scipy near the end of the support are accurate to a few units in the last place.
     assert values.max() <= distribution.support()[1] * (1 + 4e-15)
 
 
@@ -146,7 +146,7 @@ def test_no_leaf_area_is_negative(name):
     ids=lambda distribution: distribution.dist.name,
 )
 def test_quantile_map_is_within_its_error_bound(distribution):
-    """Linear interpolation: an eighth of the squared step times the largest curvature of the quantile function."""
+    """Error bound of linear interpolation: squared step / 8 times the largest second derivative."""
     deviates = np.linspace(-6, 6, 20_011)
     exact = np.where(
         deviates < 0, distribution.ppf(stats.norm.cdf(deviates)), distribution.isf(stats.norm.sf(deviates))
@@ -165,8 +165,8 @@ def test_quantile_map_keeps_nan_by_cell():
     np.testing.assert_array_equal(field, mapped)
 
 
-def test_each_class_has_the_bits_of_its_own_map():
-    """NaN of the field stays where a class has a distribution."""
+def test_quantile_map_of_classes_equals_the_map_of_each_class():
+    """NaN in the field stays NaN in classes with a distribution."""
     rng = np.random.default_rng(2)
     field, numbers = rng.normal(size=(60, 70)), rng.integers(0, 3, (60, 70)).astype(np.int16)
     field[::7, ::5] = np.nan
@@ -179,14 +179,14 @@ def test_each_class_has_the_bits_of_its_own_map():
     )
     out = quantile_map_of_classes(field, numbers, tables)
     for number in (0, 2):
-        mine = numbers == number
-        np.testing.assert_array_equal(out[mine], quantile_map(field[mine], tables[number]))
+        cells = numbers == number
+        np.testing.assert_array_equal(out[cells], quantile_map(field[cells], tables[number]))
     assert (out[numbers == 1] == 1.1).all()
 
 
 @pytest.mark.parametrize("name", fifesim.treatments())
-def test_ranks_reproduce_the_distribution_exactly(name):
-    """Every quantile (k + 1/2) / n once: the Kolmogorov distance is the least that n values can have."""
+def test_rank_map_reproduces_the_distribution(name):
+    """Each quantile (k + 1/2) / n occurs once, which gives the smallest Kolmogorov distance of n values."""
     field = np.random.default_rng(1).normal(size=(40, 50))
     distribution = lai_distribution(name)
     values = rank_map(field, distribution)

@@ -1,4 +1,4 @@
-"""Cells below pixels: means, semivariograms, trends of maps, residuals, and pixels without leaves."""
+"""Tests of cells within map pixels: means, semivariograms, trends, kriging, residuals, and pixels without leaves."""
 
 from math import factorial
 
@@ -14,7 +14,6 @@ from fifesim.ground.landscape.downscaling import (
     LogNormal,
     Marginal,
     by_pixel,
-    densities_of_means,
     deviation_table,
     downscaled,
     fife_variation,
@@ -24,9 +23,7 @@ from fifesim.ground.landscape.downscaling import (
     kriging_filter,
     level_deviations,
     map_trend,
-    of_means,
     residual_shift,
-    spectral_densities,
     weighed,
 )
 
@@ -35,7 +32,7 @@ CELLS = (180, 180)
 
 
 def log_normal(arp, cv, trend=0.0):
-    """Filters, transform and deviation of cells with a coefficient of variation within pixels."""
+    """Filters, transform and deviation of log-normal cells with a coefficient of variation within pixels."""
     return Kriging.of(arp, trend, RATIO, SHAPE), LogNormal(), float(np.interp(cv, *deviation_table(arp, RATIO)))
 
 
@@ -45,7 +42,7 @@ def of_distribution(arp, name):
 
 
 def semivariances(cells):
-    """Over one and two cells along rows and columns, of pairs in a pixel and of pairs in two."""
+    """Semivariances at lags of one and two cells, for pairs within a pixel and for pairs in two pixels."""
     found = []
     for lag in (1, 2):
         inside = np.arange(cells.shape[0]) % RATIO[0] + lag < RATIO[0]
@@ -55,7 +52,7 @@ def semivariances(cells):
 
 
 def theory(cells, arp):
-    """Semivariances of a function of the process, by its Hermite polynomials."""
+    """Semivariances of a function of the process, from its Hermite polynomials."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(100)
     values, weights = cells(nodes), weights / np.sqrt(2 * np.pi)
     orders = np.arange(1, 25)
@@ -69,7 +66,7 @@ def theory(cells, arp):
 
 
 def model_of_variation(arp, cv):
-    """Log-normal cells whose variance within pixels is cv**2 of the square of their mean, on average."""
+    """Log-normal cells whose mean variance within pixels is cv**2 times their squared mean."""
     deviation = log_normal(arp, cv)[2]
     return lambda field: np.exp(deviation * field)
 
@@ -88,13 +85,10 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_cells_of_a_map_of_the_model_vary_as_it_does_inside_of_pixels_and_across_borders(name):
-    """
-    Of maps that are means of other scenes of the model, within 3 standard errors.
-
-    Beside the scene that the map is of, whose sampling errors are partly the same.
-    """
+def test_downscaled_cells_have_the_semivariogram_of_the_model(name):
+    """The map is the mean over pixels of a scene of the model; both semivariances agree within 3 standard errors."""
     arp, model, options, value = CASES[name]
+    # Differences from the scene have a smaller sampling error, since both semivariances share a part of it.
     model, (_, transform, deviation) = model(arp, value), options(arp, value)
     of_levels = level_deviations(transform, [deviation], arp, RATIO)[0]
     shape, cells = (112, 112), (336, 336)
@@ -115,7 +109,7 @@ def test_cells_of_a_map_of_the_model_vary_as_it_does_inside_of_pixels_and_across
     np.testing.assert_allclose(np.mean(ground, axis=0), expected, rtol=0.03)
 
 
-def test_no_variation_is_a_smooth_map_of_the_same_means():
+def test_downscaling_without_variation_is_smooth_interpolation():
     y, x = np.mgrid[:60, :60] / 60
     pixels = 2.0 + np.sin(2 * np.pi * x) * np.cos(2 * np.pi * y)
     kriging = Kriging.of(0.15, np.inf, RATIO, SHAPE)
@@ -124,7 +118,7 @@ def test_no_variation_is_a_smooth_map_of_the_same_means():
     np.testing.assert_allclose(cells, 2.0 + np.sin(2 * np.pi * x) * np.cos(2 * np.pi * y), atol=5e-3)
 
 
-def test_pixels_without_leaves_or_data_have_such_cells_and_disturb_few():
+def test_pixels_without_leaves_or_data_affect_only_nearby_cells():
     kriging, transform, deviation = log_normal(0.15, 0.3)
     pixels = kriging_block_means(np.exp(0.35 * periodic_field(9, 0.15, CELLS)), RATIO)
     field = periodic_field(2, 0.15, CELLS)
@@ -140,12 +134,12 @@ def test_pixels_without_leaves_or_data_have_such_cells_and_disturb_few():
     rows, columns = np.nonzero(changed > 1e-3)
     far = [np.min(np.hypot(*(np.argwhere(~known) - (r // 3, c // 3)).T)) for r, c in zip(rows, columns, strict=True)]
     assert max(far) < 6
-    # Cells do not fall to the pixels of 0 beside them.
+    # Cells do not decrease toward neighbouring pixels of 0.
     nearest, further = cells[60:72, 89].mean(), cells[60:72, 87].mean()
     assert nearest / further == pytest.approx(whole[60:72, 89].mean() / whole[60:72, 87].mean(), rel=0.1)
 
 
-def test_map_without_leaves_has_none():
+def test_map_without_leaves_has_cells_without_leaves():
     pixels = np.zeros(SHAPE)
     pixels[0, 0] = np.nan
     kriging, transform, deviation = log_normal(0.15, 0.3)
@@ -153,29 +147,29 @@ def test_map_without_leaves_has_none():
     np.testing.assert_array_equal(cells, by_pixel(pixels, RATIO))
 
 
-def test_variation_may_differ_from_pixel_to_pixel():
+def test_variation_may_differ_between_pixels():
     pixels = np.full(SHAPE, 2.0)
     kriging, transform, _ = log_normal(0.0, 0.3)
     deviation = np.where(np.arange(60) < 30, 0.1, 0.4) * np.ones(SHAPE)
     cells = downscaled(pixels, periodic_field(1, 0.0, CELLS), kriging, transform, deviation)
     spread = np.log(cells).std(axis=0)
-    # Residuals of white noise from pixels that are known: 8/9 of the variance.
+    # Residuals of white noise have 8/9 of the variance where the mean of 9 cells is known.
     np.testing.assert_allclose(spread[[30, 60]], 0.1 * np.sqrt(8 / 9), rtol=0.2)
     np.testing.assert_allclose(spread[[120, 150]], 0.4 * np.sqrt(8 / 9), rtol=0.2)
-    # The centres of the pixels at the border are at columns 88 and 91; between them it is a share of both.
+    # The deviation is linear between the centres of the pixels on both sides of the step, at columns 88 and 91.
     np.testing.assert_allclose(spread[88:92], np.linspace(0.1, 0.4, 4) * np.sqrt(8 / 9), rtol=0.2)
 
 
-def test_level_of_a_skewed_distribution_is_that_of_cells_around_it():
+def test_level_of_a_skewed_distribution_inverts_the_mean_of_cells():
     density = lai_distribution("burned-grazed")
     cells = 0.4 + np.sqrt(0.7) * np.random.default_rng(1).standard_normal(200000)
     mean = density.ppf(stats.norm.cdf(cells)).mean()
-    # The standard error of the mean is 0.001, a level rises by 2 for a mean of 1.
+    # The standard error of the mean is 0.001, and the derivative of the level by the mean is 2.
     assert Marginal.of(density, 0.3).level(mean) == pytest.approx(0.4, abs=0.006)
 
 
 @pytest.mark.parametrize("mean", [0.4, 2.4])
-def test_mean_that_the_distribution_has_not_is_refused(mean):
+def test_means_outside_the_distribution_are_refused(mean):
     kriging, transform, deviation = of_distribution(0.15, "burned-ungrazed")
     pixels = np.full(SHAPE, 1.5)
     pixels[3, 4] = mean
@@ -185,7 +179,7 @@ def test_mean_that_the_distribution_has_not_is_refused(mean):
         downscaled(pixels, np.zeros(CELLS), kriging, transform, deviation)
 
 
-def test_means_near_the_ends_of_a_distribution_are_met():
+def test_means_near_the_limits_of_a_distribution_are_exact():
     kriging, transform, deviation = of_distribution(0.15, "burned-grazed")
     pixels = np.random.default_rng(1).choice([0.01, 0.7, 2.17], SHAPE)
     cells = downscaled(pixels, periodic_field(1, 0.15, CELLS), kriging, transform, deviation)
@@ -193,8 +187,8 @@ def test_means_near_the_ends_of_a_distribution_are_met():
     assert cells.min() >= 0 and cells.max() < 2.2 * 1.0015
 
 
-def test_grass_of_fife_varies_as_its_table_says():
-    """The three treatments at arp 0.15 in pixels of 3 x 3 cells: on average within a tenth."""
+def test_fife_variation_agrees_with_the_treatments():
+    """Three treatments at arp 0.15 in pixels of 3 x 3 cells, within 10 % on average."""
     inside = np.sqrt(1 - kept_variance(0.15, (3, 3)))
     densities = [lai_distribution(name) for name in ("burned-grazed", "burned-ungrazed", "unburned-ungrazed")]
     deviations = [inside * each.std() for each in densities]
@@ -204,14 +198,14 @@ def test_grass_of_fife_varies_as_its_table_says():
 
 
 def on_torus(row):
-    """Covariance matrix of all cells of a torus, from those by lag."""
+    """Covariance matrix of all cells of a torus, from covariances by lag."""
     rows, columns = row.shape
     i, j = np.divmod(np.arange(row.size), columns)
     return row[(i[:, None] - i) % rows, (j[:, None] - j) % columns]
 
 
 def averaging(shape, ratio):
-    """Matrix of the means over pixels."""
+    """Matrix of means over pixels."""
     cells = np.arange(np.prod(shape) * np.prod(ratio)).reshape(shape[0] * ratio[0], shape[1] * ratio[1])
     matrix = np.zeros((np.prod(shape), cells.size))
     for pixel, (i, j) in enumerate(np.ndindex(*shape)):
@@ -221,7 +215,7 @@ def averaging(shape, ratio):
 
 
 def slow(shape, ratio):
-    """Covariances by lag of a trend of one, without its mean, from its spectrum by pixel."""
+    """Covariances by lag of a trend with density 1 and without mean, from its spectrum."""
     u, v = (2 * np.pi * np.fft.fftfreq(size * number) for size, number in zip(shape, ratio, strict=True))
     squared = (2 * ratio[0] * np.sin(u[:, None] / 2)) ** 2 + (2 * ratio[1] * np.sin(v / 2)) ** 2
     squared[0, 0] = np.inf
@@ -229,13 +223,13 @@ def slow(shape, ratio):
 
 
 def weights(arp, trend, ratio, shape):
-    """Matrix of the filter, of its answers to single pixels."""
+    """Matrix of the kriging filter, from its responses to single pixels."""
     response = kriging_filter(arp, trend, ratio, shape)
     pixels = np.eye(np.prod(shape)).reshape(-1, *shape)
     return np.array([kriged(each, response, ratio).ravel() for each in pixels]).T
 
 
-def test_pixels_are_means_of_their_cells():
+def test_block_means_invert_by_pixel():
     pixels = np.arange(6.0).reshape(2, 3)
     np.testing.assert_array_equal(kriging_block_means(by_pixel(pixels, (4, 2)), (4, 2)), pixels)
     cells = np.arange(24.0).reshape(4, 6)
@@ -245,10 +239,10 @@ def test_pixels_are_means_of_their_cells():
 
 
 @pytest.mark.parametrize("arp, trend, ratio", [(0.0, 0.3, (3, 3)), (0.15, 0.75, (3, 2)), (0.2, 0.2, (2, 4))])
-def test_filter_is_the_best_linear_estimate(arp, trend, ratio):
-    """The definition, C B' (B C B')^-1, with matrices: of single precision where the filter is."""
+def test_kriging_filter_is_the_best_linear_estimate(arp, trend, ratio):
+    """Compare with C B' (B C B')^-1 by matrices; the filter has single precision."""
     shape = 8, 6
-    # The mean of the trend is as good as unknown: its variance is large beside all else.
+    # A large variance of the mean makes the mean of the trend practically unknown.
     cells = tuple(np.multiply(shape, ratio))
     covariance = on_torus(process(arp, cells) + trend**2 * slow(shape, ratio)) + 1e5
     mean = averaging(shape, ratio)
@@ -257,30 +251,23 @@ def test_filter_is_the_best_linear_estimate(arp, trend, ratio):
 
 
 def process(arp, cells):
-    """Covariances of unit variance of the process on a small torus, where they wrap."""
+    """Covariances of the process with unit variance on a small torus."""
     u, v = (2 * np.pi * np.fft.fftfreq(size) for size in cells)
     wide = covariances(arp)
     spectrum = 1 / (1 - 2 * arp * (np.cos(u[:, None]) + np.cos(v))) ** 2
     return np.fft.ifft2(spectrum).real / wide[0, 0]
 
 
-@pytest.mark.parametrize("ratio", [(3, 3), (2, 5), (4, 1)])
-def test_densities_of_means_are_sums_over_those_of_cells(ratio):
-    *both, mean = spectral_densities(0.2, ratio, (12, 10))
-    for each, found in zip(both, densities_of_means(0.2, ratio, (12, 10)), strict=True):
-        np.testing.assert_allclose(found, of_means(each, mean, ratio), rtol=1e-13)
-
-
 @pytest.mark.parametrize("ratio, shape", [((3, 3), (8, 6)), ((2, 5), (5, 4))])
-def test_sums_by_the_weights_of_pixels_are_the_transpose_of_the_estimate(ratio, shape):
+def test_weighed_is_the_transpose_of_kriged(ratio, shape):
     cells = np.random.default_rng(1).standard_normal(np.multiply(shape, ratio))
     found = weighed(cells, kriging_filter(0.2, 0.3, ratio, shape), ratio)
     np.testing.assert_allclose(found.ravel(), weights(0.2, 0.3, ratio, shape).T @ cells.ravel(), rtol=0, atol=2e-5)
 
 
 @pytest.mark.parametrize("arp", [0.05, 0.24])
-def test_field_with_the_means_of_another_has_the_covariance_of_the_process(arp):
-    """Of z + K (B z' - B z) with matrices, without drawing: inside of pixels and across their borders, to 0.5 %."""
+def test_conditioned_field_has_the_covariance_of_the_process(arp):
+    """Covariance of z + K (B z' - B z) by matrices, within pixels and across their edges, within 0.5 %."""
     ratio, shape = (3, 3), (14, 14)
     covariance = on_torus(process(arp, (42, 42)))
     spread = weights(arp, 0.0, ratio, shape) @ averaging(shape, ratio)
@@ -296,7 +283,7 @@ def test_field_with_the_means_of_another_has_the_covariance_of_the_process(arp):
 
 
 @pytest.mark.parametrize("arp, trend", [(0.05, 0.3), (0.15, 0.75), (0.24, 3.0), (0.24, np.inf)])
-def test_slow_waves_have_no_steps_at_borders(arp, trend):
+def test_kriged_waves_have_no_steps_at_pixel_edges(arp, trend):
     ratio, shape = (3, 3), (4, 64)
     centres = (np.arange(64 * 3) + 0.5) / 3
     wave = np.broadcast_to(np.sin(2 * np.pi * centres / 32), (12, 192))
@@ -308,7 +295,7 @@ def test_slow_waves_have_no_steps_at_borders(arp, trend):
 
 
 def trend(seed, ratio=RATIO):
-    """Cells of a trend of density 1 at one radian a pixel."""
+    """Cells of a trend with spectral density 1 at one radian per pixel."""
     u, v = (2 * np.pi * np.fft.fftfreq(size) * number for size, number in zip(CELLS, ratio, strict=True))
     squared = u[:, None] ** 2 + v**2
     squared[0, 0] = np.inf
@@ -321,8 +308,8 @@ def known(levels):
 
 
 @pytest.mark.parametrize("arp", [0.0, 0.15, 0.24])
-def test_map_of_the_process_has_hardly_a_trend(arp):
-    """A trend of one half adds 3 % to the variance of second differences, their standard error."""
+def test_map_of_the_process_has_a_small_trend(arp):
+    """A trend of 0.5 adds 3 % to the variance of second differences, which is their standard error."""
     for seed in range(5):
         levels = kriging_block_means(0.2 * periodic_field(seed, arp, CELLS), RATIO)
         assert map_trend(levels, known(levels), 0.2, arp, RATIO) <= 1.0
@@ -330,31 +317,31 @@ def test_map_of_the_process_has_hardly_a_trend(arp):
 
 @pytest.mark.parametrize("ratio", [(3, 3), (2, 4)])
 @pytest.mark.parametrize("strength", [4.0, 16.0])
-def test_trend_is_found_beside_the_process(strength, ratio):
+def test_trend_is_estimated_in_the_presence_of_the_process(strength, ratio):
     for seed in range(4):
         levels = kriging_block_means(0.2 * (periodic_field(seed, 0.15, CELLS) + strength * trend(seed, ratio)), ratio)
         assert map_trend(levels, known(levels), 0.2, 0.15, ratio) == strength
 
 
-def test_gentle_hills_are_known_by_their_wide_differences():
-    """Over one pixel they bend by a hundredth of the process."""
+def test_trend_of_gentle_hills_is_found_at_long_lags():
+    """Second differences of the hills over one pixel are 1 % of the process."""
     hills = kriging_block_means(np.broadcast_to(np.sin(2 * np.pi * np.arange(180) / 180), CELLS), RATIO)
     levels = hills + kriging_block_means(0.2 * periodic_field(1, 0.15, CELLS), RATIO)
     assert map_trend(levels, known(levels), 0.2, 0.15, RATIO) >= 0.5
     assert map_trend(levels - hills, known(levels), 0.2, 0.15, RATIO) <= 0.25
 
 
-def test_fences_and_pixels_without_leaves_leave_it_alone():
+def test_steps_and_pixels_without_leaves_do_not_change_the_trend():
     levels = kriging_block_means(0.2 * (periodic_field(3, 0.15, CELLS) + 4.0 * trend(3)), RATIO)
     fenced = levels + np.where(np.arange(60) < 23, 0.0, 5.0)
     holed = known(levels)
     fenced[20:30, 40:50], holed[20:30, 40:50] = -50.0, False
     assert map_trend(fenced, holed, 0.2, 0.15, RATIO) == 4.0
-    # One that bends nowhere is no trend but a plane.
+    # Planes have no second differences, hence no trend.
     assert map_trend(np.full((60, 60), 2.0), holed, 0.2, 0.15, RATIO) == 0.0
 
 
-def test_without_a_process_there_is_the_trend_alone():
+def test_trend_is_infinite_without_variation_of_the_process():
     levels = np.zeros((8, 8))
     assert map_trend(levels, known(levels), 0.0, 0.15, RATIO) == np.inf
     assert map_trend(1e6 * trend(1)[:8, :8], known(levels), 1.0, 0.15, RATIO) == np.inf
@@ -364,47 +351,43 @@ PAIR = (1, 2)
 
 
 def matrix(function, shape):
-    """Of a linear function of arrays of a shape."""
+    """Matrix of a linear function of arrays of a shape."""
     return np.array([function(each.reshape(shape)).ravel() for each in np.eye(np.prod(shape))]).T
 
 
 def pairs(deviation):
-    """Halves of the difference of two independent cells, at evenly spaced quantiles in a random order."""
+    """Half differences of two independent cells, at evenly spaced quantiles in random order."""
     ranks = (np.random.default_rng(1).permutation(SHAPE[0] * SHAPE[1]) + 0.5) / (SHAPE[0] * SHAPE[1])
     return deviation / np.sqrt(2) * stats.norm.ppf(ranks).reshape(SHAPE)
 
 
 @pytest.mark.parametrize("level, ratio", [(-0.15, 0.85), (0.15, 1.11)])
-def test_residuals_have_the_density_that_a_known_mean_leaves_them(level, ratio):
-    """
-    Two independent log-normal cells y + a and y - a of mean m, so that y = ln m - ln cosh a.
-
-    The density of a is the product of those of a and of that y; by quadrature, its variance is 15 % less than without
-    m, or 11 % more.
-    """
-    deviation, own = 0.3, pairs(0.3)
-    offset = np.mean(np.log(np.cosh(own)))
+def test_residuals_have_the_density_given_the_mean(level, ratio):
+    """Two independent log-normal cells y + a and y - a of mean m, so that y = ln m - ln cosh a, by quadrature."""
+    deviation, half = 0.3, pairs(0.3)
+    offset = np.mean(np.log(np.cosh(half)))
+    # The density of a, given m, is the product of the densities of a and y; its variance differs by -15 % or 11 %.
     a = np.linspace(-3, 3, 20001)
     density = np.exp(-((a / deviation) ** 2) - ((level + offset - np.log(np.cosh(a))) / deviation) ** 2)
     expected = np.sum(density * a**2) / np.sum(density) / (deviation**2 / 2)
     assert expected == pytest.approx(ratio, abs=0.005)
 
-    # As many pixels of the opposite level, so that the mean in the surroundings is zero.
+    # Pixels of the opposite level alternate with these, so that the mean around each pixel is zero.
     sign = np.where(np.add.outer(np.arange(60), np.arange(60)) % 2, -1, 1)
-    cells = np.stack([own, -own], axis=-1).reshape(60, 120).astype(np.float32)
-    kriging, shift, inside = Kriging.of(0.0, 0.0, PAIR, SHAPE), np.float32(0.0), own
+    cells = np.stack([half, -half], axis=-1).reshape(60, 120).astype(np.float32)
+    kriging, shift, inside = Kriging.of(0.0, 0.0, PAIR, SHAPE), np.float32(0.0), half
     for _ in range(2):
         known = sign * level + offset - np.log(np.cosh(inside))
         shift = residual_shift(cells, known, shift, kriging, LogNormal(), deviation)
         inside = (cells + shift - by_pixel(kriging_block_means(cells + shift, PAIR), PAIR))[:, ::2]
-    found = np.mean(inside[sign == 1] ** 2) / np.mean(own[sign == 1] ** 2)
-    # Of third order in the bend; one shift alone is 0.03 off for the lower level.
+    found = np.mean(inside[sign == 1] ** 2) / np.mean(half[sign == 1] ** 2)
+    # The error is of third order in the curvature; after one shift it would be 0.03 for the lower level.
     assert found == pytest.approx(expected, abs=0.004)
 
 
 @pytest.mark.parametrize("arp, trend", [(0.0, 0.0), (0.2, 0.0), (0.2, 0.5)])
-def test_shift_is_the_gradient_of_the_density_by_matrices(arp, trend):
-    """Differences of ln w, with its determinant, on a small torus: of nearly straight functions, to 2 %."""
+def test_shift_is_the_gradient_of_the_log_weight(arp, trend):
+    """Finite differences of ln w with its determinant, on a small torus, within 2 % for weakly curved functions."""
     ratio, shape, bend, step = (2, 2), (6, 6), 0.02, 1e-4
     kriging, cells = Kriging.of(arp, trend, ratio, shape), (12, 12)
     estimate = matrix(lambda pixels: kriged(pixels, kriging.response, ratio), shape).astype(float)
@@ -416,7 +399,7 @@ def test_shift_is_the_gradient_of_the_density_by_matrices(arp, trend):
     residual = field - estimate @ (mean @ field)
 
     class Bent:
-        """x + bend (x**2 / 2 + x**3 / 6)."""
+        """Transform x + bend (x**2 / 2 + x**3 / 6)."""
 
         def cells(self, x):
             return x + bend * (x**2 / 2 + x**3 / 6)
@@ -431,22 +414,22 @@ def test_shift_is_the_gradient_of_the_density_by_matrices(arp, trend):
         slopes = mean @ (Bent().slopes(estimate @ y + residual)[0][:, None] * estimate)
         return -0.5 * y @ precision @ y - np.linalg.slogdet(slopes)[1]
 
-    # The gradient is asked at half of the residuals.
+    # The gradient is evaluated at half of the residuals.
     wanted = mean @ Bent().cells(estimate @ levels + residual / 2)
     shift = residual_shift(field.reshape(cells), levels.reshape(shape), np.float32(0.0), kriging, Bent(), 1.0)
     gradient = [
         (logarithm(residual / 2 + step * each, wanted) - logarithm(residual / 2 - step * each, wanted)) / (2 * step)
         for each in np.eye(144)
     ]
-    # Means over pixels are no residual, before the covariance and after it.
+    # Remove means over pixels from the residuals, before and after the multiplication by the covariance.
     project = np.eye(144) - estimate @ mean
     expected = project @ covariance @ project.T @ gradient
     found = project @ shift.ravel()
     assert np.abs(found - expected).max() < 0.02 * np.abs(expected).max() + 1e-5
 
 
-def test_straight_functions_need_no_shift():
-    """Means of a normal distribution say nothing of residuals; nor is there anything to shift without variation."""
+def test_linear_transforms_need_no_shift():
+    """The means of a normal distribution are independent of residuals; without variation there is nothing to shift."""
     kriging, field = Kriging.of(0.15, 0.0, (3, 3), (20, 20)), np.random.default_rng(1).standard_normal((60, 60))
     known = kriging_block_means(field, (3, 3))
     normal = Marginal.of(stats.norm(10.0, 0.5), 0.3)
@@ -456,8 +439,8 @@ def test_straight_functions_need_no_shift():
     assert not residual_shift(0 * field, known, np.float32(0.0), kriging, LogNormal(), 0.0).any()
 
 
-def test_shift_is_one_standard_deviation_at_most():
-    """Of a map that the model cannot have; where the deviation differs, by that of each cell."""
+def test_shift_is_limited_to_one_standard_deviation():
+    """A map that is impossible for the model; also where the deviation differs between cells."""
     kriging, pixels = Kriging.of(0.15, 0.0, (3, 3), (20, 20)), 9 * np.random.default_rng(1).standard_normal((20, 20))
     deviation = np.where(np.arange(60) < 30, 0.1, 0.4) * np.ones((60, 60))
     field = deviation * np.random.default_rng(2).standard_normal((60, 60))

@@ -1,4 +1,4 @@
-"""A map of leaf area made a ground scene: labels, bits in any chunks and windows, pixels, and what is refused."""
+"""Tests of leaf area maps downscaled to a scene: labels, bits in chunks and windows, pixels, and errors."""
 
 import warnings
 
@@ -14,7 +14,7 @@ from fifesim.grids import grid as grids
 from fifesim.ground.landscape.downscaling import kriging_block_means
 from fifesim.ground.landscape.downscaling_labels import PIXEL_MARGIN, PixelReads, pixel_lattice
 
-# Across the edge of two tiles of 504 cells.
+# The map crosses the edge of two tiles of 504 cells.
 SOURCE = fifesim.grid_at("EPSG:32614", 1680 * 400 - 300, 1680 * 2600 - 200, 700, 500, 10)
 GRID = SOURCE.zoom_out(1 / 3)
 
@@ -44,13 +44,13 @@ def means(cells):
     return kriging_block_means(np.asarray(cells), (3, 3))
 
 
-def test_means_of_the_cells_are_the_map(scene, map_values):
+def test_means_of_cells_equal_the_map(scene, map_values):
     np.testing.assert_allclose(means(scene), map_values, rtol=1e-12, atol=0)
     assert np.nanmin(scene) == 0
     assert np.all(scene.values.reshape(50, 3, 70, 3)[20:22, :, 30:40] == 0)
 
 
-def test_scene_is_labelled_and_placed(scene):
+def test_scene_has_labels_and_georeferencing(scene):
     check_place(scene, "EPSG:32614")
     assert grids.same_grid(grids.geobox(scene), GRID)
     assert scene.name == "lai" and cf.attributes("lai").items() <= scene.attrs.items()
@@ -63,7 +63,7 @@ def test_scene_is_labelled_and_placed(scene):
 @pytest.mark.parametrize("chunks", [{"y": 40, "x": 70}, 100, "auto", {"y": -1}])
 def test_scene_has_the_same_bits_in_any_chunks(scene, lai_map, chunks):
     lazy_map = lai_map.copy(data=lai_map.variable.chunk(ODD_CHUNKS).data)
-    # The realised variation is known only once the cells are.
+    # The realised variation is known only after the cells are computed.
     expected = scene.assign_attrs()
     del expected.attrs["cv_within_pixels"]
     for given in (lai_map, lazy_map):
@@ -76,14 +76,14 @@ def test_scene_has_the_same_bits_in_any_chunks(scene, lai_map, chunks):
 
 
 @pytest.mark.parametrize(("arp", "short"), [(0.15, False), (0.24, True)])
-def test_variation_that_is_not_realised_is_warned_of(arp, short):
-    """A map whose own texture leaves the cells less room at a high arp."""
+def test_variation_below_the_requested_one_causes_a_warning(arp, short):
+    """At a high arp, the texture of the map leaves less variation for the cells."""
     coarse = fifesim.lai_scene(fifesim.fife_site(10, window=((0, 80), (0, 90))), "burned-ungrazed", arp=0.24, seed=7)
     grid = fifesim.fife_site(10 / 3, window=((0, 240), (0, 270)))
     for chunks in (None, 120):
-        with warnings.catch_warnings(record=True, action="always", category=UserWarning) as said:
+        with warnings.catch_warnings(record=True, action="always", category=UserWarning) as caught:
             cells = fifesim.downscale(coarse, grid, cv=0.4, arp=arp, seed=1, chunks=chunks).compute()
-        assert any("cv=0.4 was requested" in str(each.message) for each in said) == short
+        assert any("cv=0.4 was requested" in str(each.message) for each in caught) == short
         blocks = cells.values.reshape(80, 3, 90, 3)
         realised = np.sqrt(np.mean(blocks.var(axis=(1, 3)) / blocks.mean(axis=(1, 3)) ** 2))
         if chunks is None:
@@ -94,27 +94,27 @@ def test_variation_that_is_not_realised_is_warned_of(arp, short):
     np.testing.assert_allclose(part.attrs["cv_within_pixels"], realised, rtol=1e-12)
 
 
-def test_window_is_a_slice_of_the_whole_also_where_it_begins_in_a_pixel(scene, lai_map):
+def test_window_that_starts_within_a_pixel_equals_a_slice(scene, lai_map):
     window = fifesim.downscale(lai_map, GRID[31:95, 44:200], arp=0.2, cv=0.3, seed=7)
     np.testing.assert_array_equal(window, scene[31:95, 44:200])
     xr.testing.assert_allclose(window["x"], scene["x"][44:200], rtol=0, atol=1e-6)
 
 
-def test_cells_beyond_the_map_are_unknown(scene, lai_map):
+def test_cells_outside_the_map_are_nan(scene, lai_map):
     larger = fifesim.downscale(lai_map, GRID.pad(9), arp=0.2, cv=0.3, seed=7)
     np.testing.assert_array_equal(larger[9:-9, 9:-9], scene)
     assert np.isnan(larger[:9]).all() and np.isnan(larger[:, -9:]).all()
 
 
-def test_tiles_leave_no_seams(lai_map):
-    """Cells of a tile are those of others to 1e-4 where these would hold them: by shifting the whole by half a tile."""
+def test_tiles_have_no_seams(lai_map):
+    """Shifting the map by half a tile changes no cell by more than 1e-4, relatively."""
     moved = fifesim.grid_at("EPSG:32614", SOURCE.affine.c + 840, SOURCE.affine.f - 840, 700, 500, 10)
     there = fifesim.downscale(grids.place(lai_map, moved), moved.zoom_out(1 / 3), arp=0.2, cv=0.0)
     here = fifesim.downscale(lai_map, GRID, arp=0.2, cv=0.0)
     np.testing.assert_allclose(there.values, here.values, rtol=1e-4)
 
 
-def test_only_the_part_of_a_map_that_is_asked_for_is_read(lai_map):
+def test_only_the_needed_part_of_a_map_is_read(lai_map):
     large = fifesim.grid_at("EPSG:32614", 168 * 10 * 400, 168 * 10 * 2600, 10080, 10080, 10)
     read = []
 
@@ -139,7 +139,7 @@ def test_dates_are_downscaled_one_by_one(lai_map):
     np.testing.assert_allclose(cells[1], 2 * cells[0], rtol=1e-5)
 
 
-def test_distribution_and_functions_of_the_mean_are_taken(lai_map):
+def test_cells_follow_a_distribution_or_a_function_of_the_mean(lai_map):
     low = fifesim.downscale(lai_map * 0.5, GRID, distribution="unburned-ungrazed", seed=1)
     np.testing.assert_allclose(means(low), 0.5 * lai_map, rtol=1e-12)
     assert low.attrs["lai_distribution"] == "unburned-ungrazed" and np.nanmax(low) < 2.75 * 1.01
@@ -155,8 +155,8 @@ def test_distribution_and_functions_of_the_mean_are_taken(lai_map):
 
 
 @pytest.mark.parametrize("off", [0, 1])
-def test_seed_of_a_scene_gives_its_ups_and_downs(off):
-    """Also where pixels are no whole number of their own size from the origin of the CRS."""
+def test_cells_correlate_with_a_lai_scene_of_the_same_seed(off):
+    """Also where the pixel corner is not a multiple of the pixel size from the origin of the CRS."""
     source = fifesim.grid_at("EPSG:32614", 672000 + 30 + off * 10 / 3, 4368000 - off * 20 / 3, 450, 450, 10)
     pixels = grids.place(xr.DataArray(np.ones((45, 45)), dims=("y", "x"), name="lai"), source)
     grid = source.zoom_out(1 / 3)
@@ -182,12 +182,12 @@ def test_seed_of_a_scene_gives_its_ups_and_downs(off):
         ({"chunks": {"band": 1}}, "y and x"),
     ],
 )
-def test_impossible_scene_is_refused_before_it_computes(lai_map, options, message):
+def test_impossible_scenes_are_refused_before_computing(lai_map, options, message):
     with no_compute(), pytest.raises(ValueError, match=message):
         fifesim.downscale(lai_map.copy(data=da.from_array(lai_map.values)), **({"grid": GRID} | options))
 
 
-def test_maps_of_something_else_are_refused(lai_map):
+def test_unusable_maps_are_refused(lai_map):
     with pytest.raises(ValueError, match="scale"):
         fifesim.downscale(lai_map * 30, GRID)
     with pytest.raises(ValueError, match="is normalized difference vegetation index by its standard_name"):
@@ -205,7 +205,7 @@ def test_maps_of_something_else_are_refused(lai_map):
         fifesim.downscale(lai_map, GRID, cv="high")
 
 
-def test_whole_numbers_with_a_scale_and_rows_from_the_south_are_taken(lai_map, scene):
+def test_scaled_integers_and_rows_from_south_to_north_are_accepted(lai_map, scene):
     packed = (lai_map * 1000).round().fillna(65535).astype("u2").assign_attrs(scale_factor=0.001, _FillValue=65535)
     cells = packed[::-1].fifesim.downscale(GRID, arp=0.2, cv=0.3, seed=7)
     np.testing.assert_allclose(means(cells), np.round(lai_map, 3), rtol=1e-9)
@@ -219,7 +219,7 @@ def raster(grid):
 PIXELS = fifesim.grid_at("EPSG:32614", 699960, 4400040, 1000, 800, 10)
 
 
-def test_tiles_hold_whole_pixels_and_are_counted_from_the_origin_of_the_crs():
+def test_tiles_hold_whole_pixels_and_start_at_the_origin_of_the_crs():
     lattice = pixel_lattice(raster(PIXELS), PIXELS.zoom_out(1 / 3))
     assert lattice.ratio == (3, 3) and lattice.tile == 504 and lattice.pixels == (168, 168)
     assert lattice.pixel == (-440004, 69996) and lattice.cell == (-440004 * 3, 69996 * 3)
@@ -227,13 +227,11 @@ def test_tiles_hold_whole_pixels_and_are_counted_from_the_origin_of_the_crs():
     tiles = lattice.tiles(slice(0, 240), 0)
     assert tiles.start * 504 <= -440004 * 3 and tiles.stop * 504 >= -440004 * 3 + 240 and len(tiles) <= 2
     window = PixelReads(np.ones(PIXELS.shape), lattice).window(slice(0, 240), slice(0, 300))[0]
-    assert (
-        window.start == tiles.start * 168 - PIXEL_MARGIN + 440004
-        and window.stop == tiles.stop * 168 + PIXEL_MARGIN + 440004
-    )
+    assert window.start == tiles.start * 168 - PIXEL_MARGIN + 440004
+    assert window.stop == tiles.stop * 168 + PIXEL_MARGIN + 440004
 
 
-def test_pixels_that_are_no_multiple_of_their_size_from_the_origin_keep_their_cells():
+def test_cells_keep_their_lattice_position_if_pixels_are_off_the_pixel_lattice():
     source = fifesim.grid_at("EPSG:32614", 699966, 4400033, 1000, 800, 10)
     lattice = pixel_lattice(raster(source), source.zoom_out(1 / 5))
     corner = [place * 5 + shift for place, shift in zip(lattice.pixel, lattice.shift, strict=True)]
@@ -241,7 +239,7 @@ def test_pixels_that_are_no_multiple_of_their_size_from_the_origin_keep_their_ce
 
 
 @pytest.mark.parametrize("cells, tile", [((2, 3), 504), ((6, 6), 504), ((7, 7), 504), ((100, 100), 800)])
-def test_tiles_hold_some_pixels_of_any_size(cells, tile):
+def test_tiles_hold_at_least_8_pixels_of_any_size(cells, tile):
     grid = fifesim.grid_at("EPSG:32614", 699960, 4400040, 1000, 1000, (10 / cells[0], 10 / cells[1]))
     lattice = pixel_lattice(raster(fifesim.grid_at("EPSG:32614", 699960, 4400040, 1000, 1000, 10)), grid)
     assert lattice.ratio == cells and lattice.tile == tile
@@ -249,26 +247,18 @@ def test_tiles_hold_some_pixels_of_any_size(cells, tile):
 
 
 @pytest.mark.parametrize(
-    "grid, message",
+    "epsg, west, size, cell, message",
     [
-        (
-            fifesim.grid_at("EPSG:26914", 699960, 4400040, 100, 100, 10 / 3),
-            r"is in EPSG:32614 and the grid in EPSG:26914",
-        ),
-        (fifesim.grid_at("EPSG:32614", 699960, 4400040, 100, 100, 4), r"10 x 10 m and the grid cells of 4 x 4 m"),
-        (PIXELS, r"a pixel must be a whole number of cells, 2 or more"),
-        (fifesim.grid_at("EPSG:32614", 699960, 4400040, 900, 900, 30), r"cells of 30 x 30 m"),
-        (
-            fifesim.grid_at("EPSG:32614", 699961, 4400040, 100, 100, 2.5),
-            r"are 0.00 rows and 0.40 columns of cells away from",
-        ),
-        (
-            fifesim.grid_at("EPSG:32614", 709960, 4400040, 100, 100, 2.5),
-            r"does not overlap the grid, which spans 709960",
-        ),
+        (26914, 699960, 100, 10 / 3, "is in EPSG:32614 and the grid in EPSG:26914"),
+        (32614, 699960, 100, 4, "10 x 10 m and the grid cells of 4 x 4 m"),
+        (32614, 699960, 1000, 10, "a pixel must be a whole number of cells, 2 or more"),
+        (32614, 699960, 900, 30, "cells of 30 x 30 m"),
+        (32614, 699961, 100, 2.5, "are 0.00 rows and 0.40 columns of cells away from"),
+        (32614, 709960, 100, 2.5, "does not overlap the grid, which spans 709960"),
     ],
 )
-def test_grid_that_does_not_fit_says_what_to_type(grid, message):
+def test_grids_that_do_not_fit_are_refused_with_the_remedy(epsg, west, size, cell, message):
+    grid = fifesim.grid_at(f"EPSG:{epsg}", west, 4400040, size, size, cell)
     with pytest.raises(ValueError, match=message + r"[\s\S]*lai.odc.geobox.zoom_out\(1 / 3\) has 3 x 3 cells") as error:
         pixel_lattice(raster(PIXELS), grid)
     assert len(str(error.value)) <= 500

@@ -1,4 +1,4 @@
-"""Fields that correlate, on rasters: what they are, where they are the same, and what is refused."""
+"""Tests of correlated fields on rasters: correlations, same bits in windows and chunks, labels, and errors."""
 
 import cloudpickle
 import numpy as np
@@ -39,37 +39,41 @@ def ground(hills):
     return of_elevation(hills, ["elevation", "wetness", "illumination"])
 
 
+ONE_LATTICE = {"arps": {"lai": 0.15, "soil": 0.24}, "covary": COVARY, "seed": 7}
+COARSER = {"arps": {"soil": 0.05, "moisture": 0.05, "lai": 0.15}, "coarser": {"soil": 4, "moisture": 3}}
+
+
 @pytest.fixture(scope="module")
 def following(grid, ground):
-    return landscape_fields(grid, {"lai": 0.15, "soil": 0.24}, COVARY, seed=7, covariates=ground)
+    return landscape_fields(grid, covariates=ground, **ONE_LATTICE)
 
 
 def standard_error(one, other, cells):
-    """
-    Of the correlation of two fields over so many cells, at most.
-
-    Bartlett's: (sum over lags of their autocorrelations' product, and of the squared cross-correlation) / cells.
-    """
+    """Upper bound of the standard error of a correlation of two fields, by Bartlett's formula."""
+    # (sum over lags of the product of autocorrelations and of the squared cross-correlation) / cells
     u = 2 * np.pi * np.arange(512) / 512
     spectra = [response(arp, u[:, None], u) ** 2 for arp in (one, other)]
     spectra = [each / each.mean() for each in spectra]
     return np.sqrt(2 * np.mean(spectra[0] * spectra[1]) / cells)
 
 
-def test_fields_correlate_as_asked(fields):
-    for (one, other), asked in PAIRS.items():
+def test_fields_have_the_given_correlations(fields):
+    for (one, other), requested in PAIRS.items():
         r = np.corrcoef(fields[one].values.ravel(), fields[other].values.ravel())[0, 1]
-        assert r == pytest.approx(asked, abs=4 * standard_error(ARPS[one], ARPS[other], 600**2)), (one, other)
+        assert r == pytest.approx(requested, abs=4 * standard_error(ARPS[one], ARPS[other], 600**2)), (one, other)
 
 
-def test_a_name_has_the_same_field_beside_any_others(grid, fields):
-    alone = correlated_fields(grid, {"sand": 0.1, "moisture": 0.05}, seed=7)
-    beside = correlated_fields(grid, {"moisture": 0.05, "lai": 0.1}, seed=7)
-    np.testing.assert_array_equal(alone["moisture"], beside["moisture"])
-    assert abs(np.corrcoef(alone["sand"].values.ravel(), alone["moisture"].values.ravel())[0, 1]) < 0.01
+def test_field_of_a_name_does_not_depend_on_other_fields(grid):
+    """Nor on the lattice of other fields."""
+    first = correlated_fields(grid, {"sand": 0.1, "moisture": 0.05}, seed=7)
+    second = correlated_fields(grid, {"moisture": 0.05, "lai": 0.1}, seed=7)
+    third = correlated_fields(grid, {"soil": 0.05, "moisture": 0.05}, seed=7, coarser={"soil": 4})
+    np.testing.assert_array_equal(first["moisture"], second["moisture"])
+    np.testing.assert_array_equal(first["moisture"], third["moisture"])
+    assert abs(np.corrcoef(first["sand"].values.ravel(), first["moisture"].values.ravel())[0, 1]) < 0.01
 
 
-def test_windows_and_chunks_are_slices_of_the_whole(grid, fields):
+def test_correlated_fields_have_the_same_bits_in_windows_and_chunks(grid, fields):
     part = correlated_fields(grid[100:160, 37:111], ARPS, PAIRS, seed=7)
     with no_compute():
         lazy = correlated_fields(grid, ARPS, PAIRS, seed=7, chunks={"y": 211, "x": 397})
@@ -79,7 +83,7 @@ def test_windows_and_chunks_are_slices_of_the_whole(grid, fields):
         xr.testing.assert_identical(lazy[name].compute(), whole)
 
 
-def test_labels_say_how_they_were_made(grid, fields):
+def test_labels_and_history_of_fields(grid, fields):
     for name, field in fields.items():
         assert field.name == name and cf.attributes("normal_score").items() <= field.attrs.items()
         assert field.attrs["arp"] == ARPS[name] and field.attrs["rng_seed"] == "7"
@@ -88,40 +92,43 @@ def test_labels_say_how_they_were_made(grid, fields):
     assert "lai-soil -0.4" in fields["soil"].attrs["history"]
 
 
-def test_leaf_area_follows_the_ground(ground, following):
-    """Hills vary over kilometres: the noise is what is left to chance, and it has an independent cell in some 100."""
+def test_leaf_area_has_the_given_correlations_with_the_ground(ground, following):
+    """Hills vary over kilometres, so only the noise has a sampling error; about every 100th cell is independent."""
     lai = following["lai"].values.ravel()
-    for name, asked in COVARY.items():
+    for name, requested in COVARY.items():
         if name == "soil":
             other = following["soil"].values.ravel()
         else:
             other = normal_scores(ground[name].values.ravel(), score_table(ground[name].values.ravel()))
-        assert np.corrcoef(lai, other)[0, 1] == pytest.approx(asked, abs=0.02), name
+        assert np.corrcoef(lai, other)[0, 1] == pytest.approx(requested, abs=0.02), name
     assert stats.kstest(lai[::97], "norm").pvalue > 0.01
 
 
-def test_lazy_ground_makes_lazy_fields_of_the_same_bits(grid, ground, following):
-    chunks = {"y": 250, "x": 333}
+@pytest.mark.parametrize("options", [ONE_LATTICE, ONE_LATTICE | COARSER], ids=["one-lattice", "coarser"])
+def test_fields_on_ground_have_the_same_bits_in_windows_and_chunks(grid, ground, options):
+    whole, window = landscape_fields(grid, covariates=ground, **options), (slice(201, 300), slice(50, 222))
+    part = landscape_fields(
+        grid[window], reference=ground, covariates={name: each[window] for name, each in ground.items()}, **options
+    )
+    chunked = {name: in_chunks(each, {"y": 250, "x": 333}) for name, each in ground.items()}
     with no_compute():
-        lazy = landscape_fields(
-            grid, {"lai": 0.15, "soil": 0.24}, COVARY, seed=7,
-            covariates={name: in_chunks(raster, chunks) for name, raster in ground.items()},
-        )  # fmt: skip
-    for name, field in lazy.items():
-        xr.testing.assert_identical(field.compute(), following[name])
+        lazy = landscape_fields(grid, covariates=chunked, **options)
+    for name, field in whole.items():
+        np.testing.assert_array_equal(part[name], field[window])
+        xr.testing.assert_identical(lazy[name].compute(), field)
 
 
-def test_one_lazy_property_beside_others_in_memory(grid, ground):
-    asked = {"elevation": 0.3, "wetness": 0.4}
-    expected = landscape_fields(grid, {"lai": 0.15}, asked, seed=7, covariates=ground)["lai"]
+def test_one_lazy_covariate_makes_the_field_lazy(grid, ground):
+    requested = {"elevation": 0.3, "wetness": 0.4}
+    expected = landscape_fields(grid, {"lai": 0.15}, requested, seed=7, covariates=ground)["lai"]
     mixed = ground | {"elevation": in_chunks(ground["elevation"], {"y": 250, "x": 333})}
-    found = landscape_fields(grid, {"lai": 0.15}, asked, seed=7, covariates=mixed)["lai"]
+    found = landscape_fields(grid, {"lai": 0.15}, requested, seed=7, covariates=mixed)["lai"]
     assert found.chunks is not None
     xr.testing.assert_identical(found.compute(), expected)
 
 
 def test_kernels_hold_no_rasters(grid, ground, monkeypatch):
-    """What they hold is read through when they are named, and goes with them into each worker."""
+    """dask would hash and pickle rasters in the closure of a kernel."""
     kernels, made = [], chunking.pointwise
     monkeypatch.setattr(chunking, "pointwise", lambda kernel, *a, **k: kernels.append(kernel) or made(kernel, *a, **k))
     lazy = {"elevation": in_chunks(ground["elevation"], {"y": 250, "x": 333})}
@@ -129,17 +136,7 @@ def test_kernels_hold_no_rasters(grid, ground, monkeypatch):
     assert len(cloudpickle.dumps(kernels[-1])) < ground["elevation"].nbytes / 4
 
 
-def test_window_with_the_reference_of_the_whole_is_a_slice(grid, ground, following):
-    window = (slice(200, 300), slice(50, 222))
-    part = landscape_fields(
-        grid[window], {"lai": 0.15, "soil": 0.24}, COVARY, seed=7, reference=ground,
-        covariates={name: raster[window] for name, raster in ground.items()},
-    )  # fmt: skip
-    for name, whole in following.items():
-        np.testing.assert_array_equal(part[name], whole[window])
-
-
-def test_elevation_is_asked_what_it_tells(grid, hills, following):
+def test_covariates_are_computed_from_the_elevation(grid, hills, following):
     from_hills = landscape_fields(grid, {"lai": 0.15, "soil": 0.24}, COVARY, seed=7, dem=hills)
     xr.testing.assert_identical(from_hills["lai"], following["lai"])
     with pytest.raises(ValueError, match=r"covary names elevation, .* give dem="):
@@ -148,7 +145,7 @@ def test_elevation_is_asked_what_it_tells(grid, hills, following):
         of_elevation(hills, ["rain"])
 
 
-def test_missing_ground_is_missing_by_cell(grid, ground):
+def test_nan_in_a_covariate_is_nan_in_the_fields_that_follow_it(grid, ground):
     hole = ground["elevation"].copy(deep=True)
     hole[3, 4] = np.nan
     found = landscape_fields(grid, {"lai": 0.1, "soil": 0.1}, {"elevation": 0.5}, covariates={"elevation": hole})
@@ -159,69 +156,34 @@ def test_missing_ground_is_missing_by_cell(grid, ground):
 @pytest.mark.parametrize(
     ("arguments", "kind", "message"),
     [
-        (({"lai": 0.3},), ValueError, "arp must be in"),
-        (({"lai": "coarse"},), TypeError, "arps must be a number for each field"),
-        (({"lai": 0.1}, {("lai", "soil"): 0.1}), ValueError, "name 'soil'"),
-        (({"lai": 0.1, "soil": 0.1}, {("lai", "soil"): 2}), ValueError, r"\[-1, 1\], got 2"),
-        (([0.1],), TypeError, "arps must be a mapping"),
+        ({"arps": {"lai": 0.3}}, ValueError, "arp must be in"),
+        ({"arps": {"lai": "coarse"}}, TypeError, "arps must be a number for each field"),
+        ({"arps": {"lai": 0.1}, "correlations": {("lai", "soil"): 0.1}}, ValueError, "name 'soil'"),
+        ({"arps": {"lai": 0.1, "soil": 0.1}, "correlations": {("lai", "soil"): 2}}, ValueError, r"\[-1, 1\], got 2"),
+        ({"arps": [0.1]}, TypeError, "arps must be a mapping"),
+        ({"arps": {"lai": 0.15}, "coarser": {"sand": 4}}, ValueError, "coarser names sand, there are 'lai'"),
     ],
 )
-def test_what_cannot_be_is_one_line(grid, arguments, kind, message):
+def test_impossible_fields_are_refused(grid, arguments, kind, message):
     with pytest.raises(kind, match=message):
-        fifesim.correlated_fields(grid, *arguments)
+        fifesim.correlated_fields(grid, **arguments)
 
 
-def test_ground_elsewhere_is_refused_and_lazy_impossible_correlations_when_they_compute(grid, ground):
+def test_impossible_covariates_are_refused(grid, ground):
+    """Impossible correlations with a lazy ground raise when computed."""
     moved = ground["elevation"].assign_coords(x=ground["elevation"]["x"] + 9)
     with pytest.raises(ValueError, match="elevation lies on another grid"):
         landscape_fields(grid, {"lai": 0.1}, {"elevation": 0.3}, covariates={"elevation": moved})
     with pytest.raises(ValueError, match="reference has no 'elevation'"):
         landscape_fields(grid, {"lai": 0.1}, {"elevation": 0.3}, covariates=ground, reference={})
-    asked = {"elevation": 0.95, "wetness": 0.95}
+    requested = {"elevation": 0.95, "wetness": 0.95}
     with pytest.raises(ValueError, match="lai cannot follow all of elevation, wetness"):
-        landscape_fields(grid, {"lai": 0.1}, asked, covariates=ground)
+        landscape_fields(grid, {"lai": 0.1}, requested, covariates=ground)
     lazy = landscape_fields(
-        grid, {"lai": 0.1}, asked, covariates={name: in_chunks(each, {"y": 300}) for name, each in ground.items()}
+        grid, {"lai": 0.1}, requested, covariates={name: in_chunks(each, {"y": 300}) for name, each in ground.items()}
     )
     with pytest.raises(ValueError, match="nearest allowed in their proportion"):
         lazy["lai"].compute()
-
-
-COARSE = {"soil": 4, "moisture": 3}
-
-
-@pytest.fixture(scope="module")
-def mixed(grid, ground):
-    return landscape_fields(
-        grid, {"soil": 0.05, "moisture": 0.05, "lai": 0.15}, COVARY, seed=7, coarser=COARSE, covariates=ground
-    )
-
-
-def test_coarser_lattices_give_the_same_bits_in_chunks_and_windows(grid, ground, mixed):
-    window = (slice(201, 300), slice(50, 222))
-    options = {"arps": {"soil": 0.05, "moisture": 0.05, "lai": 0.15}, "covary": COVARY, "seed": 7, "coarser": COARSE}
-    part = landscape_fields(
-        grid[window], reference=ground, covariates={n: each[window] for n, each in ground.items()}, **options
-    )
-    with no_compute():
-        lazy = landscape_fields(
-            grid, covariates={n: in_chunks(r, {"y": 250, "x": 333}) for n, r in ground.items()}, **options
-        )
-    for name, whole in mixed.items():
-        np.testing.assert_array_equal(part[name], whole[window])
-        xr.testing.assert_identical(lazy[name].compute(), whole)
-
-
-def test_leaf_area_alone_stays_that_of_the_scene(grid):
-    """What varies beside it, and how coarsely, is nothing to it."""
-    beside = correlated_fields(grid[:80, :80], {"soil": 0.05, "lai": 0.15}, seed=7, coarser={"soil": 4})
-    alone = correlated_fields(grid[:80, :80], {"lai": 0.15}, seed=7)
-    np.testing.assert_array_equal(beside["lai"], alone["lai"])
-
-
-def test_unknown_names_of_coarser_lattices_are_refused(grid):
-    with pytest.raises(ValueError, match="coarser names sand, there are 'lai'"):
-        correlated_fields(grid, {"lai": 0.15}, coarser={"sand": 4})
 
 
 FOUR_ARPS = {"soil": 0.05, "moisture": 0.1, "lai": 0.15, "brown": 0.2}
@@ -234,8 +196,8 @@ def coarse_hills():
 
 
 @pytest.mark.parametrize("coarser", [(), ("soil",), ("soil", "moisture")], ids=str)
-def test_fields_before_the_first_that_follows_the_ground_do_not_wait_for_it(coarse_hills, coarser):
-    """And are put together as with it."""
+def test_copulas_of_fields_that_do_not_follow_the_ground_are_not_lazy(coarse_hills, coarser):
+    """Their weights equal the weights computed with the ground."""
     whole = copula(FOUR_ARPS, OF_GROUND, {"elevation": coarse_hills["elevation"].values.ravel()}, coarser)
     with no_compute():
         lazy = {name: in_chunks(each, {"y": 40, "x": 33}) for name, each in coarse_hills.items()}

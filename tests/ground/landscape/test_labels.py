@@ -1,4 +1,4 @@
-"""Landscapes: their variables and fields, maps of cover, where they are the same, and what is refused."""
+"""Tests of landscapes: variables and fields, maps of cover, same bits in windows and chunks, and errors."""
 
 import logging
 
@@ -47,7 +47,7 @@ def hills(grid):
 
 @pytest.fixture(scope="module")
 def make(grid, hills):
-    """A function that makes the landscape of this file, or parts of it."""
+    """Function that makes the landscape of this file, or variants of it."""
 
     def made(grid=grid, dem=hills, **changes):
         options = {"cover": fifesim.Patches("voronoi", 200), "classes": CLASSES, "covary": COVARY, "seed": 7}
@@ -61,8 +61,8 @@ def land(make):
     return make()
 
 
-def test_properties_are_made_of_the_scores_of_their_names(grid):
-    """Those of `correlated_fields`, to the bit."""
+def test_properties_are_mapped_from_correlated_fields(grid):
+    """Same bits as from `correlated_fields`."""
     scores = fifesim.correlated_fields(grid, {name: each.arp for name, each in DRAWN.items()}, seed=7)
     made = drawn_fields(grid, DRAWN, None, (), seed=7)[1]
     np.testing.assert_array_equal(made["soil"], scores["soil"] * DRAWN["soil"].sd)
@@ -73,8 +73,8 @@ def test_properties_are_made_of_the_scores_of_their_names(grid):
     assert made["brown"].attrs["history"].endswith("brown: by quantiles")
 
 
-def test_each_class_is_as_if_it_were_everywhere(land, make):
-    """Beyond a fence the field goes on with the texture of another arp, and what varies beside it is the same."""
+def test_each_class_equals_a_landscape_of_this_class(land, make):
+    """The random field continues across class boundaries; other properties do not depend on the classes."""
     for code, (name, kind) in enumerate(CLASSES.items(), 1):
         alone = make(cover=None, classes={name: kind})
         cells = land["cover"].values == code
@@ -83,7 +83,7 @@ def test_each_class_is_as_if_it_were_everywhere(land, make):
             np.testing.assert_array_equal(land[other], alone[other])
 
 
-def test_without_covariance_leaf_area_is_that_of_the_scene(grid, make):
+def test_without_covariance_properties_do_not_change_leaf_area(grid, make):
     plain = make(covary=None)
     bare = fifesim.landscape(grid, cover=fifesim.Patches("voronoi", 200), classes=CLASSES, seed=7)
     xr.testing.assert_identical(plain[["lai", "cover"]], bare)
@@ -92,7 +92,7 @@ def test_without_covariance_leaf_area_is_that_of_the_scene(grid, make):
     assert drawn_fields(grid, {}, None, (0.15,), seed=7) == ({}, {})
 
 
-def test_windows_and_chunks_are_slices_of_the_whole(grid, hills, land, make):
+def test_landscapes_have_the_same_bits_in_windows_and_chunks(grid, hills, land, make):
     with no_compute():
         lazy = make(dem=in_chunks(hills, {"y": 211, "x": 97}), chunks={"y": 211, "x": 97})
     assert all(each.chunks is not None for each in lazy.data_vars.values())
@@ -109,20 +109,20 @@ def test_windows_and_chunks_are_slices_of_the_whole(grid, hills, land, make):
         np.testing.assert_array_equal(lazy_part[name], land[name][WINDOW], err_msg=name)
 
 
-def test_numbers_and_rasters_are_in_the_place_of_fields(grid, make, land):
+def test_numbers_and_rasters_replace_fields(grid, make, land):
     numbers = make(soil=-0.02, moisture=0.3, crown_cover=1, covary={"brown": 0.2})
     for name, value in (("soil", -0.02), ("moisture", 0.3), ("crown_cover", 1.0)):
         assert numbers[name].ndim == 0 and numbers[name] == value
     np.testing.assert_array_equal(numbers["brown"], land["brown"])
-    mine = (land["soil"] * 0.5).assign_attrs(units="1")
-    rasters = make(soil=mine, moisture=land["brown"].rename("moisture"), covary=None)
-    np.testing.assert_array_equal(rasters["soil"], mine)
+    halved = (land["soil"] * 0.5).assign_attrs(units="1")
+    rasters = make(soil=halved, moisture=land["brown"].rename("moisture"), covary=None)
+    np.testing.assert_array_equal(rasters["soil"], halved)
     np.testing.assert_array_equal(rasters["moisture"], land["brown"])
     assert rasters["moisture"].attrs["long_name"] == "moisture of the soil"
 
 
 @pytest.mark.parametrize(
-    ("changes", "error", "said"),
+    ("changes", "error", "message"),
     [
         ({"brown": Field(mean=0.2, sd=0.5)}, ValueError, "brown lies between 0 and 1: with a mean of 0.2"),
         ({"moisture": Field(sd=0.1)}, ValueError, "moisture lies between 0 and 1"),
@@ -136,26 +136,26 @@ def test_numbers_and_rasters_are_in_the_place_of_fields(grid, make, land):
         ({"moisture": [0.2]}, TypeError, "moisture must be a number, a fifesim.Field, the path of"),
     ],
 )
-def test_what_cannot_be_is_refused_before_it_computes(make, changes, error, said):
-    with pytest.raises(error, match=said) as caught:
+def test_impossible_properties_are_refused_with_a_short_message(make, changes, error, message):
+    with pytest.raises(error, match=message) as caught:
         make(**changes)
     assert len(str(caught.value)) <= 500
 
 
-def test_a_map_of_leaf_area_goes_with_the_ground_as_it_does(make, land):
+def test_map_of_leaf_area_excludes_covary(make, land):
     with pytest.raises(ValueError, match="covary cannot be used with a map of lai: remove one of them"):
         make(lai=land["lai"])
-    mine = make(lai=land["lai"], covary=None)
-    np.testing.assert_array_equal(mine["lai"], land["lai"])
-    np.testing.assert_array_equal(mine["brown"], land["brown"])
+    mapped = make(lai=land["lai"], covary=None)
+    np.testing.assert_array_equal(mapped["lai"], land["lai"])
+    np.testing.assert_array_equal(mapped["brown"], land["brown"])
 
 
-def test_a_field_without_deviation_is_its_mean(site):
+def test_field_without_deviation_is_its_mean(site):
     land = fifesim.landscape(site, brown=fifesim.Field(mean=0.2), soil=fifesim.Field())
     assert (float(land["brown"]), float(land["soil"])) == (0.2, 0.0)
     plain = fifesim.landscape(site, brown=0.2)
-    found, meant = (each.fifesim.surface_reflectance("TM", bands=["TM3"]) for each in (land, plain))
-    np.testing.assert_array_equal(found, meant)
+    found, expected = (each.fifesim.surface_reflectance("TM", bands=["TM3"]) for each in (land, plain))
+    np.testing.assert_array_equal(found, expected)
 
 
 TABLE = class_table([CoverClass("grass", code=10), CoverClass("wood", code=20), CoverClass("water", code=80)])
@@ -167,7 +167,7 @@ def codes(site):
     return np.random.default_rng(3).choice(CODES, site.shape).astype(np.uint8)
 
 
-def test_drawn_cover_is_the_patches_by_their_codes(site):
+def test_drawn_cover_has_the_codes_of_its_patches(site):
     cover = drawn_cover(site, Patches("voronoi", 40), TABLE, 7)
     place = [grids.coordinates(site)[axis].values for axis in ("y", "x")]
     numbers = patch_classes(Patches("voronoi", 40), (1 / 3,) * 3, 7, *place)
@@ -176,9 +176,11 @@ def test_drawn_cover_is_the_patches_by_their_codes(site):
     assert cover.dtype == np.int16 and cover.name == "cover" and cf.attributes("cover").items() <= cover.attrs.items()
     assert cover.attrs["flag_meanings"] == "grass wood water" and cover.attrs["flag_values"].tolist() == list(CODES)
     assert [(each.name, each.code) for each in classes_of(cover)] == [(each.name, each.code) for each in TABLE]
+    with pytest.raises(ValueError, match="the classes of the cover are unknown"):
+        classes_of(cover.drop_attrs())
 
 
-def test_map_on_the_same_cells_is_read_as_it_is(tmp_path, site, codes):
+def test_cover_map_on_the_same_grid_is_read_unchanged(tmp_path, site, codes):
     path = write(tmp_path / "cover.tif", codes, site.affine)
     cover = cover_map(path, site, TABLE)
     np.testing.assert_array_equal(cover, codes)
@@ -194,7 +196,8 @@ def test_map_on_the_same_cells_is_read_as_it_is(tmp_path, site, codes):
             np.testing.assert_array_equal(lazy.compute(), codes)
 
 
-def test_smaller_cells_have_the_nearest_class_and_larger_ones_the_most_frequent(tmp_path, site, codes):
+def test_cover_map_is_resampled_by_nearest_or_most_frequent_class(tmp_path, site, codes):
+    """Nearest class for smaller cells, most frequent class for larger cells."""
     a = site.affine
     path = write(tmp_path / "cover.tif", codes, a)
     finer = fifesim.grid_at(site.crs, a.c, a.f, 54 * a.a, 45 * a.a, a.a / 3)
@@ -212,8 +215,8 @@ def test_smaller_cells_have_the_nearest_class_and_larger_ones_the_most_frequent(
         assert set(np.unique(found)) <= set(CODES)
 
 
-def test_map_in_another_projection_keeps_its_classes(tmp_path, site, codes):
-    """Classes in between, which means of their codes would be, are none of the table."""
+def test_reprojected_cover_map_has_only_its_classes(tmp_path, site, codes):
+    """Means of codes would be other classes."""
     path = write(tmp_path / "cover.tif", codes, site.affine)
     turned = rioxarray.open_rasterio(path).rio.reproject("EPSG:4326")
     assert (turned == turned.rio.nodata).any()
@@ -222,8 +225,8 @@ def test_map_in_another_projection_keeps_its_classes(tmp_path, site, codes):
     assert set(np.unique(cover)) <= {-1, *CODES}
 
 
-def test_cells_have_the_class_with_the_largest_area(tmp_path, site, codes, caplog):
-    """Compared with the areas of the classes, from 400 points of each cell carried to the map by pyproj."""
+def test_reprojected_cells_have_the_class_with_the_largest_area(tmp_path, site, codes, caplog):
+    """Compare with the areas of the classes, from 400 points of each cell transformed by pyproj."""
     path = write(tmp_path / "cover.tif", codes, site.affine)
     turned = rioxarray.open_rasterio(path, masked=True).rio.reproject("EPSG:4326")[0]
     with caplog.at_level(logging.WARNING):
@@ -245,7 +248,7 @@ def test_cells_have_the_class_with_the_largest_area(tmp_path, site, codes, caplo
     np.testing.assert_array_equal(found[clear], np.array(CODES)[areas.argmax(axis=0)][clear])
 
 
-def test_reprojected_map_that_declares_another_nodata_value_is_refused(tmp_path, site, codes):
+def test_reprojected_map_with_a_wrong_nodata_value_is_refused(tmp_path, site, codes):
     """rioxarray's `reproject(nodata=0)` may fill with 0 and keep the `_FillValue` of its input."""
     path = write(tmp_path / "cover.tif", codes, site.affine)
     turned = rioxarray.open_rasterio(path).rio.reproject("EPSG:4326")
@@ -254,7 +257,7 @@ def test_reprojected_map_that_declares_another_nodata_value_is_refused(tmp_path,
         cover_map(filled, site, TABLE)
 
 
-def test_missing_stays_missing(tmp_path, site, codes):
+def test_missing_cover_stays_missing(tmp_path, site, codes):
     holes = codes.astype(float)
     holes[2:5, 7] = np.nan
     for given in (holes, np.where(np.isnan(holes), 255, holes).astype(np.uint8)):
@@ -264,7 +267,8 @@ def test_missing_stays_missing(tmp_path, site, codes):
         np.testing.assert_array_equal(cover_map(raster, site, TABLE), np.where(np.isnan(holes), -1, holes))
 
 
-def test_code_without_a_class_is_named_when_it_computes(tmp_path, site, codes):
+def test_code_without_a_class_is_named(tmp_path, site, codes):
+    """Lazy maps raise when computed."""
     codes[0, :3], codes[9, 9] = 50, 60
     path = write(tmp_path / "cover.tif", codes, site.affine)
     message = r"codes without a class: 50, 60, in 4 of 2430 cells\. Classes are 10, 20, 80"
@@ -276,7 +280,7 @@ def test_code_without_a_class_is_named_when_it_computes(tmp_path, site, codes):
         lazy.compute()
 
 
-def test_map_that_is_of_no_use_is_refused(tmp_path, site, codes):
+def test_unusable_cover_maps_are_refused(tmp_path, site, codes):
     with pytest.raises(ValueError, match="allow_remote=True"):
         cover_map("/vsicurl/https://example.org/cover.tif", site, TABLE)
     with pytest.raises(ValueError, match=r"missing\.tif"):
@@ -292,11 +296,6 @@ def test_map_that_is_of_no_use_is_refused(tmp_path, site, codes):
         cover_map(xr.concat([two, two], "band"), site, TABLE)
 
 
-def test_cover_that_says_no_classes_is_refused(site):
-    with pytest.raises(ValueError, match="the classes of the cover are unknown"):
-        classes_of(drawn_cover(site, Patches("voronoi", 40), TABLE, 7).drop_attrs())
-
-
 THREE_CLASSES = {
     "bare": fifesim.CoverClass(lai=0.0, canopy=fifesim.Canopy(background=0.2)),
     "grass": fifesim.CoverClass(lai="burned-grazed", arp=0.24),
@@ -310,20 +309,17 @@ def patched(site):
     return fifesim.landscape(site, cover=PATCHES, classes=THREE_CLASSES, arp=0.1, seed=7)
 
 
-@pytest.mark.parametrize("code, name, arp", [(2, "burned-grazed", 0.24), (3, THREE_CLASSES["wood"].lai, 0.1)])
-def test_leaf_area_of_a_class_is_that_of_a_scene_of_it_alone(site, patched, code, name, arp):
-    """One white noise for all: beyond a fence the field goes on, and only its density and texture change."""
-    alone = fifesim.lai_scene(site, name, arp=arp, seed=7)
-    of_class = (patched.cover == code).values
-    assert 400 < of_class.sum() < 2000
-    np.testing.assert_array_equal(patched.lai.values[of_class], alone.values[of_class])
-
-
-def test_class_of_one_leaf_area_has_it_everywhere(patched):
+def test_leaf_area_of_each_class_equals_a_scene_of_this_class(site, patched):
+    """The white noise is common to all classes; distribution and texture change at class boundaries."""
+    for code, name, arp in ((2, "burned-grazed", 0.24), (3, THREE_CLASSES["wood"].lai, 0.1)):
+        alone = fifesim.lai_scene(site, name, arp=arp, seed=7)
+        of_class = (patched.cover == code).values
+        assert 400 < of_class.sum() < 2000
+        np.testing.assert_array_equal(patched.lai.values[of_class], alone.values[of_class])
     assert (patched.lai.values[patched.cover.values == 1] == 0).all()
 
 
-def test_landscape_is_labelled_and_placed(site, patched):
+def test_landscape_has_labels_and_georeferencing(site, patched):
     assert list(patched.data_vars) == ["lai", "cover"]
     for name, variable in patched.data_vars.items():
         check_place(variable, site.crs)
@@ -337,7 +333,7 @@ def test_landscape_is_labelled_and_placed(site, patched):
     assert [each.name for each in classes_of(patched.cover)] == list(THREE_CLASSES)
 
 
-def test_default_is_the_three_treatments_in_pastures():
+def test_default_landscape_has_three_treatments_in_pastures():
     grid = fifesim.fife_site(30)
     patched = fifesim.landscape(grid, seed=1)
     assert patched.attrs["site"] == patched.lai.attrs["site"] == "FIFE"
@@ -349,13 +345,13 @@ def test_default_is_the_three_treatments_in_pastures():
     assert min(fences) > 0.1
 
 
-def test_one_class_is_everywhere(site, lai):
+def test_single_class_covers_the_landscape(site, lai):
     patched = fifesim.landscape(site, classes=fifesim.CoverClass("grass", lai="burned-grazed"), seed=7)
     assert (patched.cover == 1).all()
     np.testing.assert_array_equal(patched.lai, lai)
 
 
-def test_own_leaf_area_is_in_the_place_of_the_classes(tmp_path, site, lai):
+def test_map_of_leaf_area_replaces_the_leaf_area_of_classes(tmp_path, site, lai):
     path = write(tmp_path / "lai.tif", lai.values, site.affine)
     for given in (path, lai):
         patched = fifesim.landscape(site, lai=given, cover=PATCHES, classes=THREE_CLASSES)
@@ -364,7 +360,7 @@ def test_own_leaf_area_is_in_the_place_of_the_classes(tmp_path, site, lai):
     assert list(fifesim.landscape(site, lai=lai)) == ["lai"]
 
 
-def test_map_of_cover_lies_below_the_leaf_area(tmp_path, site, patched):
+def test_map_of_cover_determines_leaf_area(tmp_path, site, patched):
     codes = np.where(patched.cover.values == 2, 255, patched.cover.values)
     path = write(tmp_path / "map.tif", codes, site.affine, nodata=255)
     of_map = fifesim.landscape(site, cover=path, classes=THREE_CLASSES, arp=0.1, seed=7)
@@ -373,7 +369,7 @@ def test_map_of_cover_lies_below_the_leaf_area(tmp_path, site, patched):
     assert np.isnan(of_map.lai.values[~known]).all() and (of_map.cover.values[~known] == -1).all()
 
 
-def test_cover_that_carries_its_classes_needs_no_others(site, patched):
+def test_classes_are_read_from_the_attributes_of_the_cover(site, patched):
     again = fifesim.landscape(site, cover=patched.cover, arp=0.1, seed=7)
     xr.testing.assert_equal(again, patched)
 
@@ -384,31 +380,23 @@ def test_cover_that_carries_its_classes_needs_no_others(site, patched):
         ({"classes": THREE_CLASSES}, ValueError, "the layout of the 3 classes is unknown: give cover= a map"),
         ({"cover": fifesim.Patches("voronoi", 9, (0.5, 0.5))}, ValueError, "2 shares for 3 classes"),
         ({"cover": "map.tif"}, ValueError, "a map of cover needs classes="),
-        (
-            {"cover": 3, "classes": THREE_CLASSES},
-            TypeError,
-            "cover must be a fifesim.Patches, the path of",
-        ),
+        ({"cover": 3, "classes": THREE_CLASSES}, TypeError, "cover must be a fifesim.Patches, the path of"),
         ({"cover": PATCHES, "classes": fifesim.CoverClass("water")}, ValueError, "class water has no leaf area"),
         ({"brown": 1.5}, ValueError, r"brown must be in \[0, 1\], got 1.5"),
-        (
-            {"brown": [0.5]},
-            TypeError,
-            "brown must be a number, a fifesim.Field, the path of a raster or an xarray.DataArray",
-        ),
+        ({"brown": [0.5]}, TypeError, "brown must be a number, .*Field, the path of a raster or an xarray.DataArray"),
         ({"arp": 0.24999}, ValueError, "at most"),
         ({"seed": -1}, ValueError, "seed must be"),
         ({"chunks": {"band": 1}}, ValueError, "y and x"),
         ({"chunks": 20, "arp": 0.3}, ValueError, "arp must be"),
     ],
 )
-def test_impossible_landscape_is_refused_before_it_computes(site, options, error, message):
+def test_impossible_landscapes_are_refused_before_computing(site, options, error, message):
     with pytest.raises(error, match=message), no_compute():
         fifesim.landscape(site, **options)
 
 
-def test_heights_of_a_grid_s_crs_are_left_out(site):
-    """Whatever the variables are made of, they lie on one grid."""
+def test_vertical_part_of_the_grids_crs_is_dropped(site):
+    """All variables must have the same CRS."""
     above = GeoBox(site.shape, site.affine, pyproj.CRS("EPSG:26914+5703").to_wkt())
     made = [fifesim.landscape(grid, soil=fifesim.Field(sd=0.03), brown=0.2, seed=7) for grid in (above, site)]
     xr.testing.assert_equal(*made)

@@ -1,4 +1,4 @@
-"""What tests of labelled elevation share."""
+"""Shared fixtures for tests of labelled elevation."""
 
 import pytest
 from elevations import labelled, model, write
@@ -18,5 +18,5 @@ def dem(site):
 
 @pytest.fixture
 def around():
-    """Elevation 60 cells further than `site` on all sides."""
+    """Elevation that extends 60 cells beyond `site` on all sides."""
     return labelled(fifesim.fife_site(30 / 9, window=((30, 195), (120, 294))))

@@ -1,4 +1,4 @@
-"""The synthetic Flint Hills against the statistics of a real watershed, as a function of place, and on rasters."""
+"""Tests of synthetic Flint Hills against a real watershed, of the erosion model, and of labelled rasters."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def means_30m(values):
 
 
 def semivariance(values, lag):
-    """Of rows and columns, lag in cells."""
+    """Semivariance along rows and columns; lag in cells."""
     return 0.25 * sum(np.mean(diff**2) for diff in (values[lag:] - values[:-lag], values[:, lag:] - values[:, :-lag]))
 
 
@@ -60,10 +60,10 @@ def spectrum(values):
     return [np.array([each[ring == k].mean() for k in rings]) for each in (frequency, power)]
 
 
-# All reference values: USGS 3DEP, Kings Creek watershed of Konza Prairie, 11 km2. It is one watershed: the standard
-# deviation of the median slope among squares of its size is 1.4 degrees here, of the relief over 1 km 11 m.
-def test_slopes_are_those_of_the_watershed(landscapes):
-    """Within 15 % and two standard errors: mean quantiles of 48 squares of 2.61 km, near the watershed's size."""
+# All reference values are from USGS 3DEP for one watershed, Kings Creek on Konza Prairie, 11 km2. Between synthetic
+# squares of its size, the standard deviation is 1.4 degrees for the median slope and 11 m for the relief over 1 km.
+def test_slopes_agree_with_the_watershed(landscapes):
+    """Mean quantiles of 48 squares of 2.61 km, about as large as the watershed; within 15 % and two standard errors."""
     found = []
     for values in landscapes:
         down, across = np.gradient(means_30m(values), 30.0)
@@ -75,8 +75,8 @@ def test_slopes_are_those_of_the_watershed(landscapes):
     assert (np.abs(np.mean(found, axis=0) - watershed) < 0.15 * watershed + 2 * error).all()
 
 
-def test_semivariogram_is_that_of_the_watershed(landscapes):
-    """The rise beyond 500 m is that of the watershed as a whole, which a wider landscape does not have."""
+def test_semivariogram_agrees_with_the_watershed(landscapes):
+    """Beyond 500 m the watershed also has a trend, which a larger landscape does not have."""
     lags = {20: 2.6, 30: 5.5, 50: 13.4, 100: 38.9, 200: 88, 300: 128, 500: 198}
     found = [np.mean([semivariance(values, int(lag / CELL)) for values in landscapes]) for lag in lags]
     np.testing.assert_allclose(found, list(lags.values()), rtol=0.15)
@@ -86,22 +86,22 @@ def test_semivariogram_is_that_of_the_watershed(landscapes):
 
 
 @pytest.mark.parametrize(("shortest", "longest", "exponent"), [(200, 1000, 3.5), (25, 200, 5.1)])
-def test_spectrum_falls_like_that_of_the_watershed(landscapes, shortest, longest, exponent):
+def test_spectral_slopes_agree_with_the_watershed(landscapes, shortest, longest, exponent):
     frequency, power = spectrum(landscapes)
     band = (frequency >= 1 / longest) & (frequency <= 1 / shortest)
     found = -np.polyfit(np.log(frequency[band]), np.log(power[band]), 1)[0]
     assert found == pytest.approx(exponent, rel=0.15)
 
 
-def test_elevations_are_those_of_the_watershed(landscapes):
-    """Within 15 % of its range of 110 m at each quantile, as height above its lowest point."""
+def test_quantiles_of_elevation_agree_with_the_watershed(landscapes):
+    """Within 6 % of its range of 110 m at each quantile."""
     found = np.quantile(landscapes, [0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1])
     expected = np.array([334, 341, 352, 379, 400, 412, 434, 440, 443.5])
     np.testing.assert_allclose(found, expected, rtol=0, atol=0.06 * 110)
 
 
-def test_water_finds_its_way(landscapes):
-    """Cells of 30 m without a lower neighbour are few."""
+def test_few_cells_are_pits(landscapes):
+    """Fraction of 30 m cells without a lower neighbour."""
     shares = []
     for values in map(means_30m, landscapes):
         inner = values[1:-1, 1:-1]
@@ -110,23 +110,18 @@ def test_water_finds_its_way(landscapes):
     assert np.mean(shares) < 0.015
 
 
-def test_window_is_a_slice_of_the_whole():
-    """Across tiles of the lattice, uplands, and the origin of the reference system."""
+def test_elevation_has_the_same_bits_in_windows():
+    """Across tiles of the lattice, uplands, and the origin of the CRS."""
     for north, east in ((4.3e6, 7e5), (200.0, -300.0)):
         northing, easting = north - 10 / 3 * np.arange(150), east + 10 / 3 * np.arange(170)
         whole = flint_hills.hills_elevation(7, northing, easting)
-        for rows, columns in (
-            (slice(0, 1), slice(0, 1)),
-            (slice(60, 150), slice(3, 99)),
-            (slice(149, 150), slice(40, 170)),
-        ):
-            np.testing.assert_array_equal(
-                flint_hills.hills_elevation(7, northing[rows], easting[columns]), whole[rows, columns]
-            )
+        for window in (np.s_[0:1, 0:1], np.s_[60:150, 3:99], np.s_[149:150, 40:170]):
+            part = flint_hills.hills_elevation(7, northing[window[0]], easting[window[1]])
+            np.testing.assert_array_equal(part, whole[window])
 
 
-def test_tiles_and_uplands_meet_without_a_seam():
-    """A kilometre across the edge of a tile, every metre; and 20 km across many uplands: no step in slope."""
+def test_tiles_and_uplands_have_no_seams():
+    """Curvature along 1 km across the edge of a tile, and slope along 20 km across many uplands."""
     seam = flint_hills.HILLS_TILE * flint_hills.HILLS_STEP
     profile = flint_hills.hills_elevation(5, np.array([40.0]), seam - 500 + np.arange(1000.0))[0]
     curvature = np.abs(np.diff(profile, 2))
@@ -136,30 +131,26 @@ def test_tiles_and_uplands_meet_without_a_seam():
     assert np.abs(np.diff(long)).max() < 5 * np.tan(np.radians(35))
 
 
-def test_seeds_give_unrelated_hills():
-    """A square of 6 km holds few independent elevations; the same hills would correlate by 1."""
+def test_seeds_give_different_hills():
+    """A square of 6 km has few independent elevations; the correlation of equal hills would be 1."""
     northing, easting = 4.3e6 - 100.0 * np.arange(60), 7e5 + 100.0 * np.arange(60)
     fields = [flint_hills.hills_elevation(seed, northing, easting).ravel() for seed in (0, 1, 2**63 - 1)]
     assert np.abs(np.corrcoef(fields) - np.eye(3)).max() < 0.7
 
 
-def test_hypsometry_is_the_survey_at_its_quantiles_and_a_line_beyond():
-    lowest, highest = flint_hills.hypsometry(np.array([322.1, 1108.3]))
-    assert (lowest, highest) == (334.0, 443.5)
-    np.testing.assert_allclose(flint_hills.hypsometry(np.array([302.1, 1158.3])), [330.0, 453.5], rtol=1e-12)
-
-
-def test_hypsometry_is_a_monotone_cubic_to_the_bit():
-    """Of Fritsch and Carlson, by scipy; at the knots as well, and in an array of any shape."""
+def test_hypsometry_equals_pchip_interpolation_and_is_linear_beyond_the_survey():
+    """Same bits as scipy, also at the knots and in arrays of any shape."""
     knots, heights = flint_hills._ERODED, flint_hills._WATERSHED
     eroded = np.concatenate([np.random.default_rng(1).uniform(knots[0], knots[-1], 900), knots]).reshape(9, -1)
     expected = interpolate.PchipInterpolator(knots, heights)(eroded)
     assert flint_hills.hypsometry(eroded).tobytes() == expected.tobytes()
     assert flint_hills.hypsometry(eroded.T).tobytes() == expected.T.tobytes()
+    found = flint_hills.hypsometry(np.array([302.1, 322.1, 1108.3, 1158.3]))
+    np.testing.assert_allclose(found, [330.0, 334.0, 443.5, 453.5], rtol=1e-12)
 
 
 @pytest.mark.parametrize(("height", "share"), flint_hills.BENCHES)
-def test_benches_are_sines_of_the_ground(height, share):
+def test_benches_add_sines_of_the_elevation(height, share):
     ground = np.random.default_rng(2).uniform(300, 500, (40, 50))
     ground[0, :4] = height * np.array([30, 30.25, 30.5, 30.75])
     clear, found = np.random.default_rng(3).uniform(0, 1, ground.shape), ground.copy()
@@ -168,8 +159,8 @@ def test_benches_are_sines_of_the_ground(height, share):
     np.testing.assert_allclose(found, ground + share / turn * clear * np.sin(turn * ground), rtol=0, atol=1e-12)
 
 
-def test_the_land_around_has_the_elevation_of_its_cells():
-    """In a window across the corner of four kept tiles."""
+def test_elevation_around_equals_the_elevation_of_its_cells():
+    """In a window across the corner of four cached tiles."""
     rows, columns = -144370 + np.arange(20), 23600 + np.arange(30)
     row, column = 28 * (rows[0] // 28) - 7, 28 * (columns[0] // 28) - 11
     found = flint_hills.elevation_around(5, (30.0, 29.6), row, column, (20, 30))
@@ -184,22 +175,18 @@ def without_preference(size):
     return np.ones((8, size * size))
 
 
-def test_least_way_through_even_ground_is_straight_to_the_nearest_border():
+def test_least_cost_paths():
+    """Uniform cost: distance to the border. From the centre of a ring of high cost: through its only gap."""
     i, j = np.indices((11, 11))
     found = least_ways(np.full((11, 11), 2.5))
     np.testing.assert_allclose(found, 2.5 * np.minimum(np.minimum(i, 10 - i), np.minimum(j, 10 - j)), rtol=1e-13)
-
-
-def test_least_way_goes_round_a_wall():
-    """One gap in a dear ring: from the middle through the gap, not across the ring."""
     cost = np.ones((9, 9))
-    cost[2:7, 2:7] = 1e3
-    cost[3:6, 3:6] = 1.0
-    cost[2, 4] = 1.0
+    cost[2:7, 2:7], cost[3:6, 3:6], cost[2, 4] = 1e3, 1.0, 1.0
     assert least_ways(cost)[4, 4] == pytest.approx(4.0)
 
 
-def test_ground_that_nothing_cuts_rises_by_its_uplift_and_its_border_stays():
+def test_ground_without_erosion_rises_by_its_uplift():
+    """The border stays."""
     start = np.random.default_rng(1).uniform(300, 310, (12, 12))
     found = erode(start, np.zeros_like(start), without_preference(12), LAW)
     expected = start.copy()
@@ -208,7 +195,7 @@ def test_ground_that_nothing_cuts_rises_by_its_uplift_and_its_border_stays():
 
 
 def test_creep_without_streams_is_diffusion():
-    """A wave between borders at rest decays as exp(-2 D k**2 t); explicit steps are good to one in a thousand."""
+    """A wave with fixed borders decays as exp(-2 D k**2 t); explicit steps are accurate to 0.1 %."""
     size, law = 41, LAW._replace(uplift=0.0, creep=2000.0)
     across = np.sin(np.pi * np.arange(size) / (size - 1))
     wave = across[:, None] * across
@@ -217,8 +204,8 @@ def test_creep_without_streams_is_diffusion():
     np.testing.assert_allclose(found - 100, wave * np.exp(-2 * law.creep * k**2), rtol=0, atol=1e-3)
 
 
-def test_ridge_is_cut_by_one_implicit_step_as_its_areas_grow():
-    """Every line drains to its ends, the top to one of them: four nodes, one after the other."""
+def test_ridge_is_eroded_by_one_implicit_step():
+    """Each line drains from the ridge to its ends, so drained area grows by one node per node."""
     size, law, rock = 9, LAW._replace(steps=1, uplift=0.0), 0.02
     ridge = np.tile(10.0 * (4 - np.abs(np.arange(size) - 4)), (size, 1))
     found = erode(ridge, np.full((size, size), rock), without_preference(size), law)
@@ -229,29 +216,28 @@ def test_ridge_is_cut_by_one_implicit_step_as_its_areas_grow():
         assert found[4, column] == pytest.approx(below, rel=1e-12)
 
 
-def test_preferred_neighbour_takes_the_water():
-    """On a plane that falls to the east, north-east is liked so much that the diagonal wins."""
+def test_water_flows_to_the_preferred_neighbour():
+    """On a plane that falls to the east, the weight of the north-eastern neighbour is larger."""
     size, law = 7, LAW._replace(steps=1, uplift=0.0)
     plane = np.tile(-10.0 * np.arange(size), (size, 1))
-    liked = without_preference(size)
-    liked[2] = 2.0  # of the eight neighbours, row by row from the north-west, the third
-    found = erode(plane, np.full((size, size), 0.02), liked, law)
+    preference = without_preference(size)
+    preference[2] = 2.0  # north-east is the third of eight neighbours, counted by row from the north-west
+    found = erode(plane, np.full((size, size), 0.02), preference, law)
     factor = 0.02 * law.node / (law.node * np.sqrt(2))
     # The corner node drains to the border, and nothing through it.
     assert found[5, 1] == pytest.approx((plane[5, 1] + factor * found[4, 2]) / (1 + factor), rel=1e-12)
 
 
-def test_water_that_joins_cuts_with_the_area_of_all_that_comes():
-    """Two lines of unlike length meet in a third: areas of nodes that drain through it, not of the longest way."""
+def test_drained_area_sums_over_tributaries():
+    """Two lines of different length meet in a third; the area counts all nodes, not the longest path."""
     size, law, rock = 9, LAW._replace(steps=1, uplift=0.0), 0.02
     ground = np.full((size, size), 100.0)
     ground[:, 0] = 0.0
-    # Down along row 4; from the north three nodes of column 4 and from the south one flow into it.
+    # Water flows along row 4; three nodes of column 4 from the north and one from the south flow into it.
     ground[4, 1:5] = [10.0, 20.0, 30.0, 40.0]
     ground[1:4, 4] = [70.0, 60.0, 50.0]
     ground[5, 4] = 55.0
-    liked = without_preference(size)
-    found = erode(ground, np.full((size, size), rock), liked, law)
+    found = erode(ground, np.full((size, size), rock), without_preference(size), law)
     drained = _drained_by_hand(ground, law.node)
     factor = rock * np.sqrt(drained[4, 1] * law.node**2) / law.node
     assert drained[4, 1] > 8
@@ -259,7 +245,7 @@ def test_water_that_joins_cuts_with_the_area_of_all_that_comes():
 
 
 def _drained_by_hand(ground, node):
-    """Nodes that drain through each, by following every one of them down."""
+    """Number of nodes that drain through each node, by following the path of each node."""
     size, drained = ground.shape[0], np.zeros(ground.shape, int)
     around = [(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1) if a or b]
     for i in range(1, size - 1):
@@ -275,33 +261,20 @@ def _drained_by_hand(ground, node):
     return drained
 
 
-@pytest.fixture(scope="module")
-def nodes():
-    """Elevation at the nodes of one upland."""
-    at = np.indices((NODES, NODES), float) + SPLINE_REACH
-    return spline_points(upland(3, 5, -2), *at)
-
-
-def test_rivers_are_where_both_sides_meet(nodes):
-    """Along the rivers the base, and the saddle half way along the valleys that join them."""
+def test_uplands_are_cached_and_higher_than_the_rivers_at_their_edges():
+    """Rivers have the elevation of the base; valleys between them rise to the saddle half way."""
+    one = upland(3, 5, -2)
+    assert upland(3, 5, -2) is one and one.shape == (NODES + 2 * SPLINE_REACH,) * 2
+    assert not np.array_equal(upland(3, 6, -2), one)
+    nodes = spline_points(one, *(np.indices((NODES, NODES), float) + SPLINE_REACH))
     valley = BASE + SADDLE * (1 - np.abs(np.linspace(-1, 1, NODES))) ** 0.6
     for side, level in ((nodes[0], BASE), (nodes[-1], BASE), (nodes[:, 0], valley), (nodes[:, -1], valley)):
         np.testing.assert_allclose(side, level, rtol=0, atol=1e-6)
-
-
-def test_ground_between_rivers_stands_above_them(nodes):
     inside = nodes[2:-2, 2:-2]
     assert inside.min() > BASE and 600 < np.median(inside) < 1100
 
 
-def test_place_and_seed_decide_the_upland():
-    one = upland(3, 5, -2)
-    assert upland(3, 5, -2) is one
-    assert not np.array_equal(upland(3, 6, -2), one)
-    assert one.shape == (NODES + 2 * SPLINE_REACH,) * 2
-
-
-def test_raster_has_its_labels_and_place():
+def test_raster_has_labels_and_the_same_bits_in_chunks_and_windows():
     grid = fifesim.fife_site(30 / 9, window=((90, 190), (180, 334)))
     dem = fifesim.flint_hills(grid, 7)
     check_place(dem, "EPSG:26914")
@@ -316,14 +289,14 @@ def test_raster_has_its_labels_and_place():
     xr.testing.assert_equal(fifesim.flint_hills(grid[10:20, 50:99], 7), dem[10:20, 50:99])
 
 
-def test_same_hills_on_other_cells():
-    """Cells of 10 m have their centres on every third cell of 3.33 m."""
+def test_hills_do_not_depend_on_the_cell_size():
+    """The centres of 10 m cells are the centres of every third cell of 3.33 m."""
     fine = fifesim.flint_hills(fifesim.grid_at("EPSG:26914", 7.1e5, 4.33e6, 300, 300, 10 / 3), 2)
     coarse = fifesim.flint_hills(fifesim.grid_at("EPSG:26914", 7.1e5, 4.33e6, 300, 300, 10.0), 2)
     np.testing.assert_allclose(fine.values[1::3, 1::3], coarse, rtol=0, atol=1e-6)
 
 
-def test_what_cannot_be_made_is_refused():
+def test_invalid_seed_and_large_cells_are_refused():
     grid = fifesim.fife_site(30, window=((0, 9), (0, 9)))
     with pytest.raises(ValueError, match="seed must be a whole number"):
         fifesim.flint_hills(grid, -1)
@@ -335,7 +308,7 @@ SUN = Geometry(60.0, 110.0, 25.0, 280.0)
 
 
 def grids_of(cell, coarse, reach):
-    """Cells of a scene, and those of the land around it."""
+    """Grid of a scene, and grid of the terrain around it."""
     grid = grids.grid_at("EPSG:26914", 708001.3, 4331002.9, 61 * cell, 47 * cell, cell)
     box = grid.boundingbox
     west, north = np.floor((box.left - reach) / coarse) * coarse, np.ceil((box.top + reach) / coarse) * coarse
@@ -344,7 +317,7 @@ def grids_of(cell, coarse, reach):
 
 
 @pytest.mark.parametrize(("cell", "coarse", "reach"), [(10 / 3, 30.0, 600.0), (3.7, 29.6, 400.0), (20.0, 40.0, 900.0)])
-def test_light_is_that_of_the_labelled_hills(cell, coarse, reach):
+def test_light_on_hills_equals_the_light_on_labelled_hills(cell, coarse, reach):
     grid, around = grids_of(cell, coarse, reach)
     dem = fifesim.flint_hills(grid.pad(1), 4)
     above = horizon(fifesim.flint_hills(around, 4, chunks=50), reach=reach, beside=dem).compute()
@@ -363,7 +336,7 @@ def test_steepest_is_the_largest_slope():
     assert terrain_labels.steepest(around, 4) == float(terrain_labels.slope(fifesim.flint_hills(around, 4)).max())
 
 
-def test_an_altitude_far_from_the_hills_is_told():
+def test_altitude_that_disagrees_with_the_hills_causes_a_warning():
     grid, around = grids_of(10 / 3, 30.0, 300.0)
     with pytest.warns(UserWarning, match="beside an altitude of the atmosphere of 3 km"):
         terrain_labels.light_on_hills(grid, around, 4, 300.0, SUN, 3.0)

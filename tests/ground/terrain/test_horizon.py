@@ -1,4 +1,4 @@
-"""Horizons against marching along rays, and against what geometry says of walls and planes."""
+"""Tests of horizons and sky factors against ray marching, and against closed forms for walls, planes and pits."""
 
 import numpy as np
 import pytest
@@ -17,19 +17,19 @@ def tangents_of(dem, cell_y, cell_x, azimuths, reach):
 
 
 @pytest.mark.parametrize("cells", [(10.0, 10.0), (10.0, 25.0), (30.0, 12.0)])
-def test_horizon_is_that_of_a_march_along_rays(cells):
-    """Away from the edge, where one counts a last half cell and the other does not."""
+def test_horizon_agrees_with_ray_marching(cells):
+    """Away from the edge, where only one of the methods counts the last half cell."""
     dem, azimuths = hills((70, 75), length=12.0), horizons.azimuths(16) + 5.0
     found = tangents_of(dem, *cells, azimuths, 250.0)
     rng = np.random.default_rng(2)
     for row, column in zip(rng.integers(26, 44, 25), rng.integers(26, 49, 25), strict=True):
         expected = [march(dem, row, column, *cells, azimuth, 250.0) for azimuth in azimuths]
-        # Linear between cells along one axis, or along both: waves of 12 cells differ by their curvature.
+        # One method interpolates along one axis and the other along both, which differs by the curvature of the waves.
         np.testing.assert_allclose(found[:, row, column], expected, rtol=0, atol=0.02)
         assert np.abs(found[:, row, column] - expected).mean() < 0.004
 
 
-def test_along_the_axes_and_the_diagonals_the_horizon_is_exact():
+def test_horizon_is_exact_along_axes_and_diagonals():
     dem, azimuths = hills((40, 40), seed=4), np.arange(8) * 45.0
     found = tangents_of(dem, 10.0, 10.0, azimuths, 200.0)
     for direction, (down, right) in enumerate([(-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1)]):
@@ -46,23 +46,23 @@ def test_horizon_of_a_plane_is_exact_in_every_direction(count):
     azimuths = horizons.azimuths(count)
     found = tangents_of(plane((40, 60), 15.0, 10.0, 35.0, 210.0), 15.0, 10.0, azimuths, 100.0)[:, 20, 30]
     rise = -np.tan(np.radians(35.0)) * np.cos(np.radians(azimuths - 210.0))
-    np.testing.assert_allclose(found, np.maximum(rise, 0), rtol=0, atol=1e-9)  # of weights rounded to 1e-9
+    np.testing.assert_allclose(found, np.maximum(rise, 0), rtol=0, atol=1e-9)  # weights are rounded to 1e-9
 
 
-def test_wall_is_seen_from_as_far_as_the_reach_and_no_further():
+def test_wall_is_visible_up_to_the_reach():
     dem = np.zeros((3, 200))
     dem[:, 150:] = 10.0
     found = tangents_of(dem, 3.0, 3.0, [90.0, 270.0], 150.0)
     distance = (150 - np.arange(200)) * 3.0
     seen = (distance > 0) & (distance <= 150)
-    # Far samples skip up to 1/32 of the distance.
+    # Distant samples are up to 1/32 of the distance apart.
     np.testing.assert_allclose(found[0, 1][seen], 10.0 / distance[seen], rtol=1 / 31)
     near = seen & (distance <= 31 * 3)
     np.testing.assert_allclose(found[0, 1][near], 10.0 / distance[near], rtol=1e-12)
     assert (found[0, 1][~seen] == 0).all() and (found[1] == 0).all()
 
 
-def test_unknown_ground_and_the_edge_are_open():
+def test_missing_cells_and_the_edge_hide_no_sky():
     dem = np.zeros((9, 9))
     dem[:, 7] = np.nan
     dem[:, 8] = 100.0
@@ -70,10 +70,10 @@ def test_unknown_ground_and_the_edge_are_open():
     found = tangents_of(dem, 10.0, 10.0, horizons.azimuths(16), 60.0)
     assert np.isfinite(found).all()
     assert found[:, 4, 2].max() == 0 and found[0].max() == 0
-    assert found[4, 4, 4] == pytest.approx(100 / 40)  # over the gap
+    assert found[4, 4, 4] == pytest.approx(100 / 40)  # across the gap
 
 
-def test_cell_has_the_same_bits_in_every_window():
+def test_horizon_has_the_same_bits_in_every_window():
     dem, azimuths, reach = hills((90, 80), seed=7), horizons.azimuths(16), 150.0
     m, n = horizons.horizon_margin(10.0, 10.0, reach)
     whole = horizons.horizon_tangent(dem, 10.0, 10.0, azimuths, reach)
@@ -82,21 +82,22 @@ def test_cell_has_the_same_bits_in_every_window():
 
 
 def sky_of(slope, aspect, horizon):
-    """Sky factor of slopes under a horizon of zenith angles [degree]."""
+    """Sky factor of slopes below a horizon given as zenith angles [degree]."""
     directions = np.arange(len(horizon)) * (360 / len(horizon))
     return horizon_sky_view(horizons.tangent(horizon), directions, *plane_gradient(slope, aspect))
 
 
 @pytest.mark.parametrize("count", [16, 17, 32])
 @pytest.mark.parametrize("slope", [0, 5, 30, 45, 60])
-def test_a_wide_plane_sees_the_sky_above_its_own_horizon(slope, count):
+def test_sky_factor_of_a_plane(slope, count):
+    """Vd = (1 + cos S) / 2."""
     for aspect in (0.0, 3.0, 11.25, 100.0):
         found = sky_of(slope, aspect, np.full(count, 90.0))
         np.testing.assert_allclose(found, (1 + np.cos(np.radians(slope))) / 2, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_sky_factor_is_doziers_integral(seed):
+def test_sky_factor_agrees_with_the_integral_of_dozier(seed):
     rng = np.random.default_rng(seed)
     count = 24
     horizon = rng.uniform(50, 90, count)
@@ -108,14 +109,14 @@ def test_sky_factor_is_doziers_integral(seed):
         part = phi - first * step
         return (tangents[first] * np.sin(step - part) + tangents[(first + 1) % count] * np.sin(part)) / np.sin(step)
 
-    # The midpoint rule meets kinks of the horizon: 1e-9 with this many steps.
+    # Kinks of the horizon limit the accuracy of the midpoint rule to 1e-9 with this number of steps.
     expected = dozier(slope, aspect, great_circles)
     np.testing.assert_allclose(sky_of(slope, aspect, horizon), expected, rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize("steepest", [30.0, 75.0, 89.0])
-def test_arcs_of_every_length_are_lamberts(steepest):
-    """Horizons that leap, so that an arc is up to a right angle long, by their angles and normals one by one."""
+def test_sky_vector_agrees_with_lamberts_formula(steepest):
+    """Sum of angles times normals of arcs, which are up to a right angle long since the horizon is discontinuous."""
     rng, count = np.random.default_rng(3), 16
     tangents = np.tan(np.radians(rng.uniform(0, steepest, (count, 50))))
     tangents[:, 0] = np.where(np.arange(count) % 2, np.tan(np.radians(steepest)), 0.0)
@@ -132,23 +133,23 @@ def test_arcs_of_every_length_are_lamberts(steepest):
 
 
 @pytest.mark.parametrize("wall", [5.0, 20.0, 45.0])
-def test_bottom_of_a_v_valley_sees_what_its_walls_leave(wall):
-    """Across a long valley Vd is half the sum of the sines from the normal to the two limits of the sky."""
+def test_sky_factor_of_a_v_shaped_valley(wall):
+    """In a long valley Vd is half the sum of the sines of the angles from the normal to both limits of the sky."""
     azimuth = np.radians(np.arange(32) * 11.25)
     horizon = horizons.zenith(np.tan(np.radians(wall)) * np.abs(np.sin(azimuth)))
     np.testing.assert_allclose(sky_of(0.0, 0.0, horizon), np.cos(np.radians(wall)), rtol=5e-3)
-    # The foot of the west wall faces east: behind, its own plane, ahead, the other wall.
+    # The foot of the west wall faces east; its sky is limited by its plane to the west and the other wall to the east.
     found = sky_of(wall, 90.0, horizon)
     np.testing.assert_allclose(found, (1 + np.cos(np.radians(2 * wall))) / 2, rtol=5e-3)
 
 
-def test_horizon_below_the_horizontal_is_open_and_unknown_is_open():
+def test_horizon_below_the_horizontal_or_unknown_hides_no_sky():
     assert sky_of(0.0, 0.0, np.full(16, 95.0)) == pytest.approx(1, abs=1e-12)
     assert sky_of(0.0, 0.0, np.full(16, np.nan)) == pytest.approx(1, abs=1e-12)
 
 
 def cells_of(dem, cell, reach, count=32):
-    """Slope, aspect and sky factor on a raster, NaN beyond it."""
+    """Slope, aspect and sky factor on a raster surrounded by NaN."""
     azimuths = horizons.azimuths(count)
     m, n = horizons.horizon_margin(cell, cell, reach)
     padded = np.pad(dem, ((m, m), (n, n)), constant_values=np.nan)
@@ -158,8 +159,8 @@ def cells_of(dem, cell, reach, count=32):
 
 
 @pytest.mark.parametrize("depth", [0.2, 0.5, 0.8])
-def test_spherical_pit_on_a_raster(depth):
-    """Everywhere in a pit of a sphere of radius R: Vd = 1 - depth / 2R, for the light that enters is spread evenly."""
+def test_sky_factor_and_terrain_view_in_a_spherical_pit(depth):
+    """In a pit of a sphere of radius R, Vd = 1 - depth / 2R everywhere, since entering light is spread evenly."""
     radius, size = 100.0, 281
     rim = radius * np.sqrt(depth * (2 - depth))
     cell = 2.1 * rim / size
@@ -169,15 +170,15 @@ def test_spherical_pit_on_a_raster(depth):
     slope, _, found = cells_of(dem, cell, 210.0)
     inside = np.hypot(x, y) < 0.7 * rim
     np.testing.assert_allclose(found[inside].mean(), 1 - depth / 2, rtol=5e-3)
-    # The rim is cut by cells, which single directions see.
+    # Cells approximate the rim, which matters for single directions.
     np.testing.assert_allclose(found[inside], 1 - depth / 2, rtol=0.012)
-    # What the land takes: in the pit as much as it hides of the sky above its own plane.
+    # The terrain view factor equals the part of the sky above the plane of the slope that terrain hides.
     view = horizon_terrain_view(found, np.cos(np.radians(slope)))
     np.testing.assert_allclose(view[inside], ((1 + np.cos(np.radians(slope))) / 2)[inside] - 1 + depth / 2, atol=0.012)
 
 
-def test_sky_of_a_place_nearby_is_kept_within_its_limits():
-    """The vector of level open ground, seen from a steep slope, and one that the slope turns away from."""
+def test_sky_factor_of_a_neighbouring_sky_vector_is_clipped():
+    """Sky vector of level open ground on a steep slope, a vector too long, and one behind the slope."""
     east, north = plane_gradient(60.0, 30.0)
     open_sky = Vector(*sky_vector(np.zeros(16), np.arange(16) * 22.5, 0.0, 0.0))
     assert sky_factor(open_sky, east, north) == pytest.approx(0.5, abs=1e-12)

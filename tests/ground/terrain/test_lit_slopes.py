@@ -1,4 +1,4 @@
-"""Lit slopes: cosines, shadows, Kt and what it conserves."""
+"""Tests of light on slopes: cosines, shadows, Kt and conservation of energy."""
 
 import numpy as np
 import pytest
@@ -34,8 +34,8 @@ def kt_of(light, rho, geometry, direct=0.7, total=0.9):
     return topographic_factor(light.sky_view, ct, rho, light.mu_s_local, geometry.mu_s, direct, total)
 
 
-def test_kernel_on_planes_is_the_formulas():
-    """The cosines by spherical trigonometry."""
+def test_light_on_planes_agrees_with_formulas():
+    """Cosines by spherical trigonometry."""
     geometry = Geometry(50.0, 110.0, 20.0, 300.0)
 
     def cosine(slope, aspect, zenith, azimuth):
@@ -51,36 +51,20 @@ def test_kernel_on_planes_is_the_formulas():
             np.testing.assert_allclose(found, value, rtol=0, atol=tolerance)
 
 
-@pytest.mark.parametrize("azimuth", [90.0, 180.0, 270.0, 0.0])
+@pytest.mark.parametrize("turn", [0, 1, 2, 3])
+@pytest.mark.parametrize("oblique", [0.0, 17.3])
 @pytest.mark.parametrize("elevation", [12.0, 20.0, 45.0])
-def test_shadow_of_a_cliff_is_as_long_as_it_should_be(elevation, azimuth):
-    """A plateau of 20 m toward the sun: its shadow ends 20 m / tan(elevation) from its edge."""
+def test_length_of_the_shadow_of_a_plateau(elevation, oblique, turn):
+    """20 m / tan(elevation) along the azimuth of the sun, also 17.3 degrees off the normal of the edge."""
     dem = np.zeros((120, 120))
     dem[:, 60:] = 20.0
-    dem = np.rot90(dem, (azimuth - 90) / -90)
-    light = light_of(dem, 2.0, Geometry(90 - elevation, azimuth))
-    line = np.rot90(light.mu_s_local == 0, (azimuth - 90) / 90)[60]
-    assert line[:60].sum() * 2.0 == pytest.approx(20 / np.tan(np.radians(elevation)), abs=2.0 + 1e-9)
-    # Cell 60 is on the cliff's face, which turns away.
+    light = light_of(np.rot90(dem, -turn), 2.0, Geometry(90 - elevation, (90 * (turn + 1) - oblique) % 360))
+    line = np.rot90(light.mu_s_local == 0, turn)[60]
+    length = 20 / np.tan(np.radians(elevation)) * np.cos(np.radians(oblique))
+    assert line[:60].sum() * 2.0 == pytest.approx(length, abs=2.0 + 1e-9)
+    # Cell 60 is on the slope of the edge, which faces away from the sun.
     assert not line[61:].any()
     assert np.diff(line.astype(int)).clip(0).sum() == 1  # one run
-
-
-def test_shadow_between_two_directions_of_the_horizon():
-    """The edge is straight, and so is its horizon as interpolated."""
-    dem = np.zeros((120, 120))
-    dem[:, 60:] = 20.0
-    azimuth = 90 - 17.3
-    line = light_of(dem, 2.0, Geometry(70.0, azimuth)).mu_s_local[60] == 0
-    length = 20 / np.tan(np.radians(20.0)) * np.sin(np.radians(azimuth))
-    assert line[:60].sum() * 2.0 == pytest.approx(length, abs=2.0 + 1e-9)
-
-
-def test_kt_and_the_upwelling_factor_are_one_on_level_ground():
-    for geometry in (Geometry(28.5, 117.0), Geometry(0.0, 0.0), Geometry(69.9, 300.0, 60.0, 100.0)):
-        light = light_of(np.full((9, 9), 371.2), 30.0, geometry)
-        np.testing.assert_allclose(kt_of(light, 0.4, geometry), 1, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(light.upwelling, 1, rtol=0, atol=1e-12)
 
 
 def pit(size=121, radius=100.0, depth=0.4):
@@ -91,22 +75,22 @@ def pit(size=121, radius=100.0, depth=0.4):
     return np.minimum(np.where(x**2 + y**2 < rim**2, z, 0.0), 0.0), cell, np.hypot(x, y) < rim, np.pi * rim**2
 
 
-def test_skylight_and_sun_that_enter_a_closed_pit_fall_on_its_walls():
-    """With rho = 0 what Kt gives to the walls, by their area, is what passes the opening."""
+def test_light_that_enters_a_pit_is_conserved():
+    """For rho = 0, Kt times the area of the walls sums to the light that passes the opening."""
     dem, cell, inside, opening = pit()
     for geometry in (Geometry(20.0, 30.0), Geometry(50.0, 200.0), Geometry(70.0, 310.0)):
         light = light_of(dem, cell, geometry)
         area = cell**2 / light.cosine
-        # The rim's cells are cut by it: 2 % of the opening is within half a cell of it.
+        # Cells approximate the rim: 2 % of the opening is within half a cell of it.
         for direct in (0.0, 0.5, 0.9):
             flux = (kt_of(light, 0.0, geometry, direct) * area)[inside].sum()
             assert flux == pytest.approx(opening, rel=0.02)
 
 
-def test_turning_ground_and_sun_together_turns_the_result():
+def test_rotating_terrain_and_directions_rotates_the_light():
     dem = hills((41, 41), seed=3, relief=60.0)
     before = light_of(dem, 10.0, Geometry(60.0, 35.0, 25.0, 290.0))
-    # Counterclockwise on paper is from east to north: azimuths fall by 90.
+    # `rot90` rotates counterclockwise, from east to north: azimuths decrease by 90 degrees.
     after = light_of(np.rot90(dem), 10.0, Geometry(60.0, 305.0, 25.0, 200.0))
     np.testing.assert_allclose(np.rot90(before, axes=(1, 2)), after, rtol=0, atol=1e-9)
     assert before.sky_view.std() > 1e-3 and (before.mu_s_local == 0).any()
@@ -114,7 +98,7 @@ def test_turning_ground_and_sun_together_turns_the_result():
 
 @pytest.fixture
 def lit():
-    """What fused passes take of hills with a hole, and rho and Kt of these by the formulas."""
+    """Arguments of fused passes over hills with a hole, and their light and Kt from the formulas."""
     dem, geometry = hills((30, 35), seed=5, relief=60.0), Geometry(55.0, 100.0, 30.0, 20.0)
     dem[3, 4] = np.nan
     rho = np.random.default_rng(4).uniform(0, 0.6, (2, *dem.shape))
@@ -124,7 +108,7 @@ def lit():
     return (rho, *sky_of(dem, 10.0, 300.0, geometry.saa), (10.0, 10.0), geometry, direct, total), light, kt
 
 
-def test_fused_reflectance_is_rho_kt_and_the_view_factor(lit):
+def test_fused_reflectance_is_rho_times_kt_times_the_upwelling_factor(lit):
     arguments, light, kt = lit
     expected = arguments[0] * kt
     np.testing.assert_allclose(lights.slope_reflectance(*arguments, upwelling=False), expected, rtol=1e-13)
@@ -133,7 +117,7 @@ def test_fused_reflectance_is_rho_kt_and_the_view_factor(lit):
 
 
 @pytest.mark.parametrize("upwelling", [True, False])
-def test_fused_factor_has_the_bits_of_the_formula_and_comes_with_reflectance(lit, upwelling, monkeypatch):
+def test_fused_factor_has_the_same_bits_with_and_without_reflectance(lit, upwelling, monkeypatch):
     """Also in strips of two rows."""
     arguments, _, kt = lit
     monkeypatch.setattr(lights, "_STRIP", 70)
@@ -144,14 +128,14 @@ def test_fused_factor_has_the_bits_of_the_formula_and_comes_with_reflectance(lit
 
 
 @pytest.mark.parametrize("make", [lights.slope_factor, lights.slope_reflectance])
-def test_bands_last_in_memory_are_no_other_bands(lit, make):
+def test_memory_layout_of_bands_changes_no_bit(lit, make):
     rho, *others = lit[0]
     turned = np.moveaxis(np.ascontiguousarray(np.moveaxis(rho, 0, -1)), -1, 0)
     np.testing.assert_array_equal(make(turned, *others), make(rho, *others))
 
 
-def test_places_between_are_interpolated():
-    """A sky that varies evenly is met exactly between its places, and beyond them; some rows are those of the whole."""
+def test_sky_is_interpolated_between_its_cells():
+    """A linear sky is exact between and beyond its cells; selected rows have the same bits."""
     rows, columns = np.arange(20.0), np.arange(24.0)
     value = 0.6 + 0.01 * rows[:, None] + 0.005 * columns
     layers = np.zeros((4, 5, 3))

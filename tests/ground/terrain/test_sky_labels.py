@@ -1,4 +1,4 @@
-"""Horizons of labelled elevation, and the sky that they leave."""
+"""Tests of horizons on labelled rasters, and of sky view from them."""
 
 import numpy as np
 import pytest
@@ -13,15 +13,15 @@ from fifesim.ground.terrain import sky_labels as sky_raster
 SUN = Geometry(70.0, 117.0, 20.0, 40.0)
 
 
-def test_horizon_keeps_the_promises_of_rasters(dem):
+def test_horizon_follows_the_rules_for_raster_functions(dem):
     dem.attrs["source_resolution"] = 10.0
     found = check_raster_function(lambda each: sky_raster.horizon(each, reach=60.0), dem, quantity="horizon")
     assert found.sizes == {"direction": 32, "y": 15, "x": 18}
     assert found["y"].isin(dem["y"]).all() and found["x"].isin(dem["x"]).all()
 
 
-def test_coarse_horizons_stay_near_those_at_every_cell():
-    """Ground of 200 m waves and more, which 30 m cells resolve; the figures of the docstring."""
+def test_coarse_horizons_agree_with_horizons_at_every_cell():
+    """Terrain with waves of 200 m and more, which 30 m cells resolve; tolerances from the docstring."""
     grid = fifesim.grid_at("EPSG:26914", 700000, 4330000, 900, 900, 10 / 3)
     z = hills((270, 270), seed=2, relief=26.0, length=60.0)
     coarse, fine = labelled(grid, z), labelled(grid, z, source_resolution=10 / 3)
@@ -31,14 +31,14 @@ def test_coarse_horizons_stay_near_those_at_every_cell():
     assert float(difference.std()) < 5e-4
 
 
-def test_sun_below_every_horizon_is_refused(site):
+def test_sun_below_the_horizon_of_all_slopes_is_refused(site):
     steep = labelled(site, plane(tuple(site.shape), 10 / 3, 10 / 3, 40.0, 0.0))
     for function in (fifesim.shadow, fifesim.illumination):
         with pytest.raises(ValueError, match=r"sza 60, 178.* from grid north.*below the horizon of every slope"):
             function(steep, Geometry(60.0, 180.0))
 
 
-def test_horizons_longer_than_a_chunk_leave_no_seams(around, lai):
+def test_horizons_longer_than_a_chunk_have_no_seams(around, lai):
     around.attrs["source_resolution"] = 10 / 3
     whole = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"], dem=around, geometry=SUN)
     for chunks in ({"y": 37, "x": 50}, {"y": 165, "x": 29}):
@@ -47,12 +47,12 @@ def test_horizons_longer_than_a_chunk_leave_no_seams(around, lai):
 
 
 @pytest.mark.parametrize("options", [{"directions": 12}, {"reach": 1.0}, {"resolution": 0.0}])
-def test_horizon_of_too_little_is_refused(dem, options):
+def test_invalid_horizon_options_are_refused(dem, options):
     with pytest.raises(ValueError, match=r"from 16 up|at least one cell|positive metres"):
         fifesim.horizon(dem, **options)
 
 
-def test_lazy_horizon_beside_a_scene_has_a_chunk_for_each_of_its(around, dem):
+def test_lazy_horizon_has_as_many_chunks_as_the_scene(around, dem):
     whole = fifesim.horizon(around, reach=90.0, resolution=10.0)
     with no_compute():
         lazy = fifesim.horizon(around.chunk(50), reach=90.0, resolution=10.0, beside=dem.chunk({"y": 15, "x": 27}))
@@ -60,7 +60,7 @@ def test_lazy_horizon_beside_a_scene_has_a_chunk_for_each_of_its(around, dem):
     np.testing.assert_array_equal(lazy, whole)
 
 
-def test_horizon_that_does_not_cover_is_refused(lai, dem, around):
+def test_horizon_that_does_not_cover_the_scene_is_refused(lai, dem, around):
     horizon = fifesim.horizon(around.isel(x=slice(0, 90)))
     with pytest.raises(ValueError, match=r"horizon spans .* does not cover the dem's"):
         fifesim.sky_view(dem, horizon)
@@ -73,8 +73,8 @@ def test_horizon_that_does_not_cover_is_refused(lai, dem, around):
 @pytest.mark.parametrize(
     "cut", [{"x": slice(1, None)}, {"x": slice(None, -1)}, {"y": slice(1, None)}, {"y": slice(None, -1)}], ids=str
 )
-def test_horizon_may_lack_less_than_a_place_on_each_side(cut):
-    """Of ten places of 30 m, nine lack a whole one, and less where the elevation ends within."""
+def test_horizon_may_end_less_than_one_cell_before_the_elevation(cut):
+    """A horizon on nine of ten cells of 30 m is too small, but sufficient for the elevation without its last cell."""
     dem = labelled(fifesim.fife_site(30 / 9, window=((0, 90), (0, 90))), np.full((90, 90), 7.0))
     horizon = fifesim.horizon(dem).isel(cut)
     with pytest.raises(ValueError, match="does not cover the dem's"):
@@ -82,8 +82,8 @@ def test_horizon_may_lack_less_than_a_place_on_each_side(cut):
     np.testing.assert_allclose(fifesim.sky_view(dem.isel(cut), horizon), 1, rtol=1e-12)
 
 
-def test_small_and_coarse_rasters_have_horizons_too():
-    """Fewer cells than one of the source, and cells larger than the reach."""
+def test_horizons_of_small_and_coarse_rasters():
+    """A raster smaller than one cell of the source, and cells larger than the reach."""
     tiny = labelled(fifesim.grid_at("EPSG:26914", 700000, 4330000, 12, 9, 3), np.full((3, 4), 7.0))
     np.testing.assert_allclose(fifesim.sky_view(tiny), 1, rtol=1e-12)
     wide = labelled(fifesim.grid_at("EPSG:26914", 700000, 4330000, 80000, 60000, 10000), np.full((6, 8), 7.0))

@@ -1,4 +1,4 @@
-"""Elevation models of any unit, orientation and coordinate reference system."""
+"""Tests of elevation models of any unit, orientation and coordinate reference system."""
 
 import re
 import warnings
@@ -19,15 +19,11 @@ from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
 from fifesim.ground.terrain import source_labels as sources
 from fifesim.ground.terrain.elevation_labels import source_dem
-from fifesim.ground.terrain.source_labels import (
-    beside_altitude,
-    model_under,
-    source_resolution,
-)
+from fifesim.ground.terrain.source_labels import beside_altitude, model_under, source_resolution
 
 
 @pytest.mark.parametrize("unit", ["ft", "US survey foot", "fathom"])
-def test_other_units_are_refused_unless_given(tmp_path, unit):
+def test_units_other_than_metres_must_be_given(tmp_path, unit):
     values, affine = model()
     where = write(tmp_path / "feet.tif", values / 0.3048, affine, unit=unit)
     with pytest.raises(ValueError, match=rf"in '{unit}', not in metres: give their units.*vertical_units"):
@@ -36,7 +32,7 @@ def test_other_units_are_refused_unless_given(tmp_path, unit):
     np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-3 * AMPLITUDE)
 
 
-def test_units_of_a_compound_reference_system(tmp_path):
+def test_vertical_units_of_a_compound_crs(tmp_path):
     """NAD83 / UTM 14N with NAVD88 heights in US survey feet, and in metres."""
     values, affine = model()
     feet = write(tmp_path / "feet.tif", values / (1200 / 3937), affine, "EPSG:26914+6360")
@@ -47,19 +43,15 @@ def test_units_of_a_compound_reference_system(tmp_path):
     np.testing.assert_allclose(fifesim.fine_dem(feet, grid(), vertical_units="us-ft"), same, rtol=0, atol=1e-9)
 
 
-def test_missing_reference_system_is_refused(tmp_path):
-    values, affine = model()
-    where = write(tmp_path / "nowhere.tif", values, affine, crs=None)
-    for raster in (where, rioxarray.open_rasterio(where)):
-        with pytest.raises(ValueError, match="has no CRS: give it one"):
-            fifesim.fine_dem(raster, grid())
-
-
-def test_what_is_no_model_is_refused(tmp_path, path):
+def test_invalid_elevation_models_are_refused(tmp_path, path):
+    nowhere = write(tmp_path / "nowhere.tif", *model(), crs=None)
     with pytest.raises(ValueError, match="cannot read"):
         fifesim.fine_dem(tmp_path / "missing.tif", grid())
     with pytest.raises(TypeError, match=r"path_or_raster must be the path of a file, or an xarray\.DataArray"):
         fifesim.fine_dem(np.zeros((3, 3)), grid())
+    for raster in (nowhere, rioxarray.open_rasterio(nowhere)):
+        with pytest.raises(ValueError, match="has no CRS: give it one"):
+            fifesim.fine_dem(raster, grid())
     bands = xr.concat([rioxarray.open_rasterio(path)] * 2, "band")
     with pytest.raises(ValueError, match="has one band"):
         fifesim.fine_dem(bands, grid())
@@ -74,7 +66,7 @@ def test_what_is_no_model_is_refused(tmp_path, path):
     ],
     ids=["south-up", "west-right", "rotated"],
 )
-def test_orientation_of_the_source_does_not_matter(tmp_path, affine):
+def test_source_may_have_any_orientation(tmp_path, affine):
     values, _ = model(affine=affine, shape=(100, 100) if affine.b else (70, 70))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
@@ -82,12 +74,9 @@ def test_orientation_of_the_source_does_not_matter(tmp_path, affine):
     np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1.5e-3 * AMPLITUDE)
 
 
-def test_change_of_datum_has_a_known_accuracy(path):
-    """
-    NAD27 against NAD83: identity of degrees would be 30 m off, the operation is good to 11 m and agrees with itself.
-
-    On slopes of 0.36 at most, 1 cm of height is 3 cm of place.
-    """
+def test_change_of_datum_from_nad27_to_nad83(path):
+    """Equal degrees are 30 m apart in both datums; the reference is the transformation by PROJ."""
+    # The transformation is accurate to 11 m. On slopes of 0.36 at most, 1 cm of height is 3 cm of position.
     old = fifesim.grid_at("EPSG:26714", WEST + 30, NORTH - 210, 500, 500, 10.0)
     dem = fifesim.fine_dem(path, old)
     pipeline, _ = projection.operation("EPSG:26714", CRS, projection.degrees(old))
@@ -95,8 +84,8 @@ def test_change_of_datum_has_a_known_accuracy(path):
     np.testing.assert_allclose(dem, surface(x, y), rtol=0, atol=1e-3 * AMPLITUDE)
 
 
-def test_arrays_give_what_their_file_gives(path):
-    """Read masked or not, in chunks or not, with the rows of either order."""
+def test_arrays_give_the_same_elevation_as_their_file(path):
+    """Masked or not, in chunks or not, with rows in either order."""
     whole = fifesim.fine_dem(path, grid())
     for options in ({}, {"masked": True}, {"masked": True, "chunks": {"y": 23, "x": 31}}):
         raster = rioxarray.open_rasterio(path, **options)
@@ -112,7 +101,7 @@ def test_arrays_give_what_their_file_gives(path):
 
 @pytest.fixture(scope="module")
 def continent(tmp_path_factory):
-    """A file of 20,000 x 20,000 cells (1.6 GB) of which it holds those around the grid, and the first of these."""
+    """Sparse file of 20,000 x 20,000 cells (1.6 GB) with data around the grid, and the index of its first cell."""
     where = tmp_path_factory.mktemp("continent") / "continent.tif"
     values, affine = model(margin=1500.0)
     first, count = 9984, 20_000
@@ -124,11 +113,9 @@ def continent(tmp_path_factory):
 
 
 @pytest.mark.parametrize("margin", [None, 900.0])
-def test_no_more_of_a_file_is_read_than_lies_near_the_grid(continent, monkeypatch, margin):
-    """
-    Tiles of 504 fine cells are 56 of the model's, a spline looks 37 around, the look for terraces 237; with a margin
-    of 30, tiles are 504 of the model's.
-    """
+def test_only_the_part_of_a_file_near_the_grid_is_read(continent, monkeypatch, margin):
+    # In cells of the model: tiles have 56, the spline needs 37 on each side and the search for terraces 237; with a
+    # margin of 30, tiles have 504.
     (where, first), read = continent, []
     windows = sources._file_window
 
@@ -147,20 +134,16 @@ def test_no_more_of_a_file_is_read_than_lies_near_the_grid(continent, monkeypatc
     assert all(first - around < start < first and first + 30 < stop < first + 30 + around for start, stop in outline)
 
 
-@pytest.mark.parametrize("fill", [True, 0, -3])
-def test_fill_is_a_distance(path, fill):
-    with pytest.raises((TypeError, ValueError), match=r"fill (is a distance|must be a number, got True)"):
-        fifesim.fine_dem(path, grid(), fill=fill)
-
-
-def test_fill_goes_at_most_250_cells_of_the_source(path):
-    """Of 30 m."""
+def test_fill_must_be_a_positive_distance_of_at_most_250_cells_of_the_source(path):
+    for fill in (True, 0, -3):
+        with pytest.raises((TypeError, ValueError), match=r"fill (is a distance|must be a number, got True)"):
+            fifesim.fine_dem(path, grid(), fill=fill)
     model_under(grid(), path, 7500, None)
     with pytest.raises(ValueError, match=r"fill=7501 is more than 250 cells .* at most fill=7500"):
         model_under(grid(), path, 7501, None)
 
 
-def test_a_window_too_fine_to_read_is_refused(path, monkeypatch):
+def test_sources_far_finer_than_the_grid_are_refused(path, monkeypatch):
     fifesim.fine_dem(path, grid())
     monkeypatch.setattr("fifesim.ground.terrain.source_labels._MOST_CELLS", 100)
     with pytest.raises(ValueError, match=r"far finer than the cells.*gdalwarp -r average"):
@@ -168,7 +151,7 @@ def test_a_window_too_fine_to_read_is_refused(path, monkeypatch):
 
 
 def test_finer_source_is_averaged(tmp_path):
-    """A wave of two cells of the source is gone, the mean of the surface stays."""
+    """A wave of two cells of the source is removed, and the mean of the surface is kept."""
     values, affine = model(cell=10.0)
     ripple = 5.0 * (-1.0) ** np.arange(values.shape[1])
     where = write(tmp_path / "fine.tif", values + ripple, affine)
@@ -176,16 +159,8 @@ def test_finer_source_is_averaged(tmp_path):
     assert dem.attrs["source_resolution"] == pytest.approx(40)
     expected = fifesim.fine_dem(write(tmp_path / "smooth.tif", values, affine), grid(40.0, size=880.0))
     np.testing.assert_allclose(dem, expected, rtol=0, atol=1e-9)
-    # A mean over 40 m of waves of 160 m is 0.9 of their amplitude.
+    # Means over 40 m have 0.9 of the amplitude of waves of 160 m.
     np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=0.1 * 2 + 0.05 * 4 + 0.2)
-
-
-def test_lazy_array_gives_the_same_bits_in_any_chunks(path):
-    raster = rioxarray.open_rasterio(path, masked=True)
-    whole = fifesim.fine_dem(raster, grid())
-    for chunks in ({"y": 100, "x": 77}, "auto"):
-        lazy = fifesim.fine_dem(raster.chunk({"y": 17, "x": 40}), grid(), chunks=chunks)
-        np.testing.assert_array_equal(lazy.compute(), whole)
 
 
 def slopes(values, cell):
@@ -204,8 +179,8 @@ def test_band_limited_surface_is_recovered(path):
 
 @pytest.mark.parametrize("cell", [30 / 9, 7.0, 45.0])
 @pytest.mark.parametrize("margin", [0.0, 600.0])
-def test_plane_stays_a_plane(tmp_path, cell, margin):
-    """Also up to the outer edge of the outermost cells of the source, and for sources finer than the grid."""
+def test_plane_is_exact(tmp_path, cell, margin):
+    """Also at the outer edge of the outermost cells of the source, and for sources finer than the grid."""
     where = write(tmp_path / "plane.tif", *model(tilted, margin=margin))
     dem = fifesim.fine_dem(where, grid(cell))
     np.testing.assert_allclose(dem, truth(dem, tilted), rtol=0, atol=1e-8)
@@ -213,7 +188,7 @@ def test_plane_stays_a_plane(tmp_path, cell, margin):
 
 
 def test_source_in_degrees(tmp_path):
-    """A lattice in degrees of the same surface; positions go by PROJ's own operation."""
+    """The same surface on a lattice in degrees, with coordinates transformed by PROJ."""
     to_degrees = pyproj.Transformer.from_crs(CRS, "EPSG:4269", always_xy=True)
     back = pyproj.Transformer.from_crs("EPSG:4269", CRS, always_xy=True)
     west, north = to_degrees.transform(WEST - 600, NORTH + 600)
@@ -225,18 +200,20 @@ def test_source_in_degrees(tmp_path):
 
 
 @pytest.mark.parametrize("chunks", [{"y": 100, "x": 77}, {"y": 31, "x": 270}, "auto"])
-def test_chunks_and_windows_change_no_bit(path, chunks):
-    whole = fifesim.fine_dem(path, grid())
+@pytest.mark.parametrize("lazy_source", [False, True])
+def test_fine_dem_has_the_same_bits_in_chunks_and_windows(path, chunks, lazy_source):
+    source = rioxarray.open_rasterio(path, masked=True).chunk({"y": 17, "x": 40}) if lazy_source else path
+    whole = fifesim.fine_dem(source.compute() if lazy_source else path, grid())
     with no_compute():
-        lazy = fifesim.fine_dem(path, grid(), chunks=chunks)
+        lazy = fifesim.fine_dem(source, grid(), chunks=chunks)
     assert lazy.chunks is not None
     xr.testing.assert_identical(lazy.compute(), whole)
-    part = fifesim.fine_dem(path, grid()[37:150, 11:112])
+    part = fifesim.fine_dem(source, grid()[37:150, 11:112])
     xr.testing.assert_equal(part, whole[37:150, 11:112])
 
 
-def test_source_around_the_grid(path):
-    """On cells of about the source's size that the grid's corner is a corner of; the model reaches 600 m."""
+def test_source_dem_has_a_margin_around_the_grid(path):
+    """Cells of about the source's size; the corner of the grid is a corner of these cells."""
     dem, reach = fifesim.source_dem(path, grid(), 450.0)
     assert dem.odc.geobox.affine == Affine(30, 0, WEST - 450, 0, -30, NORTH + 450)
     assert dem.shape == (60, 60)
@@ -247,7 +224,7 @@ def test_source_around_the_grid(path):
 
 
 @pytest.mark.parametrize("chunks", ["auto", {"y": 31, "x": 27}])
-def test_lazy_source_is_the_same_with_and_without_holes(tmp_path, chunks):
+def test_source_dem_has_the_same_bits_in_chunks_with_and_without_holes(tmp_path, chunks):
     values, affine = model()
     values[:, :15], values[3, 40] = np.nan, np.nan
     for crs in (CRS, "EPSG:32614"):
@@ -260,7 +237,7 @@ def test_lazy_source_is_the_same_with_and_without_holes(tmp_path, chunks):
             xr.testing.assert_identical(lazy.compute(), whole)
 
 
-def test_source_reaches_as_far_as_its_data(tmp_path):
+def test_source_dem_ends_at_the_edge_of_its_data(tmp_path):
     values, affine = model()
     values[:, :15], values[3, 40] = np.nan, np.nan
     dem, reach = fifesim.source_dem(write(tmp_path / "cut.tif", values, affine), grid(), 6000.0)
@@ -284,7 +261,7 @@ def hills(cell=30):
 @pytest.mark.parametrize("fill", [-9999.0, -32768.0, 32767.0, 9999.0, -3.4e38])
 @pytest.mark.parametrize("form", ["file", "array", "lazy"])
 def test_undeclared_fill_values_next_to_the_grid_are_refused(tmp_path, fill, form):
-    """The spline would carry them into the grid: 210 to 650 m instead of 338 to 412 m."""
+    """The spline would spread them into the grid: 210 to 650 m instead of 338 to 412 m."""
     dem = hills()
     dem[40:60, 61:] = fill
     path = write(tmp_path / "dem.tif", dem.values, dem.odc.geobox.affine, nodata=None)
@@ -300,7 +277,7 @@ def test_undeclared_fill_values_next_to_the_grid_are_refused(tmp_path, fill, for
 
 
 @pytest.mark.parametrize("cell", [10, 30])
-def test_feet_without_a_unit_are_a_warning_by_their_slope(cell):
+def test_large_slopes_cause_a_warning_of_feet(cell):
     dem = hills(cell)
     grid = fifesim.fife_site(10, window=((20, 80), (20, 80)))
     steep = 300 + 12 * (dem - 300)
@@ -313,7 +290,7 @@ def test_feet_without_a_unit_are_a_warning_by_their_slope(cell):
         fifesim.fine_dem(steep, grid, vertical_units="m")
 
 
-def test_voids_of_zero_are_a_warning():
+def test_voids_of_0_m_cause_a_warning():
     dem = hills()
     dem[48:50, 48:50] = 0.0
     with pytest.warns(UserWarning, match=r"elevations of exactly 0 m beside others.*-a_nodata 0"):
@@ -323,13 +300,13 @@ def test_voids_of_zero_are_a_warning():
 
 
 @pytest.mark.parametrize("units", ["ft", "US survey foot", "km"])
-def test_other_units_are_refused(dem, units):
+def test_rasters_in_other_units_are_refused(dem, units):
     dem.attrs["units"] = units
     with pytest.raises(ValueError, match=f"units '{units}', dem needs 'm'"):
         fifesim.slope(dem)
 
 
-def test_geographic_and_unplaced_elevation_are_refused(dem):
+def test_elevation_in_degrees_or_without_crs_or_south_up_is_refused(dem):
     degrees = dem.drop_vars("spatial_ref").assign_coords(y=39 - 1e-4 * np.arange(45), x=-96 + 1e-4 * np.arange(54))
     with pytest.raises(ValueError, match="geographic CRS"):
         fifesim.sky_view(degrees.rio.write_crs("EPSG:4326"))
@@ -339,7 +316,7 @@ def test_geographic_and_unplaced_elevation_are_refused(dem):
         fifesim.slope(dem.isel(y=slice(None, None, -1)))
 
 
-def test_a_dem_of_integers_is_an_elevation_and_an_undeclared_mark_is_not(dem):
+def test_integers_are_accepted_and_unmasked_nodata_is_refused(dem):
     whole = dem.round().astype("int16").assign_attrs(dem.attrs)
     np.testing.assert_array_equal(fifesim.slope(whole), fifesim.slope(whole.astype(float).assign_attrs(dem.attrs)))
     with pytest.raises(ValueError, match="masked=True"):
@@ -348,7 +325,7 @@ def test_a_dem_of_integers_is_an_elevation_and_an_undeclared_mark_is_not(dem):
         fifesim.slope("hill.tif")
 
 
-def test_resolution_of_the_source_is_given_or_carried_or_thirty_metres(dem):
+def test_source_resolution_is_the_argument_or_the_attribute_or_30_m(dem):
     assert source_resolution(dem) == 30.0
     assert source_resolution(dem.assign_attrs(source_resolution=10.0)) == 10.0
     assert source_resolution(dem.assign_attrs(source_resolution=10.0), 12.5) == 12.5
@@ -358,14 +335,9 @@ def test_resolution_of_the_source_is_given_or_carried_or_thirty_metres(dem):
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "altitude", "said"),
+    ("low", "high", "altitude", "message"),
     [
-        (
-            1239,
-            1393,
-            0.4,
-            r"1239 to 1393 m beside .* of 0.4 km: where they are feet, take dem .*Atmosphere.altitude=1.3",
-        ),
+        (1239, 1393, 0.4, r"1239 to 1393 m beside .* of 0.4 km: .* feet, take dem .*Atmosphere.altitude=1.3"),
         (656, 700, 0.2, "feet"),
         (2500, 3100, 1.5, "1.5 km: give fifesim.Atmosphere.altitude=2.8"),
         (0, 100, 2.0, "2 km: give fifesim.Atmosphere.altitude=0.1"),
@@ -374,14 +346,14 @@ def test_resolution_of_the_source_is_given_or_carried_or_thirty_metres(dem):
         (-50, 120, 0.0, None),
     ],
 )
-def test_elevations_of_another_place_than_the_air_are_told(site, low, high, altitude, said):
-    """At once, or when lazy ones compute; by their mean, their height may also be right."""
+def test_elevation_that_disagrees_with_the_altitude_causes_a_warning(site, low, high, altitude, message):
+    """For lazy elevation when it is computed."""
     cells = np.linspace(low, high, site.shape.y * site.shape.x).reshape(site.shape)
     cells[0, 0] = np.nan
     dem = grids.place(xr.DataArray(cells, dims=("y", "x")), site)
-    expected = pytest.warns(UserWarning, match=said) if said else nullcontext()
+    expected = pytest.warns(UserWarning, match=message) if message else nullcontext()
     with warnings.catch_warnings():
-        warnings.simplefilter("error" if said is None else "always")
+        warnings.simplefilter("error" if message is None else "always")
         with expected:
             assert beside_altitude(dem, altitude) is dem
         with no_compute():
@@ -390,7 +362,7 @@ def test_elevations_of_another_place_than_the_air_are_told(site, low, high, alti
             np.testing.assert_array_equal(lazy.compute(scheduler="synchronous"), cells)
 
 
-def test_model_that_ends_inside_the_grid_is_refused_by_how_much(path):
+def test_message_for_a_model_that_ends_within_the_grid_has_distances(path):
     beyond = grid(west=WEST + 700, north=NORTH - 900)
     with pytest.raises(ValueError, match="lacks up to") as error:
         fifesim.fine_dem(path, beyond)
@@ -403,8 +375,8 @@ def test_model_that_ends_inside_the_grid_is_refused_by_how_much(path):
 
 
 @pytest.mark.parametrize(("east", "south"), [(700, 900), (-700, -800), (650, 0)])
-def test_model_that_ends_inside_the_grid_says_what_it_covers(path, east, south):
-    """What it names is covered, and a pixel of 30 m more is not."""
+def test_message_for_a_model_that_ends_within_the_grid_has_the_covered_area(path, east, south):
+    """The model covers the area in the message, but not 30 m more."""
     with pytest.raises(ValueError, match="it covers west=") as error:
         fifesim.fine_dem(path, grid(west=WEST + east, north=NORTH - south))
     found = re.search(r"west=(\S+), north=(\S+), width=(\S+), height=(\S+?)(;|$)", str(error.value)).groups()[:4]
@@ -416,7 +388,8 @@ def test_model_that_ends_inside_the_grid_says_what_it_covers(path, east, south):
         fifesim.fine_dem(path, fifesim.grid_at("EPSG:26914", more[0], north, more[1], height, 30 / 9))
 
 
-def test_hole_is_refused_by_its_place_and_size(tmp_path):
+def test_message_for_a_hole_has_its_location_and_size(tmp_path):
+    """For a lazy array when it is computed."""
     where = with_hole(tmp_path)
     with pytest.raises(ValueError, match=r"a hole of (\d+) x (\d+) m at (\d+) E (\d+) N: fill=(\d+)") as error:
         fifesim.fine_dem(where, grid())
@@ -426,18 +399,14 @@ def test_hole_is_refused_by_its_place_and_size(tmp_path):
     assert (tall, wide) == (pytest.approx(90, abs=16), pytest.approx(120, abs=16))
     assert east == pytest.approx(WEST - 600 + 30 * 30, abs=20)
     assert north == pytest.approx(NORTH + 600 - 31.5 * 30, abs=20)
+    lazy = fifesim.fine_dem(rioxarray.open_rasterio(where, masked=True, chunks={"y": 20, "x": 20}), grid())
+    with pytest.raises(ValueError, match="a hole of"):
+        lazy.compute()
     dem = fifesim.fine_dem(where, grid(), fill=fill)
     np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=0.1 * AMPLITUDE)
 
 
-def test_lazy_array_tells_of_its_hole_when_computed(tmp_path):
-    raster = rioxarray.open_rasterio(with_hole(tmp_path), masked=True, chunks={"y": 20, "x": 20})
-    dem = fifesim.fine_dem(raster, grid())
-    with pytest.raises(ValueError, match="a hole of"):
-        dem.compute()
-
-
-def test_terraces_of_whole_numbers_are_warned_of(tmp_path, path):
+def test_terraces_cause_a_warning(tmp_path, path):
     def gentle(x, y):
         return np.rint(tilted(x, y) / 10)
 

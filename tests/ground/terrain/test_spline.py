@@ -1,4 +1,4 @@
-"""Spline interpolation of elevation against waves, planes and SciPy."""
+"""Tests of spline interpolation of elevation against waves, planes and scipy, of smooth noise, and of filled gaps."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from fifesim.ground.terrain.spline import smooth_noise
 @pytest.mark.parametrize(("cells", "error"), [(5, 6e-4), (6, 2e-4), (8, 3e-5)])
 @pytest.mark.parametrize("turn", [0, 30, 45])
 def test_waves_longer_than_five_cells_are_recovered(cells, error, turn):
-    """Between lattice points 30 m apart, every ninth of a cell, away from the mirrored borders."""
+    """At every ninth of a cell, away from the mirrored borders."""
     u, v = np.cos(np.radians(turn)) / cells, np.sin(np.radians(turn)) / cells
     rows, columns = np.mgrid[:120, :110]
 
@@ -25,7 +25,7 @@ def test_waves_longer_than_five_cells_are_recovered(cells, error, turn):
     np.testing.assert_allclose(found, wave(y[:, None], x[None, :]), rtol=0, atol=error)
 
 
-def test_spline_is_that_of_scipy():
+def test_spline_agrees_with_scipy():
     values = np.random.default_rng(0).standard_normal((70, 60))
     coefficients = spline.spline_coefficients(values)
     y, x = np.linspace(10, 50, 31), np.linspace(20, 40, 17)
@@ -35,8 +35,8 @@ def test_spline_is_that_of_scipy():
     np.testing.assert_array_equal(spline.spline_points(coefficients, *points), spline.spline_grid(coefficients, y, x))
 
 
-def test_margin_hides_what_lies_beyond():
-    """0.431**32 = 2e-12."""
+def test_values_beyond_the_margin_have_no_effect():
+    """They are weighted by 0.431**32 = 2e-12."""
     values = np.random.default_rng(1).standard_normal((200, 200))
     whole = spline.spline_coefficients(values)
     part = spline.spline_coefficients(values[50:150, 50:150])
@@ -44,8 +44,8 @@ def test_margin_hides_what_lies_beyond():
     np.testing.assert_allclose(part[inside, inside], whole[50:150, 50:150][inside, inside], rtol=0, atol=1e-10)
 
 
-def test_spline_of_tiles_is_the_same_in_every_window():
-    """Across tiles and the origin; a part is cut from the whole to the bit, and the whole is the plain spline."""
+def test_spline_of_tiles_equals_the_spline_of_the_whole():
+    """Across tiles and the origin; windows have the same bits."""
     rng = np.random.default_rng(4)
     made = {}
 
@@ -59,8 +59,8 @@ def test_spline_of_tiles_is_the_same_in_every_window():
     np.testing.assert_allclose(whole, spline.spline_grid(coefficients, y + 50, x), rtol=0, atol=1e-12)
 
 
-def test_noise_has_unit_variance_between_nodes_too():
-    """Every sixth of a lattice step; four standard errors of so many nodes, whose weights tie neighbours."""
+def test_smooth_noise_has_unit_variance():
+    """Also between nodes; within four standard errors, where the weights of a node correlate its neighbours."""
     at = np.arange(1500) * 5.0
     noise = smooth_noise(3, 1, 30.0, at, at)
     assert np.mean(noise**2) == pytest.approx(1, abs=4 * np.sqrt(2 * 2.2 / 250**2))
@@ -69,7 +69,7 @@ def test_noise_has_unit_variance_between_nodes_too():
     assert coarse / fine == pytest.approx(4, rel=0.1)
 
 
-def test_window_is_a_slice_and_streams_and_seeds_are_unrelated():
+def test_smooth_noise_windows_equal_slices_and_streams_are_uncorrelated():
     south, east = -700.0 + 7.0 * np.arange(200), 96.0 + 9.0 * np.arange(150)
     whole = smooth_noise(7, 2, 16.0, south, east)
     np.testing.assert_array_equal(smooth_noise(7, 2, 16.0, south[50:60], east[9:11]), whole[50:60, 9:11])
@@ -82,7 +82,7 @@ def plane(shape=(80, 90)):
     return 400.0 + 3.0 * columns - 2.0 * rows
 
 
-def test_plane_goes_on_past_its_edge():
+def test_extended_plane_remains_a_plane():
     values = plane()
     known = values.copy()
     known[:, 60:], known[:12], known[60:, 20:40] = np.nan, np.nan, np.nan
@@ -93,15 +93,15 @@ def test_plane_goes_on_past_its_edge():
     assert np.isfinite(spline.extend(known, 2)).all()
 
 
-def test_holes_in_a_plane_are_filled_by_the_plane():
+def test_holes_in_a_plane_are_filled_exactly():
     values = plane()
     known = values.copy()
     known[20:27, 30:33], known[40, 50], known[43:47, 47:53] = np.nan, np.nan, np.nan
     np.testing.assert_allclose(spline.fill_gaps(known, (4, 4)), values, rtol=0, atol=1e-8)
 
 
-def test_least_bending_is_smooth_across_a_hole():
-    """A hole of a quarter of a wave: within 2 % of its amplitude, where linear interpolation is 5 % off."""
+def test_filled_hole_is_smooth():
+    """A hole of a quarter of a wavelength: within 2 % of the amplitude, where linear interpolation has 5 % error."""
     rows, columns = np.mgrid[:60, :60]
     values = np.sin(2 * np.pi * columns / 28) * np.cos(2 * np.pi * rows / 40)
     known = values.copy()
@@ -109,8 +109,8 @@ def test_least_bending_is_smooth_across_a_hole():
     np.testing.assert_allclose(spline.fill_gaps(known, (4, 4)), values, rtol=0, atol=0.02)
 
 
-def test_a_hole_is_a_hole_wherever_it_lies():
-    """With one known cell between it and the border, on any side, as in the middle."""
+def test_filled_hole_does_not_depend_on_its_location():
+    """Also with only one known cell between the hole and a border."""
     rows, columns = np.mgrid[:40, :50]
     values = np.sin(rows / 5) + np.cos(columns / 7)
     for corner in ((1, 20), (36, 20), (18, 1), (18, 46), (18, 20)):
@@ -125,15 +125,9 @@ def test_a_hole_is_a_hole_wherever_it_lies():
             np.testing.assert_allclose(turned, by_bending, rtol=0, atol=1e-9)
 
 
-def test_larger_holes_are_left_but_for_their_edge():
+def test_only_the_edge_of_large_holes_is_filled():
     known = plane()
     known[20:60, 20:60] = np.nan
     out = spline.fill_gaps(known, (3, 3))
     assert np.isnan(out[23:57, 23:57]).all()
     assert np.isfinite(out[20:23, 20:60]).all()
-
-
-def test_block_means_of_a_plane_are_its_middles():
-    means = spline.block_means(plane((12, 9)), 4, 3)
-    np.testing.assert_allclose(means, [[403 + 9 * j - 3 - 8 * i for j in range(3)] for i in range(3)], rtol=1e-12)
-    assert np.isnan(spline.block_means(np.where(plane((4, 4)) == 400, np.nan, 1.0), 2, 2)[0, 0])

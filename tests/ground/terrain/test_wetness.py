@@ -1,4 +1,4 @@
-"""Where water gathers, beside closed forms, another filling of pits, and what flows out; and on rasters."""
+"""Tests of drained area and wetness index against closed forms, another filling of pits, and conservation of area."""
 
 import heapq
 
@@ -15,7 +15,7 @@ FALL = 1e-4
 
 
 def flooded(elevation):
-    """Ground filled from its border inward, the lowest cell first (priority flood)."""
+    """Ground filled from its border inward, lowest cell first (priority flood)."""
     filled = np.full(elevation.shape, np.inf)
     edge = [
         (elevation[place], place)
@@ -41,14 +41,14 @@ def rough():
     return hills((37, 52), seed=3) + np.random.default_rng(1).normal(0, 4, (37, 52))
 
 
-def test_pits_are_filled_as_a_flood_from_the_border_does(rough):
+def test_filled_pits_agree_with_a_priority_flood(rough):
     filled = fill_pits(rough)
     np.testing.assert_allclose(filled, flooded(rough), rtol=0, atol=1e-9)
     assert (filled > rough).any() and (filled >= rough).all()
 
 
-def test_all_water_reaches_the_border(rough):
-    """Cells without a lower neighbour lie on the border, and what comes to them is the area of all."""
+def test_border_cells_drain_the_whole_area(rough):
+    """Only cells on the border have no lower neighbour, and together they drain the whole area."""
     filled = fill_pits(rough)
     area = drained_area(filled, 10.0, 20.0)
     around = np.pad(filled, 1, constant_values=np.inf)
@@ -59,39 +59,39 @@ def test_all_water_reaches_the_border(rough):
     assert area.min() >= 200.0
 
 
-def test_plane_drains_a_line_of_cells_for_each():
-    """Away from its sides, where water that parts leaves: the distance from the top, over the slope."""
+def test_wetness_of_a_plane():
+    """Away from the sides, where water leaves: ln(distance from the top / slope)."""
     rows = np.arange(40.0)[:, None]
     plane = np.repeat(200.0 - 0.08 * 10.0 * rows, 81, axis=1)
     found = wetness_index(plane, 10.0, 10.0)[:, 40]
     np.testing.assert_allclose(found[:30], np.log((rows[:30, 0] + 1) * 10.0 / 0.08), rtol=0, atol=2e-3)
 
 
-def test_cone_drains_alike_all_round():
-    """Water from the top of a cone crosses circles: area over contour is a half of the radius, in all directions."""
+def test_drained_area_of_a_cone_is_isotropic():
+    """Water from the top crosses circles, so area over contour length is half the radius in all directions."""
     y, x = np.mgrid[-50:51, -50:51]
     radius = np.hypot(x, y)
     found = drained_area(100.0 - radius, 1.0, 1.0)
     ring = (radius > 25) & (radius < 35)
-    # A contour is a little longer than cells are wide where water crosses them obliquely.
+    # Where water crosses cells obliquely, the contour is slightly longer than the cell width.
     ratio = found[ring] / (radius[ring] / 2)
     assert ratio.mean() == pytest.approx(1.1, abs=0.1) and ratio.std() < 0.15
     np.testing.assert_allclose(found, found.T, rtol=1e-9)
 
 
-def test_mirrored_ground_has_a_mirrored_index(rough):
+def test_wetness_of_mirrored_ground_is_mirrored(rough):
     found = wetness_index(rough, 10.0, 20.0)
     np.testing.assert_allclose(wetness_index(rough[::-1], 10.0, 20.0)[::-1], found, rtol=0, atol=1e-9)
     np.testing.assert_allclose(wetness_index(rough.T, 20.0, 10.0).T, found, rtol=0, atol=1e-9)
 
 
-def test_level_ground_is_finite_and_small_rasters_are_too():
+def test_wetness_of_level_ground_and_small_rasters_is_finite():
     assert np.isfinite(wetness_index(np.full((6, 7), 3.0), 5.0, 5.0)).all()
     assert wetness_index(np.full((1, 1), 3.0), 5.0, 5.0)[0, 0] == pytest.approx(np.log(5.0 / LEAST_SLOPE))
     assert wetness_index(np.array([[3.0, 2.0]]), 5.0, 5.0).shape == (1, 2)
 
 
-def test_water_leaves_where_nothing_is_known(rough):
+def test_missing_cells_drain_their_neighbours(rough):
     gap = rough.copy()
     gap[15:18, 20:30] = np.nan
     found = wetness_index(gap, 10.0, 10.0)
@@ -100,8 +100,8 @@ def test_water_leaves_where_nothing_is_known(rough):
     assert np.isfinite(area).all()
 
 
-def test_water_parts_by_slope_to_a_power():
-    """From a top one metre above eight neighbours on cells of 10 m by 20 m, each as steep as it is near."""
+def test_drained_area_is_divided_by_a_power_of_the_slope():
+    """Water of a top 1 m above its neighbours, on cells of 10 m by 20 m, is divided by slope to the power 1.1."""
     top = np.zeros((3, 3))
     top[1, 1] = 1.0
     distance = np.hypot(10.0 * np.array([-1, 0, 1])[:, None], 20.0 * np.array([-1, 0, 1]))
@@ -110,14 +110,14 @@ def test_water_parts_by_slope_to_a_power():
     np.testing.assert_allclose(drained_area(top, 10.0, 20.0), expected, rtol=1e-12)
 
 
-def test_wetness_keeps_the_promises_of_rasters(dem):
+def test_wetness_follows_the_rules_for_raster_functions(dem):
     dem[20:23, 30] = np.nan
     found = check_raster_function(fifesim.wetness, dem, quantity="wetness")
     np.testing.assert_array_equal(np.isnan(found), np.isnan(dem))
 
 
-def test_at_its_places_it_is_that_of_the_coarse_elevation(around):
-    """Every ninth cell, as of the horizon, has the index of the elevation there; cells between lie on a line."""
+def test_wetness_at_a_coarser_resolution_is_interpolated(around):
+    """Every ninth cell, as in `horizon`, has the index of the coarse elevation; the index between them is linear."""
     found, places = fifesim.wetness(around, resolution=30.0), fifesim.horizon(around, resolution=30.0)
     cells = [np.abs(around[axis].values[:, None] - places[axis].values).argmin(axis=0).tolist() for axis in ("y", "x")]
     expected = wetness_index(around.values[np.ix_(*cells)], 30.0, 30.0)
@@ -127,17 +127,14 @@ def test_at_its_places_it_is_that_of_the_coarse_elevation(around):
     np.testing.assert_allclose(between, np.linspace(between[0], between[-1], 10), rtol=0, atol=1e-9)
 
 
-def test_finest_is_the_elevation_itself(dem):
+def test_wetness_at_the_finest_resolution_is_the_wetness_of_the_cells(dem):
     found = fifesim.wetness(dem, resolution=1.0)
     np.testing.assert_array_equal(found, wetness_index(dem.values, 30 / 9, 30 / 9))
 
 
-def test_few_cells_and_coarse_ones_have_one_too():
+def test_wetness_of_few_cells_is_finite_and_of_nan_is_nan(dem):
     tiny = labelled(fifesim.grid_at("EPSG:26914", 700000, 4330000, 12, 9, 3), np.full((3, 4), 7.0))
     assert np.isfinite(fifesim.wetness(tiny)).all()
-
-
-def test_elevation_of_nothing_is_nothing(dem):
     assert np.isnan(fifesim.wetness(dem * np.nan)).all()
     with pytest.raises(ValueError, match="resolution of an elevation's source must be positive"):
         fifesim.wetness(dem, resolution=0)
