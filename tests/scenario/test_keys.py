@@ -1,7 +1,5 @@
 """Keys of a scenario: spelling, units and files."""
 
-import subprocess
-import sys
 from datetime import date, datetime, timedelta, timezone
 
 import pytest
@@ -21,14 +19,6 @@ from fifesim.scenario.keys import (
     text,
 )
 from fifesim.scenario.scenario import Scenario
-
-
-def test_spelling_check_does_not_load_physics():
-    """A typo is reported before the scientific stack is loaded."""
-    heavy = "scipy", "numba", "rasterio", "odc", "pvlib", "matplotlib", "distributed"
-    code = f"import sys, fifesim.scenario.toml; print([name for name in {heavy!r} if name in sys.modules])"
-    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert printed.strip() == "[]"
 
 
 def test_scenario_sections_match_the_key_tables_in_order():
