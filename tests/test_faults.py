@@ -288,8 +288,8 @@ def small_disk(tmp_path):
 def test_full_disk_leaves_only_finished_files(scenario, whole, small_disk, size):
     """The disk is full at the start, at the first blocks, at the last blocks, or when the final files are written."""
     out = small_disk(f"size={size}") / "out"
-    done = run(scenario, "-o", out)
-    assert done.returncode == 1, done.stdout
+    done = run_here(scenario, "-o", out)
+    assert done.exit_code == 1, done.stdout
     assert "space" in done.stderr and "Traceback" not in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert not out.exists() or [path.name for path in out.iterdir()] == [UNFINISHED]
