@@ -64,6 +64,12 @@ def test_interpolate_crowned_matches_its_terms(crowned, view):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
 
 
+def test_single_dead_share_applies_to_all_cells(table):
+    lai = np.random.default_rng(3).uniform(0, 8, 600)
+    one, all_cells = (interpolate_foliage(table, lai, np.full(n, 0.3), np.full((2, 1), 0.2))[0] for n in (1, 600))
+    np.testing.assert_array_equal(one, all_cells)
+
+
 def test_foliage_is_nan_without_data_and_infinite_beyond_the_table(table):
     lai, brown = np.array([1, np.nan, 1, LARGEST_FOLIAGE_LAI + 1e-9]), np.array([0.2, 0.2, np.nan, 0.2])
     found, wrong = interpolate_foliage(table, lai, brown, np.array([[0.1], [0.2]]))

@@ -93,16 +93,6 @@ def test_extinction_of_vertical_leaves():
     np.testing.assert_allclose(extinction_coefficient(sza, "90: 1"), 2 / np.pi * np.tan(np.radians(sza)), rtol=1e-12)
 
 
-@pytest.mark.parametrize("mean", [30, 45, 57.3, 75])
-def test_extinction_of_ellipsoidal_leaves(mean):
-    """Campbell (1986): K is proportional to sqrt(x^2 + tan^2 sza); leaf angle classes are accurate to 1e-3."""
-    tangent = np.tan(np.radians([0, 10, 30, 50, 70]))
-    square = extinction_coefficient(np.degrees(np.arctan(tangent)), ("campbell", mean)) ** 2
-    slope = (square[1:] - square[0]) / tangent[1:] ** 2
-    np.testing.assert_allclose(slope, slope[-1], rtol=1e-2)
-    np.testing.assert_allclose(square, square[0] + slope[-1] * tangent**2, rtol=1e-3)
-
-
 @pytest.mark.parametrize("shape", ["planophile", "erectophile", "uniform"])
 def test_extinction_equals_sail(shape):
     tss = sail(1.0, 0.1, 0.1, sza=40, leaf_angles=shape).tss

@@ -75,18 +75,6 @@ def test_leaf_projection_and_scattering_match_sums_over_leaf_azimuth(inclination
     np.testing.assert_allclose(scattered, [reflected, transmitted], atol=1e-9)
 
 
-@pytest.mark.parametrize("sza, vza, raa", [(28.5, 0, 0), (60, 45, 90), (75, 75, 180), (30, 30, 0)])
-def test_spherical_leaves_scatter_by_ross_closed_form(sza, vza, raa):
-    """Ross (1981), as a function of the angle between sun and view; 900 leaf angle classes are accurate to 1e-5."""
-    leaves = leaf_angle_classes("spherical", classes=900)
-    reflected, transmitted = volume_scattering(np.array(leaves.inclination), sza, vza, raa) @ np.array(leaves.fraction)
-    s, v, azimuth = np.radians([sza, vza, raa])
-    between = np.arccos(np.clip(np.cos(s) * np.cos(v) + np.sin(s) * np.sin(v) * np.cos(azimuth), -1, 1))
-    ross = np.sin(between) - between * np.cos(between)
-    np.testing.assert_allclose(np.pi * transmitted, ross / (3 * np.pi), atol=1e-5)
-    np.testing.assert_allclose(np.pi * reflected, (ross + np.pi * np.cos(between)) / (3 * np.pi), atol=1e-5)
-
-
 def test_hot_spot_matches_the_converged_integral():
     """The hot spot changes single scattering only; the reference quadrature is accurate to 1e-9."""
     rng = np.random.default_rng(4)

@@ -72,19 +72,12 @@ def test_film_sums_all_reflections():
     np.testing.assert_allclose(wet_soil(DRY, passed, surface, inside), out, rtol=1e-12)
 
 
-def test_grains_in_a_medium_like_air_keep_their_reflectance():
+def test_limits_of_moist_soil():
+    """Grains in a medium like air, white ground below clear water, and dry soil keep their reflectance."""
     np.testing.assert_allclose(grains_in_water(DRY, 1.0), DRY, rtol=1e-12)
     assert np.all(grains_in_water(DRY, 1.08) < DRY)
-
-
-def test_clear_water_conserves_light():
-    """White ground stays white below any number of films."""
     films = water_films((narrow(0.45),))
-    white = films._replace(passed=np.ones((1, 6)))
-    assert moistened(np.ones(1), 1.0, white) == pytest.approx(1, abs=1e-12)
-
-
-def test_moisture_of_0_changes_no_bit():
+    assert moistened(np.ones(1), 1.0, films._replace(passed=np.ones((1, 6)))) == pytest.approx(1, abs=1e-12)
     background = np.array([0.15, 0.19, 0.3, 0.31, 0.32, 0.33])
     assert (moistened(background, 0.0, FILMS) == background).all()
 

@@ -6,7 +6,7 @@ import xarray as xr
 from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 
 from fifesim.grids import classes
-from fifesim.grids.classes import by_class, cells_by_class, check_codes, numbers_of
+from fifesim.grids.classes import by_class, check_codes
 
 
 @pytest.fixture
@@ -69,11 +69,6 @@ def many_codes():
     return np.random.default_rng(1).choice([-1, *TABLE], 1000).astype(np.int16)
 
 
-def test_cells_by_class_are_in_order(many_codes):
-    for code, cells in zip(TABLE, cells_by_class(many_codes, TABLE), strict=True):
-        np.testing.assert_array_equal(cells, np.flatnonzero(many_codes == code))
-
-
 @pytest.mark.parametrize("dtype", [np.int16, np.int64, float, np.uint16])
 def test_known_codes_pass_in_any_number_type(many_codes, dtype):
     """NaN and -1 have no class."""
@@ -97,10 +92,3 @@ def test_fractional_codes_and_many_codes_give_a_short_message():
     with pytest.raises(ValueError, match=r"1, 2, 3, 4, 5, 6, 7, 8, \.\.\., in") as caught:
         check_codes(np.arange(1, 1001), tuple(range(2000, 3000)))
     assert len(str(caught.value)) < 500
-
-
-def test_numbers_are_positions_in_the_table():
-    codes = np.random.default_rng(1).choice([-1, 3, 9, 700], (30, 40)).astype(np.int16)
-    numbers, present = numbers_of(codes, (9, 5, 3))
-    assert (np.array([9, 5, 3, -2])[numbers] == np.where(np.isin(codes, [3, 9]), codes, -2)).all()
-    assert present.tolist() == [True, False, True, True]

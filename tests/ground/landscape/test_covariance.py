@@ -80,16 +80,6 @@ def test_fields_have_the_given_correlations(places):
         assert stats.kstest(found[name], "norm").pvalue > 0.001
 
 
-def test_correlations_with_the_ground_are_exact_without_noise(places):
-    parts = copula(
-        {"lai": 0.1}, {pair: r for pair, r in REQUESTED.items() if pair[0] == "lai" and pair[1] in places}, places
-    )
-    ground = field_of(parts, "lai", {"lai": np.zeros(20_000)}, places)
-    for name in places:
-        scores = normal_scores(places[name], score_table(places[name]))
-        assert np.mean(ground * scores) == pytest.approx(REQUESTED["lai", name], abs=1e-3)
-
-
 def test_correlations_with_ground_that_is_not_jointly_normal():
     """Each property is normal, but their sum is not: beyond 1, one is the mirror image of the other."""
     one = np.random.default_rng(8).standard_normal(20_000)

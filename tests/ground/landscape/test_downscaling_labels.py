@@ -231,13 +231,6 @@ def test_tiles_hold_whole_pixels_and_start_at_the_origin_of_the_crs():
     assert window.stop == tiles.stop * 168 + PIXEL_MARGIN + 440004
 
 
-def test_cells_keep_their_lattice_position_if_pixels_are_off_the_pixel_lattice():
-    source = fifesim.grid_at("EPSG:32614", 699966, 4400033, 1000, 800, 10)
-    lattice = pixel_lattice(raster(source), source.zoom_out(1 / 5))
-    corner = [place * 5 + shift for place, shift in zip(lattice.pixel, lattice.shift, strict=True)]
-    assert corner == list(grids.lattice_position(source.zoom_out(1 / 5)))
-
-
 @pytest.mark.parametrize("cells, tile", [((2, 3), 504), ((6, 6), 504), ((7, 7), 504), ((100, 100), 800)])
 def test_tiles_hold_at_least_8_pixels_of_any_size(cells, tile):
     grid = fifesim.grid_at("EPSG:32614", 699960, 4400040, 1000, 1000, (10 / cells[0], 10 / cells[1]))

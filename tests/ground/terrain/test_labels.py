@@ -24,6 +24,7 @@ FUNCTIONS = {
     "terrain_view": terrain_labels.terrain_view,
     "illumination": lambda dem: terrain_labels.illumination(dem, SUN),
     "shadow": lambda dem: terrain_labels.shadow(dem, SUN),
+    "wetness": fifesim.wetness,
 }
 
 

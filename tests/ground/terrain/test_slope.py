@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from oracles_terrain import hills, plane, plane_gradient
+from oracles_terrain import hills, plane
 from scipy.interpolate import RegularGridInterpolator
 
 from fifesim.ground.terrain import slope as terrain
@@ -55,17 +55,6 @@ def test_gradient_agrees_with_numpy():
     np.testing.assert_array_equal(some, np.array(found)[:, rows[:, None] - 1, columns - 1])
 
 
-def test_along_normal_and_slope_cosine_agree_with_vectors():
-    rng = np.random.default_rng(1)
-    slope, aspect, *vector = rng.uniform([[0], [0], [-1], [-1], [-1]], [[89], [360], [1], [1], [1]], (5, 50))
-    tilt, azimuth = np.radians((slope, aspect))
-    normal = np.stack([np.sin(tilt) * np.sin(azimuth), np.sin(tilt) * np.cos(azimuth), np.cos(tilt)])
-    east, north = plane_gradient(slope, aspect)
-    found = terrain.along_normal(terrain.Vector(*vector), east, north)
-    np.testing.assert_allclose(found, (normal * vector).sum(0), rtol=0, atol=1e-13)
-    np.testing.assert_allclose(terrain.slope_cosine(east, north), normal[2], rtol=0, atol=1e-14)
-
-
 def test_bilinear_agrees_with_scipy():
     rng = np.random.default_rng(1)
     layer = rng.standard_normal((6, 9))
@@ -82,14 +71,6 @@ def test_bilinear_extends_the_last_value_and_is_nan_next_to_nan():
     at = np.array([0, 0, 2]), np.array([0.0, 0.5, 0.5])
     found = bilinear(np.array([[1.0, np.nan, 2.0, 2.0]]), (np.array([0]), np.array([0.0])), at)
     assert np.isnan(found)[0].tolist() == [True, True, False]
-
-
-def test_direction_vector_agrees_with_spherical_coordinates():
-    rng = np.random.default_rng(1)
-    zenith, azimuth = rng.uniform(0, [[90], [360]], (2, 50))
-    a, b = np.radians((zenith, azimuth))
-    toward = np.stack([np.sin(a) * np.sin(b), np.sin(a) * np.cos(b), np.cos(a)])
-    np.testing.assert_allclose(terrain.direction_vector(zenith, azimuth), toward, atol=1e-15)
 
 
 def test_kt_is_the_ratio_of_light_on_the_slope_and_on_level_ground():

@@ -131,3 +131,9 @@ def test_only_the_edge_of_large_holes_is_filled():
     out = spline.fill_gaps(known, (3, 3))
     assert np.isnan(out[23:57, 23:57]).all()
     assert np.isfinite(out[20:23, 20:60]).all()
+
+
+def test_block_means_of_a_plane():
+    means = spline.block_means(plane((12, 9)), 4, 3)
+    np.testing.assert_allclose(means, [[403 + 9 * j - 3 - 8 * i for j in range(3)] for i in range(3)], rtol=1e-12)
+    assert np.isnan(spline.block_means(np.where(plane((4, 4)) == 400, np.nan, 1.0), 2, 2)[0, 0])

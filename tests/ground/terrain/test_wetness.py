@@ -5,7 +5,6 @@ import heapq
 import numpy as np
 import pytest
 from elevations import labelled
-from lazy import check_raster_function
 from oracles_terrain import hills
 
 import fifesim
@@ -108,12 +107,6 @@ def test_drained_area_is_divided_by_a_power_of_the_slope():
     share = np.where(distance > 0, (1 / np.where(distance > 0, distance, 1)) ** 1.1, 0.0)
     expected = 200.0 * (1 + share / share.sum())
     np.testing.assert_allclose(drained_area(top, 10.0, 20.0), expected, rtol=1e-12)
-
-
-def test_wetness_follows_the_rules_for_raster_functions(dem):
-    dem[20:23, 30] = np.nan
-    found = check_raster_function(fifesim.wetness, dem, quantity="wetness")
-    np.testing.assert_array_equal(np.isnan(found), np.isnan(dem))
 
 
 def test_wetness_at_a_coarser_resolution_is_interpolated(around):
