@@ -69,7 +69,7 @@ def erode(start, erodibility, preference, law):
     [Braun2013]_
     """
     size, step = start.shape[0], 1.0 / law.steps
-    ground = np.array(start, float)
+    ground, new = np.array(start, float), np.array(start, float)
     receiver, order, drained, above = (np.empty(size * size, np.int32) for _ in range(4))
     # Powers of areas, which are whole numbers of nodes; 0 where none has been asked for.
     distance, powers, factor = np.ones(size * size), np.zeros(size * size + 1), np.empty(size * size)
@@ -83,7 +83,8 @@ def erode(start, erodibility, preference, law):
         _factors(step, erodibility.reshape(-1), *area, drained, distance, receiver, factor)
         _cut(order, receiver, factor, ground.reshape(-1))
         for _ in range(parts):
-            ground = _creep(ground, share, law.uplift * step / parts)
+            _creep(ground, share, law.uplift * step / parts, new)
+            ground, new = new, ground
     return ground
 
 
@@ -187,12 +188,14 @@ def _cut(order, receiver, factor, ground):
         ground[i] = (ground[i] + factor[i] * ground[receiver[i]]) / (1.0 + factor[i])
 
 
-def _creep(ground, share, uplift):
-    """Ground after a part of a step of creep and uplift; its border stays."""
-    new, inner = ground.copy(), ground[1:-1, 1:-1]
-    around = ground[1:-1, :-2] + ground[1:-1, 2:] + ground[:-2, 1:-1] + ground[2:, 1:-1]
-    new[1:-1, 1:-1] = inner + share * (around - 4.0 * inner) + uplift
-    return new
+@compiled
+def _creep(ground, share, uplift, new):
+    """Fill in the ground after a part of a step of creep and uplift; its border stays."""
+    for y in range(1, ground.shape[0] - 1):
+        north, row, south, out = ground[y - 1], ground[y], ground[y + 1], new[y]
+        for x in range(1, row.size - 1):
+            around = row[x - 1] + row[x + 1] + north[x] + south[x]
+            out[x] = row[x] + share * (around - 4.0 * row[x]) + uplift
 
 
 # An upland is a square of nodes between rivers. [m]

@@ -46,34 +46,31 @@ def _weights(share, out):
 def spline_grid(coefficients, rows, columns):
     """Values of a spline on a grid parallel to its lattice, shape (rows, columns)."""
     # Positions are at least two lattice cells inside; 0 is the centre of the first cell.
-    (top, down), (left, across) = _places(rows), _places(columns)
-    lines, out = np.empty((coefficients.shape[0], left.size)), np.empty((top.size, left.size))
-    _spline_grid(np.ascontiguousarray(coefficients), top, down, left, across, lines, out)
+    first, weights = np.empty(columns.size, np.int64), np.empty((columns.size, 6))
+    lines, out = np.empty((coefficients.shape[0], columns.size)), np.empty((rows.size, columns.size))
+    positions = np.ascontiguousarray(rows, float), np.ascontiguousarray(columns, float)
+    _spline_grid(np.ascontiguousarray(coefficients), *positions, first, weights, lines, out)
     return out
 
 
-def _places(positions):
-    """First of six lattice points for each position, and their weights, shape (6, n)."""
-    whole, weights = np.floor(positions), np.empty((6, positions.size))
-    _weights(positions - whole, weights)
-    return whole.astype(np.int64) - 2, weights
-
-
 @compiled
-def _spline_grid(coefficients, top, down, left, across, lines, out):
+def _spline_grid(coefficients, rows, columns, first, weights, lines, out):
     """Interpolate all rows of coefficients to columns, into ``lines``, and these to rows."""
-    w = across
+    for j in range(columns.size):
+        first[j] = int(np.floor(columns[j])) - 2
+        _weights(columns[j] - np.floor(columns[j]), weights[j])
     for i in range(lines.shape[0]):
-        c, line = coefficients[i], lines[i]
-        for j in range(left.size):
-            k = left[j]
-            near = w[0, j] * c[k] + w[1, j] * c[k + 1] + w[2, j] * c[k + 2]
-            line[j] = near + w[3, j] * c[k + 3] + w[4, j] * c[k + 4] + w[5, j] * c[k + 5]
-    for i in range(top.size):
-        k, values = top[i], out[i]
+        for j in range(columns.size):
+            k, w = first[j], weights[j]
+            c = coefficients[i, k : k + 6]
+            lines[i, j] = w[0] * c[0] + w[1] * c[1] + w[2] * c[2] + w[3] * c[3] + w[4] * c[4] + w[5] * c[5]
+    w = np.empty(6)
+    for i in range(rows.size):
+        k, values = int(np.floor(rows[i])) - 2, out[i]
+        _weights(rows[i] - np.floor(rows[i]), w)
         a, b, c, d, e, f = lines[k], lines[k + 1], lines[k + 2], lines[k + 3], lines[k + 4], lines[k + 5]
-        u, v, x, y, z, q = down[0, i], down[1, i], down[2, i], down[3, i], down[4, i], down[5, i]
-        for j in range(left.size):
+        u, v, x, y, z, q = w[0], w[1], w[2], w[3], w[4], w[5]
+        for j in range(columns.size):
             values[j] = u * a[j] + v * b[j] + x * c[j] + y * d[j] + z * e[j] + q * f[j]
 
 
