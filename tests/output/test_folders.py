@@ -190,12 +190,12 @@ def rival(tmp_path):
     process.join()
 
 
-@pytest.mark.parametrize("options", [{"overwrite": True}, {"overwrite": False}, {"overwrite": False, "resume": True}])
-def test_second_run_in_a_folder_is_rejected_and_names_the_first(tmp_path, rival, options):
+def test_second_run_in_a_folder_is_rejected_and_names_the_first(tmp_path, rival):
     process, end = rival
-    for attempt in (check_folder, lambda folder, **options: write(folder, "second", **options)):
-        with pytest.raises(ValueError, match=f"in use by process {process.pid} on "):
-            attempt(tmp_path / "out", **options)
+    for options in ({"overwrite": True}, {"overwrite": False}, {"overwrite": False, "resume": True}):
+        for attempt in (check_folder, lambda folder, **options: write(folder, "second", **options)):
+            with pytest.raises(ValueError, match=f"in use by process {process.pid} on "):
+                attempt(tmp_path / "out", **options)
     end.set()
     process.join(60)
     assert contents(tmp_path / "out") == dict.fromkeys(NAMES, "first")
