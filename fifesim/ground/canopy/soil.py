@@ -68,14 +68,20 @@ def in_cells(kernel, reflectance, change, *parameters, check):
     return np.moveaxis(out.reshape(bands, *shape), 0, -1)
 
 
+@compiled
 def _brighten(reflectance, brightness, line, out):
-    for start in range(0, brightness.size, _AT_ONCE):
-        run = slice(start, start + _AT_ONCE)
-        for before, after, slope in zip(reflectance, out, line, strict=True):
-            np.multiply(brightness[run], slope, out=after[run])
-            after[run] += before if before.size == 1 else before[run]
-            np.clip(after[run], 0.0, 1.0, out=after[run])
-    return not within(brightness, -1.0, 1.0)
+    """Fill in the brightened reflectance, shape (band, n); return the number of impossible changes."""
+    step, wrong = int(reflectance.shape[1] > 1), 0
+    for first in range(0, brightness.size, _AT_ONCE):
+        change = brightness[first : first + _AT_ONCE]
+        wrong += outside(change, -1.0, 1.0)
+        for band in range(out.shape[0]):
+            before, after = reflectance[band, step * first :], out[band, first:]
+            for i in range(change.size):
+                value = before[step * i] + change[i] * line[band]
+                # NaN is neither.
+                after[i] = 0.0 if value < 0.0 else 1.0 if value > 1.0 else value
+    return wrong
 
 
 def check_brightness(brightness):
