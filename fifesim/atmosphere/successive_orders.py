@@ -193,11 +193,20 @@ def _by_layers(light, matrix):
 
 def _scattered(weighted, basis, mixing):
     """Coefficients of the source that a weighted field generates by scattering, shape (layers, basis)."""
+    source = np.zeros((mixing.shape[0], basis.shape[1]))
+    _mix(weighted @ basis, mixing, source)
+    return source
+
+
+@compiled
+def _mix(incident, mixing, source):
+    """Add to the source the incident light that is scattered by the mixing matrices of layers and degrees."""
     layers, degrees, components, _ = mixing.shape
-    incident, source = (weighted @ basis).reshape(layers, components, degrees), np.zeros((layers, components, degrees))
-    for of in range(components):
-        source += np.moveaxis(mixing[..., of], 1, 2) * incident[:, None, of]
-    return source.reshape(layers, -1)
+    for k in range(layers):
+        for to in range(components):
+            for of in range(components):
+                for degree in range(degrees):
+                    source[k, to * degrees + degree] += mixing[k, degree, to, of] * incident[k, of * degrees + degree]
 
 
 @compiled
