@@ -201,12 +201,6 @@ def test_coupling_slopes_and_model_keys_reach_the_chain():
     assert "discrete ordinates" in exact["scene"]["surface_reflectance"].history
 
 
-def test_inconsistent_coupling_and_slopes_are_rejected():
-    for wrong, message in (({"coupling": "directional", **EXACT}, "needs model"), ({"slopes": "upright"}, "elevation")):
-        with pytest.raises(ValueError, match=message):
-            fifesim.Scenario(terrain={"dem": "flat"}).replace(**wrong)
-
-
 def test_instrument_path_is_relative_to_the_scenario_and_its_tables_to_the_instrument(tmp_path, monkeypatch):
     """The working directory has no effect."""
     (tmp_path / "sensors").mkdir()

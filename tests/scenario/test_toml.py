@@ -29,12 +29,6 @@ def test_file_paths_are_relative_to_the_scenario(tmp_path):
     assert values["sensor"]["instrument"] == str(tmp_path.resolve() / "mine.toml")
 
 
-def test_impossible_file_names_are_rejected(tmp_path):
-    path = write_toml(tmp_path, f"[sensor]\ninstrument = '{'a' * 5000}.toml'\n")
-    with pytest.raises(ValueError, match="instrument"):
-        read_scenario(path)
-
-
 def test_spelling_check_reports_each_mistake_on_one_line(tmp_path):
     path = write_toml(tmp_path, "[sensor]\nbandz = ['TM3']\npixel = -1\n[ground]\narp = 0.3\n")
     with pytest.raises(ValueError) as caught:
@@ -45,23 +39,18 @@ def test_spelling_check_reports_each_mistake_on_one_line(tmp_path):
         "unknown key sensor.bandz",
     ]
 
-
-def test_spelling_check_leaves_names_of_instruments_and_models_to_physics(tmp_path):
+    # Names of instruments and models are left to physics.
     check_spelling(write_toml(tmp_path, "[sensor]\ninstrument = 'TN'\n[ground]\nleaf_angles = 'sphere'\n"))
 
 
-@pytest.mark.parametrize(
-    "name", ["a\nb.tif", "a\tb", "\x1b[31mred.tif", "a\x7fb.tif", "röd 😀.tif", "a\u202eb", "\"'.tif", "a\\b"]
-)
-def test_any_file_name_is_read_back(tmp_path, name):
-    scenario = parse_scenario({"ground": {"lai_file": str(tmp_path / name)}})
-    path = write_toml(tmp_path, write_scenario(scenario))
-    assert read_scenario(path) == scenario
+FILE_NAMES = ("a\nb.tif", "a\tb", "\x1b[31mred.tif", "a\x7fb.tif", "röd 😀.tif", "a\u202eb", "\"'.tif", "a\\b")
+BAND_NAMES = ("B 3", "röd", 'b"3', "b.3", "b\\3", "", "=", "3")
 
 
-@pytest.mark.parametrize("name", ["B 3", "röd", 'b"3', "b.3", "b\\3", "", "=", "3"])
-def test_any_band_name_is_read_back(tmp_path, name):
-    scenario = parse_scenario({"ground": {"background": {name: 0.1, "TM3": 0.2}}})
+@pytest.mark.parametrize(("name", "band"), [*zip(FILE_NAMES, BAND_NAMES, strict=True)])
+def test_any_name_of_a_file_or_band_is_read_back(tmp_path, name, band):
+    ground = {"lai_file": str(tmp_path / name), "background": {band: 0.1, "TM3": 0.2}}
+    scenario = parse_scenario({"ground": ground})
     assert read_scenario(write_toml(tmp_path, write_scenario(scenario))) == scenario
 
 
@@ -82,24 +71,17 @@ def test_unset_keys_are_comments_that_can_be_filled_in(tmp_path):
     assert load_values(write_toml(tmp_path, text))["ground"]["lai_file"] == str(tmp_path.resolve() / "lai.tif")
 
 
-@pytest.mark.parametrize(
-    ("section", "key", "suffix"),
-    [
-        *(("ground", "lai_file", ".tif"), ("terrain", "dem", ".tif"), ("ground", "distribution", ".csv")),
-        ("sensor", "instrument", ".toml"),
-    ],
-)
-def test_unreadable_files_of_a_scenario_are_rejected_without_waiting(tmp_path, section, key, suffix):
-    """A pipe would block for ever. The error names the key before anything is loaded."""
+@pytest.mark.parametrize("key", ["ground.lai_file", "terrain.dem", "ground.distribution", "sensor.instrument", ""])
+def test_unreadable_files_are_rejected_without_waiting(tmp_path, key):
+    """A pipe would block for ever. The error names the key of a file before anything is loaded."""
+    suffix = {"ground.distribution": ".csv", "sensor.instrument": ".toml"}.get(key, ".tif")
     os.mkfifo(tmp_path / f"pipe{suffix}")
     (tmp_path / f"folder{suffix}").mkdir()
     (tmp_path / f"loop{suffix}").symlink_to(f"loop{suffix}")
     (tmp_path / f"zero{suffix}").symlink_to("/dev/zero")
-    for name in ("pipe", "folder", "loop", "zero", "a" * 5000, "a\0b"):
-        said = spelling_error(
-            write_toml(tmp_path, f'{section}.{key} = "{name.replace(chr(0), chr(92) + "u0000")}{suffix}"')
-        )
-        assert said.startswith(f"{section}.{key} = "), said
+    for name in ("pipe", "folder", "loop", "zero", "a" * 5000, "a\\u0000b" if key else "none"):
+        path = write_toml(tmp_path, f'{key} = "{name}{suffix}"') if key else tmp_path / f"{name}{suffix}"
+        assert spelling_error(path).startswith(f"{key} = " if key else "")
 
 
 def spelling_error(path):
@@ -130,20 +112,12 @@ def test_message_is_short_and_printable(tmp_path, text, said):
     assert said in spelling_error(write_toml(tmp_path, text))
 
 
-def test_paths_that_are_no_regular_file_are_rejected(tmp_path):
-    os.mkfifo(tmp_path / "pipe.toml")
-    (tmp_path / "loop.toml").symlink_to("loop.toml")
-    for name in ("pipe.toml", "loop.toml", ".", "/dev/zero", "a" * 5000, "none.toml"):
-        spelling_error(tmp_path / name)
-
-
 def test_symbolic_link_keeps_its_name(tmp_path):
     """The target of the link has no suffix that distinguishes a file from a name."""
     (tmp_path / "version1").write_text("lai\n1\n2\n3\n")
     (tmp_path / "samples.csv").symlink_to("version1")
-    assert read_scenario(write_toml(tmp_path, "ground.distribution = 'samples.csv'")).ground.distribution.endswith(
-        ".csv"
-    )
+    scenario = read_scenario(write_toml(tmp_path, "ground.distribution = 'samples.csv'"))
+    assert scenario.ground.distribution.endswith(".csv")
 
 
 def test_each_class_is_written_as_a_table(tmp_path):
