@@ -11,9 +11,9 @@ import xarray as xr
 
 from fifesim.base.arguments import Kind
 from fifesim.base.files import shown
+from fifesim.base.geometry import relative_azimuth
 from fifesim.grids import cf, chunks, swaths
 from fifesim.retrieval.description import ANGLE_MARGIN, OUTSIDE, Retrieval
-from fifesim.retrieval.methods import azimuth_difference
 from fifesim.retrieval.networks import SL2P_BANDS, sl2p
 
 _ANGLES = ("sza", "saa", "vza", "vaa")
@@ -190,7 +190,7 @@ def _check_angles(angles, retrieval):
         return
     sza, saa, vza, vaa = (float(each) for each in angles)
     first, last = retrieval.tables["angle_range"]
-    own = sza, vza, float(azimuth_difference(saa, vaa)) if vza >= _NADIR else 0.0
+    own = sza, vza, float(relative_azimuth(saa, vaa)) if vza >= _NADIR else 0.0
     for name, value, low, high in zip(("sza", "vza", "relative azimuth"), own, first, last, strict=True):
         if not low - ANGLE_MARGIN <= value <= high + ANGLE_MARGIN:
             raise ValueError(
@@ -216,7 +216,7 @@ def _in_batches(function, layers, light, *angles):
         part = slice(start, start + _BATCH)
         own = spectra[part].astype(float)
         sza, saa, vza, vaa = (np.broadcast_to(each if np.ndim(each) == 0 else each[part], len(own)) for each in flat)
-        azimuth = np.where(vza < _NADIR, 0.0, azimuth_difference(saa, vaa))
+        azimuth = np.where(vza < _NADIR, 0.0, relative_azimuth(saa, vaa))
         out[:, part] = function(own, np.stack([sza, vza, azimuth], axis=1))
     return out.reshape(layers, *shape)
 

@@ -319,8 +319,3 @@ def is_outside(tables, reflectance):
     """Whether spectra are outside of the training spectra."""
     distance = (((reflectance - tables["domain_mean"]) @ tables["domain_scale"]) ** 2).sum(1)
     return np.sqrt(distance) > tables["domain_radius"]
-
-
-def azimuth_difference(saa, vaa):
-    """Angle between two azimuths, 0 to 180. [degree]"""
-    return np.abs((np.asarray(vaa) - saa + 180) % 360 - 180)
