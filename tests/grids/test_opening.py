@@ -262,10 +262,7 @@ def test_rasters_without_numbers_or_location_are_rejected(tmp_path):
 
 
 def test_vertical_crs_is_ignored(tmp_path):
-    plain, compound = (
-        write(tmp_path / "plain.tif"),
-        write(tmp_path / "compound.tif", crs="EPSG:26914+5703"),
-    )
+    plain, compound = write(tmp_path / "plain.tif"), write(tmp_path / "compound.tif", crs="EPSG:26914+5703")
     image = fifesim.open_image(compound)
     assert image.rio.crs == "EPSG:26914" and image.equals(fifesim.open_image(plain))
     np.testing.assert_array_equal(fifesim.open_lai(compound, GRID), fifesim.open_lai(plain, GRID))

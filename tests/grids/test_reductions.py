@@ -13,15 +13,7 @@ import fifesim
 from fifesim.base.footprints import Boxcar, regularize
 from fifesim.grids import grid as grids
 from fifesim.grids import reductions
-from fifesim.grids.reductions import (
-    areas,
-    combined,
-    operators,
-    regularized,
-    resample,
-    sums_by_block,
-    sums_by_row,
-)
+from fifesim.grids.reductions import areas, combined, operators, regularized, resample, sums_by_block, sums_by_row
 
 VALUES = np.random.default_rng(9).integers(0, 100, (23, 31)).astype(float)
 RASTER = xr.DataArray(VALUES, dims=("y", "x"))

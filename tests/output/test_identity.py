@@ -14,21 +14,6 @@ from elevations import write
 from fifesim.base import files
 from fifesim.output import identity as run_identity
 from fifesim.output.folders import BEGUN, versions
-from fifesim.output.identity import (
-    PRODUCT,
-    SCENARIO_TAG,
-    VERSIONS,
-    NotThisRun,
-    begin,
-    changed_inputs,
-    check_finished,
-    check_inputs,
-    inputs_of,
-    origin_tags,
-    scenario_to_resume,
-    state_of,
-    with_checksums,
-)
 from fifesim.scenario.scenario import parse_scenario, read_scenario
 from fifesim.scenario.toml import write_scenario
 
@@ -51,7 +36,7 @@ def test_files_named_by_other_files_are_inputs(lai_file, tmp_path):
     (tmp_path / "samples.csv").write_text("lai\n" + "\n".join(map(str, np.linspace(0.5, 3, 50))), encoding="utf-8")
     ground = {"lai_file": str(lai_file), "distribution": str(tmp_path / "samples.csv")}
     sensor = {"instrument": str(tmp_path / "mine.toml"), "bands": ["AVHRR1"], "pixel": 30}
-    found = inputs_of(parse_scenario(SMALL | {"ground": ground, "sensor": sensor}))
+    found = run_identity.inputs_of(parse_scenario(SMALL | {"ground": ground, "sensor": sensor}))
     names = {os.path.basename(name) for name in found}
     assert names == {"lai.vrt", "source.tif", "mine.toml", "avhrr_response.csv", "samples.csv"}
 
@@ -60,7 +45,7 @@ def test_band_table_is_an_input(tmp_path):
     """It holds the bandwidths and noise, like the instrument file."""
     (tmp_path / "bands.csv").write_text("name,center,width\nred,0.668,0.010\nnir,0.840,0.040\n")
     (tmp_path / "mine.toml").write_text('name = "Mine"\naltitude = 7e5\ngsd = 30.0\nbits = 12\nbands = "bands.csv"\n')
-    found = inputs_of(parse_scenario(SMALL | {"sensor": {"instrument": str(tmp_path / "mine.toml")}}))
+    found = run_identity.inputs_of(parse_scenario(SMALL | {"sensor": {"instrument": str(tmp_path / "mine.toml")}}))
     assert {os.path.basename(name) for name in found} == {"mine.toml", "bands.csv"}
 
 
@@ -69,20 +54,20 @@ def scenario_with_lai(lai_file):
 
 
 def make_identity(scenario, scene):
-    return state_of(inputs_of(scenario), write_scenario(scenario), scene=scene)
+    return run_identity.state_of(run_identity.inputs_of(scenario), write_scenario(scenario), scene=scene)
 
 
 def test_changed_source_is_reported_on_resume_and_at_the_end(lai_file, tmp_path):
     identity = make_identity(scenario_with_lai(lai_file), False)
     before = json.loads(identity["run.json"])["inputs"]
-    begin(tmp_path, identity)
-    check_inputs(before, inputs_of(scenario_with_lai(lai_file)))
+    run_identity.begin(tmp_path, identity)
+    run_identity.check_inputs(before, run_identity.inputs_of(scenario_with_lai(lai_file)))
     with rasterio.open(tmp_path / "source.tif", "r+") as sink:
         sink.write(np.full((1, 9, 9), 3.0))
     with pytest.raises(ValueError, match=r"source\.tif changed while it was read"):
-        check_inputs(before, inputs_of(scenario_with_lai(lai_file)))
-    with pytest.raises(NotThisRun, match=r"an input file that has changed.*--overwrite"):
-        begin(tmp_path, make_identity(scenario_with_lai(lai_file), False))
+        run_identity.check_inputs(before, run_identity.inputs_of(scenario_with_lai(lai_file)))
+    with pytest.raises(run_identity.NotThisRun, match=r"an input file that has changed.*--overwrite"):
+        run_identity.begin(tmp_path, make_identity(scenario_with_lai(lai_file), False))
 
 
 def rewrite_map(path, value, way):
@@ -99,12 +84,14 @@ def rewrite_map(path, value, way):
 @pytest.mark.parametrize("way", ["in place", "by a copy"])
 def test_changed_input_of_the_same_size_and_time_is_found(lai_file, tmp_path, way):
     identity = make_identity(scenario_with_lai(lai_file), False)
-    begin(tmp_path, identity)
+    run_identity.begin(tmp_path, identity)
     rewrite_map(tmp_path / "source.tif", 3.0, way)
     with pytest.raises(ValueError, match=r"source\.tif changed while it was read"):
-        check_inputs(json.loads(identity["run.json"])["inputs"], inputs_of(scenario_with_lai(lai_file)))
-    with pytest.raises(NotThisRun, match="an input file that has changed"):
-        begin(tmp_path, make_identity(scenario_with_lai(lai_file), False))
+        run_identity.check_inputs(
+            json.loads(identity["run.json"])["inputs"], run_identity.inputs_of(scenario_with_lai(lai_file))
+        )
+    with pytest.raises(run_identity.NotThisRun, match="an input file that has changed"):
+        run_identity.begin(tmp_path, make_identity(scenario_with_lai(lai_file), False))
 
 
 def chmod(path):
@@ -127,9 +114,11 @@ def test_changed_attributes_count_only_for_files_too_large_to_compare(
 ):
     """Files above the size limit are compared by their attributes alone."""
     monkeypatch.setattr(run_identity, "_COMPARED", largest)
-    before = with_checksums(inputs_of(scenario_with_lai(lai_file)))
+    before = run_identity.with_checksums(run_identity.inputs_of(scenario_with_lai(lai_file)))
     change(tmp_path / "source.tif")
-    changed = changed_inputs(json.loads(json.dumps(before)), inputs_of(scenario_with_lai(lai_file)))
+    changed = run_identity.changed_inputs(
+        json.loads(json.dumps(before)), run_identity.inputs_of(scenario_with_lai(lai_file))
+    )
     assert [os.path.basename(path) for path in changed] == found
 
 
@@ -139,47 +128,47 @@ def test_changed_archive_of_an_input_is_found(lai_file, tmp_path, braces):
     with zipfile.ZipFile(archive, "w") as packed:
         packed.write(tmp_path / "source.tif", "lai.tif")
     inside = f"/vsizip/{{{archive}}}/lai.tif" if braces else f"/vsizip/{archive}/lai.tif"
-    before = with_checksums(inputs_of(scenario_with_lai(inside)))
+    before = run_identity.with_checksums(run_identity.inputs_of(scenario_with_lai(inside)))
     assert list(before) == [str(archive)]
     with zipfile.ZipFile(archive, "a") as packed:
         packed.writestr("more.txt", "more")
-    assert changed_inputs(before, inputs_of(scenario_with_lai(inside))) == [str(archive)]
+    assert run_identity.changed_inputs(before, run_identity.inputs_of(scenario_with_lai(inside))) == [str(archive)]
 
 
 def test_finished_run_must_match_the_scenario_and_be_newer_than_its_inputs(tmp_path):
     (tmp_path / "scenario.toml").write_text("seed = 3  # of the ground\n")
     written = (tmp_path / "scenario.toml").stat().st_mtime_ns
-    check_finished(tmp_path / "scenario.toml", "a", "a", {"lai.tif": [9, written, written, 1]})
+    run_identity.check_finished(tmp_path / "scenario.toml", "a", "a", {"lai.tif": [9, written, written, 1]})
     with pytest.raises(ValueError, match=r"of another scenario, with seed = 3:.*--overwrite"):
-        check_finished(tmp_path / "scenario.toml", "seed = 3  # of the ground", "seed = 4", {})
+        run_identity.check_finished(tmp_path / "scenario.toml", "seed = 3  # of the ground", "seed = 4", {})
     for times in ((written + 1, 0), (0, written + 1)):
         with pytest.raises(ValueError, match=r"older than its input lai\.tif:.*--overwrite"):
-            check_finished(tmp_path / "scenario.toml", "a", "a", {"lai.tif": [9, *times, 1]})
+            run_identity.check_finished(tmp_path / "scenario.toml", "a", "a", {"lai.tif": [9, *times, 1]})
 
 
 def test_scenario_to_resume_is_read_from_the_folder(tmp_path):
-    assert scenario_to_resume(tmp_path) is None
+    assert run_identity.scenario_to_resume(tmp_path) is None
     (tmp_path / "scenario.toml").write_text("[ground]\nseed = 3\n")
-    assert scenario_to_resume(tmp_path).ground.seed == 3
+    assert run_identity.scenario_to_resume(tmp_path).ground.seed == 3
 
 
 @pytest.mark.parametrize("text", ["[]", "{}", "{", "1", '{"versions": []}', "[" * 100_000])
 def test_invalid_run_state_is_rejected(tmp_path, text):
     identity = make_identity(parse_scenario(SMALL).complete(), False)
-    begin(tmp_path, identity)
+    run_identity.begin(tmp_path, identity)
     (tmp_path / "run.json").write_text(text)
-    with pytest.raises(NotThisRun, match=r"run\.json is invalid.*--overwrite"):
-        begin(tmp_path, identity)
+    with pytest.raises(run_identity.NotThisRun, match=r"run\.json is invalid.*--overwrite"):
+        run_identity.begin(tmp_path, identity)
 
 
 @pytest.mark.parametrize(("key", "said"), [("versions", "package versions"), ("scene", "another setting of --scene")])
 def test_run_with_other_versions_or_options_is_not_resumed(tmp_path, key, said):
     identity = make_identity(parse_scenario(SMALL).complete(), False)
-    begin(tmp_path, identity)
+    run_identity.begin(tmp_path, identity)
     state = json.loads(identity["run.json"])
     other = identity | {"run.json": json.dumps(state | {key: {} if key == "versions" else True})}
-    with pytest.raises(NotThisRun, match=said):
-        begin(tmp_path, other)
+    with pytest.raises(run_identity.NotThisRun, match=said):
+        run_identity.begin(tmp_path, other)
 
 
 def test_comments_of_a_scenario_do_not_prevent_resuming(tmp_path):
@@ -187,21 +176,21 @@ def test_comments_of_a_scenario_do_not_prevent_resuming(tmp_path):
     classes = {name: {"share": 0.5, "distribution": name} for name in ("burned-grazed", "burned-ungrazed")}
     values = SMALL | {"landscape": {"cover": "pastures"}, "classes": classes}
     identity = make_identity(parse_scenario(values).complete(), False)
-    begin(tmp_path, identity)
+    run_identity.begin(tmp_path, identity)
     heading, rest = identity[BEGUN].split("\n", 1)
     assert heading.startswith("# Synthetic landscape: fields are synthetic; the ground is level")
-    begin(tmp_path, identity | {BEGUN: rest})
-    begin(tmp_path, identity | {BEGUN: f"# Other words.\n{rest}"})
+    run_identity.begin(tmp_path, identity | {BEGUN: rest})
+    run_identity.begin(tmp_path, identity | {BEGUN: f"# Other words.\n{rest}"})
     turned = parse_scenario(values | {"classes": dict(reversed(classes.items()))}).complete()
-    with pytest.raises(NotThisRun, match="has another scenario"):
-        begin(tmp_path, make_identity(turned, False))
+    with pytest.raises(run_identity.NotThisRun, match="has another scenario"):
+        run_identity.begin(tmp_path, make_identity(turned, False))
 
 
 def test_tags_hold_the_scenario_and_the_versions(small_run):
     with rasterio.open(small_run / "truth.tif") as source:
         tags = source.tags()
-    assert tags[SCENARIO_TAG] == write_scenario(read_scenario(small_run / "scenario.toml"))
-    assert (tags[PRODUCT], json.loads(tags[VERSIONS])) == ("truth.tif", versions())
+    assert tags[run_identity.SCENARIO_TAG] == write_scenario(read_scenario(small_run / "scenario.toml"))
+    assert (tags[run_identity.PRODUCT], json.loads(tags[run_identity.VERSIONS])) == ("truth.tif", versions())
 
 
 def test_paths_in_tags_are_relative_to_the_image(tmp_path):
@@ -211,8 +200,11 @@ def test_paths_in_tags_are_relative_to_the_image(tmp_path):
     data.touch()
     scenario = parse_scenario({"terrain": {"dem": str(data)}})
     for folder, expected in ((tmp_path / "out", "../data/hills.tif"), (data.parent, "hills.tif")):
-        text = origin_tags(scenario, "image.tif", folder)[SCENARIO_TAG]
+        text = run_identity.origin_tags(scenario, "image.tif", folder)[run_identity.SCENARIO_TAG]
         assert tomllib.loads(text)["terrain"]["dem"] == expected
         assert str(tmp_path) not in text
     virtual = parse_scenario({"terrain": {"dem": "/vsizip/hills.zip/hills.tif"}})
-    assert "/vsizip/hills.zip/hills.tif" in origin_tags(virtual, "image.tif", tmp_path)[SCENARIO_TAG]
+    assert (
+        "/vsizip/hills.zip/hills.tif"
+        in run_identity.origin_tags(virtual, "image.tif", tmp_path)[run_identity.SCENARIO_TAG]
+    )

@@ -13,19 +13,7 @@ from PIL import Image
 
 import fifesim
 from fifesim.grids import grid as grids
-from fifesim.output.maps import (
-    composite_bands,
-    encoded,
-    false_colour_names,
-    image_map,
-    relief_map,
-    rgb,
-    stretch_of,
-    thinned,
-    valid,
-    value_map,
-    write_style,
-)
+from fifesim.output import maps
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +38,7 @@ def dn(lai):
     ],
 )
 def test_tick_labels_have_enough_digits(lai, low, high, texts):
-    bar = value_map(lai, "leaves", limits=(low, high)).bar
+    bar = maps.value_map(lai, "leaves", limits=(low, high)).bar
     assert [text for _, text in bar.ticks] == texts
     for place, text in bar.ticks:
         assert place == pytest.approx(100 * (float(text.replace("−", "-")) - low) / (high - low))
@@ -60,7 +48,7 @@ def test_map_colours_match_the_colour_bar(lai):
     """The lower limit maps to the first stop, values above the upper limit to the last, and no data to grey."""
     values = lai.copy(data=np.linspace(0.0, 4.0, lai.size).reshape(lai.shape))
     values[5, 5] = np.nan
-    found = value_map(values, "leaves", limits=(0.0, 2.0))
+    found = maps.value_map(values, "leaves", limits=(0.0, 2.0))
     first, last = (
         tuple(int(stop[at : at + 2], 16) for at in (1, 3, 5)) for stop in (found.bar.stops[0], found.bar.stops[-1])
     )
@@ -75,25 +63,25 @@ def test_map_colours_match_the_colour_bar(lai):
 def test_frame_marks_its_part_of_the_map(lai):
     """The ground is 600 m wide and 300 m high; the frame marks the right half of its lowest 90 m."""
     part = fifesim.grids.grid.geobox(lai[21:, 30:]).boundingbox
-    assert value_map(lai, "", frame=part).frame == pytest.approx((50.0, 70.0, 50.0, 30.0))
-    assert value_map(lai, "").scale == (pytest.approx(100 / 6), "100 m")
+    assert maps.value_map(lai, "", frame=part).frame == pytest.approx((50.0, 70.0, 50.0, 30.0))
+    assert maps.value_map(lai, "").scale == (pytest.approx(100 / 6), "100 m")
     wide = fifesim.lai_scene(fifesim.fife_site(cell=100.0, window=((0, 5), (0, 40))), "burned-grazed", seed=1)
-    assert value_map(wide, "").scale == (pytest.approx(25), "1 km")
+    assert maps.value_map(wide, "").scale == (pytest.approx(25), "1 km")
 
 
 def test_leaves_are_red_and_soil_is_not(dn):
     """The composite shows near infrared as red, so the pixel with the highest NDVI has the largest share of red."""
-    found = image_map(dn, "", stretch_of(dn)).pixels.astype(float)
+    found = maps.image_map(dn, "", maps.stretch_of(dn)).pixels.astype(float)
     ndvi = dn.fifesim.ndvi().values
     red = found[..., 0] - found[..., 1:].mean(axis=-1)
     assert np.corrcoef(red.ravel(), ndvi.ravel())[0, 1] > 0.9
-    assert false_colour_names(dn) == ["TM4", "TM3", "TM2"]
+    assert maps.false_colour_names(dn) == ["TM4", "TM3", "TM2"]
 
 
 def test_no_data_is_grey_in_an_image(dn):
     holed = dn.copy()
     holed[1, 2, 3] = 0
-    pixels = image_map(holed, "", stretch_of(dn)).pixels
+    pixels = maps.image_map(holed, "", maps.stretch_of(dn)).pixels
     assert (pixels[2, 3] == 217).all() and (pixels != 217).any()
 
 
@@ -101,7 +89,7 @@ def test_relief_is_lit_from_the_north_west(lai):
     """The side of a ridge that faces north-west is brighter than the other."""
     rows, columns = np.indices(lai.shape)
     ridge = lai.copy(data=-2.0 * np.abs(rows + columns - 44.0))
-    shown = relief_map(ridge, "").pixels.astype(float).sum(axis=-1)
+    shown = maps.relief_map(ridge, "").pixels.astype(float).sum(axis=-1)
     assert shown[10, 20] > shown[15, 43]
 
 
@@ -109,10 +97,10 @@ def test_relief_is_lit_from_the_north_west(lai):
 def test_small_images_keep_sharp_pixel_edges(size, kind):
     pixels = np.zeros((size, size, 3), np.uint8)
     pixels[: size // 2] = 200
-    picture = Image.open(io.BytesIO(encoded(pixels)))
+    picture = Image.open(io.BytesIO(maps.encoded(pixels)))
     assert picture.format == kind and picture.size == (size, size)
     np.testing.assert_allclose(np.asarray(picture.convert("RGB"), int)[[2, -2]], pixels[[2, -2]], atol=4)
-    assert Image.open(io.BytesIO(encoded(pixels, lossless=True))).format == "PNG"
+    assert Image.open(io.BytesIO(maps.encoded(pixels, lossless=True))).format == "PNG"
 
 
 GRID = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 1200.0, 900.0, 30.0)
@@ -128,7 +116,7 @@ def make_image(bands=tuple(WAVELENGTHS), dtype=float):
 
 def test_colours_are_stretched_between_percentiles():
     array = make_image()
-    found = rgb(array, stretch=(10, 80))
+    found = maps.rgb(array, stretch=(10, 80))
     assert found.dims == ("y", "x", "rgb") and found["rgb"].values.tolist() == ["red", "green", "blue"]
     for colour, name in zip(("red", "green", "blue"), ("B8", "B4", "B3"), strict=True):
         band = array.sel(band=name).values
@@ -153,36 +141,36 @@ def test_colours_are_stretched_between_percentiles():
 )
 def test_missing_bands_are_named(bands, composite, message):
     with pytest.raises(ValueError, match=message):
-        rgb(make_image(bands), composite)
+        maps.rgb(make_image(bands), composite)
 
 
 def test_other_mistakes_are_named():
     with pytest.raises(ValueError, match="stretch must be two percentiles"):
-        rgb(make_image(), stretch=(98, 2))
+        maps.rgb(make_image(), stretch=(98, 2))
     with pytest.raises(ValueError, match="along a dimension band"):
-        rgb(make_image().isel(band=0))
+        maps.rgb(make_image().isel(band=0))
     with pytest.raises(ValueError, match=r"has no wavelength .*composite=\('\w+', '\w+', '\w+'\)"):
-        rgb(make_image().drop_vars("wavelength"))
+        maps.rgb(make_image().drop_vars("wavelength"))
 
 
 def test_composite_bands_may_be_numbers_or_have_no_contrast():
-    assert composite_bands(make_image(), "natural colour") == ["B4", "B3", "B2"]
+    assert maps.composite_bands(make_image(), "natural colour") == ["B4", "B3", "B2"]
     numbered = make_image().assign_coords(band=[2, 3, 4, 8])
-    found = rgb(numbered, (8, 4, 3))
-    np.testing.assert_array_equal(found, rgb(make_image(), ("B8", "B4", "B3")))
+    found = maps.rgb(numbered, (8, 4, 3))
+    np.testing.assert_array_equal(found, maps.rgb(make_image(), ("B8", "B4", "B3")))
     assert found.attrs["long_name"] == "8, 4, 3 as red, green, blue"
     numbered[3] = 7.0
-    assert (rgb(numbered).sel(rgb="red") == 0.5).all()
+    assert (maps.rgb(numbered).sel(rgb="red") == 0.5).all()
 
 
 def test_no_data_has_no_colour():
     array = make_image(dtype=np.uint8)
     array[2, 3, 4] = 0
-    found = rgb(array)
+    found = maps.rgb(array)
     assert found[3, 4].isnull().all() and int(found.isnull().sum()) == 3
-    assert np.isnan(valid(array.isel(band=2)).values[3, 4])
+    assert np.isnan(maps.valid(array.isel(band=2)).values[3, 4])
     other = array.isel(band=0).assign_attrs(_FillValue=array.values[0, 1, 1])
-    assert np.isnan(valid(other).values[1, 1])
+    assert np.isnan(maps.valid(other).values[1, 1])
 
 
 def test_colours_of_a_lazy_image_are_lazy_and_identical():
@@ -190,25 +178,25 @@ def test_colours_of_a_lazy_image_are_lazy_and_identical():
     read = []
     lazy = in_chunks(array, CHUNKS)
     lazy = lazy.copy(data=lazy.data.map_blocks(lambda block: read.append(1) or block, meta=np.empty((0, 0, 0))))
-    found = rgb(lazy)
+    found = maps.rgb(lazy)
     assert found.chunks is not None
     # The stretch limits need one pass over the whole image, which keeps no pixel.
     limits = len(read)
     assert limits == lazy.data.npartitions
     with dask.config.set(scheduler="synchronous"):
-        xr.testing.assert_identical(found.compute(), rgb(array))
+        xr.testing.assert_identical(found.compute(), maps.rgb(array))
 
 
 def test_large_raster_is_thinned_to_the_middle_of_each_block():
     array = xr.DataArray(np.arange(12.0)[:, None] * np.ones(7), dims=("y", "x"))
-    assert thinned(array, 12) is array
-    few = thinned(array, 4)
+    assert maps.thinned(array, 12) is array
+    few = maps.thinned(array, 4)
     assert few.shape == (4, 2) and few[:, 0].values.tolist() == [1, 4, 7, 10]
-    assert thinned(array.rename(y="line", x="sample"), 4).sizes == {"line": 4, "sample": 2}
+    assert maps.thinned(array.rename(y="line", x="sample"), 4).sizes == {"line": 4, "sample": 2}
 
 
 def read_style(raster, path):
-    return ElementTree.parse(write_style(fifesim.to_geotiff(raster, path))).getroot().find("pipe/rasterrenderer")
+    return ElementTree.parse(maps.write_style(fifesim.to_geotiff(raster, path))).getroot().find("pipe/rasterrenderer")
 
 
 @pytest.fixture(scope="module")
@@ -271,6 +259,6 @@ def test_existing_style_is_kept_unless_overwritten(image, tmp_path):
     path = fifesim.to_geotiff(image, tmp_path / "image.tif")
     (tmp_path / "image.qml").write_text("mine")
     with pytest.raises(FileExistsError, match="overwrite=True"):
-        write_style(path)
+        maps.write_style(path)
     assert (tmp_path / "image.qml").read_text() == "mine"
-    assert "multibandcolor" in write_style(path, overwrite=True).read_text(encoding="utf-8")
+    assert "multibandcolor" in maps.write_style(path, overwrite=True).read_text(encoding="utf-8")

@@ -6,17 +6,8 @@ import pytest
 import xarray as xr
 import zarr
 
+from fifesim.output import products
 from fifesim.output.identity import NotThisRun
-from fifesim.output.products import (
-    chunk_checksum,
-    has_blocks,
-    make_scene_store,
-    products_of,
-    save_block,
-    saved_array,
-    saved_blocks,
-    wanted_blocks,
-)
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
@@ -28,17 +19,17 @@ def simulated_tree():
 
 
 def test_each_block_is_listed_once(simulated_tree):
-    found, lai = products_of(simulated_tree), simulated_tree["scene"]["lai"]
-    wanted = wanted_blocks(found, lai)
+    found, lai = products.products_of(simulated_tree), simulated_tree["scene"]["lai"]
+    wanted = products.wanted_blocks(found, lai)
     assert len(wanted) == len(set(wanted)) == sum(array.npartitions for array in found.arrays.values())
     assert {name for name, _ in wanted} == set(found.rasters) == {"image", "lai", "fpar", "detail"}
 
 
 def test_blocks_are_ordered_by_the_scene_chunk_below_them(simulated_tree):
     """The scene chunk below a block is located by comparing the centres of blocks and cells."""
-    found, lai = products_of(simulated_tree), simulated_tree["scene"]["lai"]
+    found, lai = products.products_of(simulated_tree), simulated_tree["scene"]["lai"]
     places = []
-    for name, index in wanted_blocks(found, lai):
+    for name, index in products.wanted_blocks(found, lai):
         raster, place = found.rasters[name], []
         for axis, cells, north_up in (("y", lai.chunks[0], -1), ("x", lai.chunks[1], 1)):
             sizes = raster.chunksizes[axis]
@@ -52,22 +43,22 @@ def test_blocks_are_ordered_by_the_scene_chunk_below_them(simulated_tree):
 
 
 def test_detail_shows_the_cells_in_the_middle_of_the_scene(simulated_tree):
-    detail, scene = products_of(simulated_tree).rasters["detail"], simulated_tree["scene"]["lai"]
+    detail, scene = products.products_of(simulated_tree).rasters["detail"], simulated_tree["scene"]["lai"]
     assert detail.shape == (144, 144)
     assert abs(float(detail["x"].mean() - scene["x"].mean())) <= 15
 
 
 def test_scene_blocks_are_written_during_the_computation(simulated_tree, tmp_path):
     path = tmp_path / "scene.zarr"
-    found = products_of(simulated_tree, path)
+    found = products.products_of(simulated_tree, path)
     assert set(found.scene) == set(simulated_tree["scene"].data_vars)
-    make_scene_store(path, found.scene)
+    products.make_scene_store(path, found.scene)
     (checksum,) = found.arrays["scene-lai"].compute().ravel()
-    assert chunk_checksum(path, "lai", (0, 0)) == checksum
+    assert products.chunk_checksum(path, "lai", (0, 0)) == checksum
     written = xr.open_zarr(path, decode_coords="all")
     assert written["lai"].values.tobytes() == simulated_tree["scene"]["lai"].values.tobytes()
     zarr.open_array(str(path), path="lai")[3, 4] = 9.0
-    assert chunk_checksum(path, "lai", (0, 0)) != checksum
+    assert products.chunk_checksum(path, "lai", (0, 0)) != checksum
 
 
 CELLS = np.random.default_rng(2).random((2, 7, 9))
@@ -80,20 +71,20 @@ def array():
 
 def save(folder, array, *indices):
     for index in indices:
-        save_block(folder, "image", index, array.blocks[index].compute())
+        products.save_block(folder, "image", index, array.blocks[index].compute())
 
 
 def test_saved_blocks_form_the_original_array(tmp_path, array):
     save(tmp_path, array, *np.ndindex(array.numblocks))
-    found = saved_array(tmp_path, "image", array)
+    found = products.saved_array(tmp_path, "image", array)
     assert found.chunks == ((2,), (4, 3), (9,)) and found.dtype == array.dtype
     np.testing.assert_array_equal(found.compute(), CELLS)
 
 
 def test_saved_blocks_are_found(tmp_path, array):
     save(tmp_path, array, (0, 0, 1), (0, 1, 0))
-    assert saved_blocks(tmp_path, "image", array) == {(0, 0, 1), (0, 1, 0)}
-    assert saved_blocks(tmp_path, "truth", array) == set()
+    assert products.saved_blocks(tmp_path, "image", array) == {(0, 0, 1), (0, 1, 0)}
+    assert products.saved_blocks(tmp_path, "truth", array) == set()
 
 
 @pytest.mark.parametrize("kept", [0, 60, -8])
@@ -101,7 +92,7 @@ def test_truncated_block_is_ignored(tmp_path, array, kept):
     save(tmp_path, array, (0, 0, 0))
     (path,) = (tmp_path / "image").iterdir()
     path.write_bytes(path.read_bytes()[:kept])
-    assert saved_blocks(tmp_path, "image", array) == set()
+    assert products.saved_blocks(tmp_path, "image", array) == set()
 
 
 def test_changed_block_is_ignored_and_not_read(tmp_path, array):
@@ -110,15 +101,15 @@ def test_changed_block_is_ignored_and_not_read(tmp_path, array):
     content = bytearray(path.read_bytes())
     content[-20] ^= 1
     path.write_bytes(content)
-    assert (0, 0, 0) not in saved_blocks(tmp_path, "image", array)
+    assert (0, 0, 0) not in products.saved_blocks(tmp_path, "image", array)
     with pytest.raises(OSError, match="has changed since it was written"):
-        saved_array(tmp_path, "image", array).compute()
+        products.saved_array(tmp_path, "image", array).compute()
 
 
 def test_block_of_another_shape_or_type_is_ignored(tmp_path, array):
     save(tmp_path, array, (0, 0, 0))
-    assert saved_blocks(tmp_path, "image", array.astype("float32")) == set()
-    assert saved_blocks(tmp_path, "image", array.rechunk((2, 4, 4))) == set()
+    assert products.saved_blocks(tmp_path, "image", array.astype("float32")) == set()
+    assert products.saved_blocks(tmp_path, "image", array.rechunk((2, 4, 4))) == set()
 
 
 def test_error_names_a_block_that_cannot_be_written(tmp_path, array):
@@ -128,7 +119,7 @@ def test_error_names_a_block_that_cannot_be_written(tmp_path, array):
 
 
 def test_partial_run_is_kept_if_it_has_blocks_and_can_be_resumed(tmp_path, array):
-    assert not has_blocks(tmp_path, OSError())
+    assert not products.has_blocks(tmp_path, OSError())
     save(tmp_path / "blocks", array, (0, 0, 0))
-    assert has_blocks(tmp_path, OSError()) and has_blocks(tmp_path, KeyboardInterrupt())
-    assert has_blocks(tmp_path, NotThisRun()) and not has_blocks(tmp_path, ValueError())
+    assert products.has_blocks(tmp_path, OSError()) and products.has_blocks(tmp_path, KeyboardInterrupt())
+    assert products.has_blocks(tmp_path, NotThisRun()) and not products.has_blocks(tmp_path, ValueError())

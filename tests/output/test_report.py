@@ -12,20 +12,6 @@ from matplotlib.figure import Figure
 import fifesim
 from fifesim.analysis.regression_labels import regress
 from fifesim.output import report
-from fifesim.output.report import (
-    cautions,
-    engine_rows,
-    finding,
-    fit_figure,
-    fixed,
-    headline,
-    histogram_figures,
-    inputs_in_words,
-    main_results,
-    pairing,
-    pairing_rows,
-    title,
-)
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
@@ -35,13 +21,13 @@ def test_title_names_files_without_their_folders():
     ground = scenario.ground.model_copy(update={"lai_file": "/somewhere/leaves.tif"})
     sensor = scenario.sensor.model_copy(update={"instrument": "/elsewhere/camera.toml"})
     scenario = scenario.model_copy(update={"ground": ground, "sensor": sensor})
-    assert title(scenario) == "leaves.tif, seen by camera.toml"
+    assert report.title(scenario) == "leaves.tif, seen by camera.toml"
     oli = parse_scenario({"ground": {"arp": 0.15}, "sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]}})
-    assert title(oli).endswith("arp 0.15, seen by OLI (synthetic landscape, hypothetical overpass)")
+    assert report.title(oli).endswith("arp 0.15, seen by OLI (synthetic landscape, hypothetical overpass)")
 
 
 def engine_row(sza, **atmosphere):
-    rows = engine_rows(parse_scenario({"geometry": {"sza": sza, "saa": 120.0}, "atmosphere": atmosphere}))
+    rows = report.engine_rows(parse_scenario({"geometry": {"sza": sza, "saa": 120.0}, "atmosphere": atmosphere}))
     assert len(rows) == 1
     return rows[0][1]
 
@@ -53,7 +39,7 @@ def test_report_lists_bands_where_5s_errs_by_more_than_two_percent():
     clear = engine_row(25.0, aerosol="none", visibility=None)
     assert clear.endswith("within 2 %")
     other = parse_scenario({"atmosphere": {"engine": "successive-orders"}})
-    assert engine_rows(other) == []
+    assert report.engine_rows(other) == []
 
 
 GROUND = {"grid": {"width": 600, "height": 300}, "terrain": {"dem": "flat"}}
@@ -69,7 +55,7 @@ def simulated_run(request):
 def test_pairing_reports_the_offset_between_pixels_and_blocks(simulated_run):
     """Nineteen intervals of 30.315 m between the first and last pixel centre extend 6 m beyond as many 30 m blocks."""
     scenario, image, truth = simulated_run
-    text = pairing(scenario, image, truth)
+    text = report.pairing(scenario, image, truth)
     assert "9 x 9 cells of 3.33 m, a square of 30 m" in text
     native = scenario.sensor.interval == "native"
     assert ("have the same centres" in text) is not native
@@ -83,22 +69,22 @@ def test_main_results_match_the_regression(simulated_run):
     """Residuals are recomputed with numpy, paired by row and column like the regression."""
     _, image, truth = simulated_run
     fit = regress(truth["lai"], image["ndvi"], pair="index")
-    (value, name, text), (span, *_) = main_results(truth, image, truth, {"lai": fit})
+    (value, name, text), (span, *_) = report.main_results(truth, image, truth, {"lai": fit})
     share = fit.residual_deviation / float(truth["lai"].mean())
     assert (value, name) == (f"± {fit.residual_deviation:.3f}", "LAI")
     assert f", {100 * share:.0f} % of the mean; R² = {fit.r2:.3f}" in text
     rows, columns = (min(image.sizes[axis], truth.sizes[axis]) for axis in ("y", "x"))
     ndvi, true = (each.values[:rows, :columns] for each in (image["ndvi"], truth["lai"]))
     low, high = np.nanpercentile(fit.intercept + fit.slope * ndvi - true, [5, 95])
-    assert span == f"{fixed(low, 2, True)} to {fixed(high, 2, True)}"
-    assert main_results(truth, image, truth, {}) == []
+    assert span == f"{report.fixed(low, 2, True)} to {report.fixed(high, 2, True)}"
+    assert report.main_results(truth, image, truth, {}) == []
 
 
 def test_finding_without_a_regression_gives_the_reason():
-    assert finding({}, {"lai": "NDVI does not vary", "fpar": "NDVI does not vary"}) == (
+    assert report.finding({}, {"lai": "NDVI does not vary", "fpar": "NDVI does not vary"}) == (
         "No line was fitted: NDVI does not vary"
     )
-    assert "no NDVI" in finding({}, {})
+    assert "no NDVI" in report.finding({}, {})
 
 
 def test_headline_names_instrument_place_and_time():
@@ -110,7 +96,7 @@ def test_headline_names_instrument_place_and_time():
         "terrain": {"dem": "flat"},
         "sensor": {"instrument": "OLI"},
     }
-    text = headline(parse_scenario(case).complete())
+    text = report.headline(parse_scenario(case).complete())
     assert re.fullmatch(
         r"Simulated .*Operational Land Imager.* image, 25\.\d\d° S, 2[78]\.\d\d° E, 1 June 2022 10:05 UTC \(.*\)", text
     )
@@ -118,10 +104,12 @@ def test_headline_names_instrument_place_and_time():
 
 def test_cautions_name_the_omitted_effects(simulated_run):
     scenario, image, _ = simulated_run
-    said = " ".join(cautions(scenario))
+    said = " ".join(report.cautions(scenario))
     assert ("perfectly registered" in said) is not any(scenario.sensor.offset)
     assert "No detector noise" in said
-    assert "visibility 45 km" in inputs_in_words(scenario, image) and "nadir view" in inputs_in_words(scenario, image)
+    assert "visibility 45 km" in report.inputs_in_words(scenario, image) and "nadir view" in report.inputs_in_words(
+        scenario, image
+    )
 
 
 GRID = {"width": 1110, "height": 1110}
@@ -136,7 +124,7 @@ class Fit:
 def compare_with_paper(fits=None, **sections):
     values = {"grid": GRID, "ground": {"distribution": "burned-grazed", "arp": 0.15}}
     values |= {"sensor": {"response": "paper"}} | sections
-    return pairing_rows(parse_scenario(values).complete(), {"lai": Fit} if fits is None else fits)
+    return report.pairing_rows(parse_scenario(values).complete(), {"lai": Fit} if fits is None else fits)
 
 
 def test_report_explains_the_difference_from_the_published_r2():
@@ -181,7 +169,7 @@ def level_run():
 def test_figure_title_gives_the_regression_of_its_line(level_run):
     image, truth, _ = level_run
     fit = regress(truth["lai"], image["ndvi"], pair="index")
-    axis = fit_figure(image, truth, "lai", fit).axes[0]
+    axis = report.fit_figure(image, truth, "lai", fit).axes[0]
     assert f"n = {fit.n}" in axis.get_title()
     (line,) = axis.lines
     np.testing.assert_allclose(line.get_ydata(), fit.intercept + fit.slope * line.get_xdata())
@@ -189,7 +177,7 @@ def test_figure_title_gives_the_regression_of_its_line(level_run):
 
 def test_density_counts_every_pixel_at_its_values(level_run):
     image, truth, _ = level_run
-    axis = fit_figure(image, truth, "lai", regress(truth["lai"], image["ndvi"], pair="index")).axes[0]
+    axis = report.fit_figure(image, truth, "lai", regress(truth["lai"], image["ndvi"], pair="index")).axes[0]
     (density,) = axis.images
     counts = 10.0 ** density.get_array()
     ndvi = image["ndvi"].values[np.isfinite(image["ndvi"].values)]
@@ -202,7 +190,7 @@ def test_density_counts_every_pixel_at_its_values(level_run):
 
 def test_frequencies_of_each_band_sum_to_one(level_run):
     image, truth, detail = level_run
-    axis = histogram_figures(image, truth, detail)[2].axes[0]
+    axis = report.histogram_figures(image, truth, detail)[2].axes[0]
     shares = {line.get_label(): line.get_ydata().sum() for line in axis.lines}
     assert shares == pytest.approx(dict.fromkeys(map(str, image["band"].values), 1.0))
     assert [text.get_text() for text in axis.get_legend().get_texts()] == list(shares)

@@ -26,15 +26,6 @@ from fifesim.grids.reductions import resample
 from fifesim.grids.windows import array_from_windows, tiles
 from fifesim.output import report, workers
 from fifesim.output.run_folder import simulate_to_folder
-from fifesim.output.workers import (
-    check_memory_of_cells,
-    check_size,
-    cluster,
-    disk_space,
-    run_on_client,
-    run_on_threads,
-    tasks_of,
-)
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
@@ -118,7 +109,7 @@ for address, security in ((tls, Security()), (tls.replace("tls", "tcp"), Securit
 
 def test_workers_reject_clients_without_their_certificate():
     before = listening_addresses()
-    with cluster(workers=1) as guarded:
+    with workers.cluster(workers=1) as guarded:
         assert guarded.submit(abs, -2).result() == 2
         address, places = guarded.scheduler.address, listening_addresses() - before
         assert address.startswith("tls://127.0.0.1:") and len(places) >= 3
@@ -159,9 +150,9 @@ class Stub:
 def test_task_that_kills_workers_is_reported_and_other_tasks_cancelled(monkeypatch):
     error = KilledWorker("task", SimpleNamespace(address="tcp://here"), 3)
     stub, found = Stub(monkeypatch, error), []
-    tasks, outputs = tasks_of({"ones": da.ones(3, chunks=1)}, [("ones", (n,)) for n in range(3)])
+    tasks, outputs = workers.tasks_of({"ones": da.ones(3, chunks=1)}, [("ones", (n,)) for n in range(3)])
     with pytest.raises(RuntimeError, match="a worker may lack memory"):
-        run_on_client(tasks, outputs, lambda *output: found.append(output), stub)
+        workers.run_on_client(tasks, outputs, lambda *output: found.append(output), stub)
     assert found == [("ones", (0,), "first")] and stub.released == stub.futures[:1]
     assert stub.cancelled == stub.futures[1:]
 
@@ -179,37 +170,37 @@ def complete_flat_scenario(**sections):
 def test_scene_too_large_for_memory_is_rejected_with_a_size_that_fits(tmp_path, sections):
     """A scene with 0.9 of the edge in the message is accepted; one with 1.2 of the edge is not."""
     with pytest.raises(ValueError, match=r"memory.*grid\.width = grid\.height") as caught:
-        check_size(complete_flat_scenario(**sections), tmp_path / "a" / "b")
+        workers.check_size(complete_flat_scenario(**sections), tmp_path / "a" / "b")
     edge = float(re.search(r"grid\.height = (\S+) fits", str(caught.value))[1])
 
     def square(edge):
         return complete_flat_scenario(**sections | {"grid": sections["grid"] | {"width": edge, "height": edge}})
 
-    check_size(square(0.9 * edge), tmp_path)
+    workers.check_size(square(0.9 * edge), tmp_path)
     with pytest.raises(ValueError, match="fits"):
-        check_size(square(1.2 * edge), tmp_path)
+        workers.check_size(square(1.2 * edge), tmp_path)
 
 
 def test_disk_that_is_too_small_is_named(tmp_path, monkeypatch):
     """On a full disk no scene fits, so the message suggests another folder."""
     scenario = complete_flat_scenario()
-    least, most = disk_space(scenario)
+    least, most = workers.disk_space(scenario)
     assert least == pytest.approx(500**2 * (2 + 16), rel=0.01) and most == 3.4 * least
     free = {"now": 10**9}
     monkeypatch.setattr(workers.shutil, "disk_usage", lambda path: namedtuple("Usage", "free")(free["now"]))
-    check_size(scenario, tmp_path)
+    workers.check_size(scenario, tmp_path)
     for free["now"], said in (
         (10**6, r"space.*fits"),
         (0, f"No space left on device in {tmp_path}: name another output folder with -o"),
     ):
         with pytest.raises(OSError, match=said):
-            check_size(scenario, tmp_path)
+            workers.check_size(scenario, tmp_path)
 
 
 def test_memory_check_uses_the_number_of_cells_per_edge():
-    check_memory_of_cells(333)
+    workers.check_memory_of_cells(333)
     with pytest.raises(ValueError, match=r"cells = 1000000: .* cells = \S+ fits"):
-        check_memory_of_cells(1_000_000)
+        workers.check_memory_of_cells(1_000_000)
 
 
 def position_values(row, column, shape):
@@ -240,8 +231,8 @@ def test_blocks_equal_dask_and_arrive_in_the_given_order(threads):
     """Blocks are delivered in the order of the list of outputs."""
     array, found = resampled_means(96, 17), {}
     backwards = block_keys(array)[::-1]
-    tasks = tasks_of({"means": array}, backwards)
-    run_on_threads(*tasks, lambda name, index, block: found.update({(name, index): block}), threads)
+    tasks = workers.tasks_of({"means": array}, backwards)
+    workers.run_on_threads(*tasks, lambda name, index, block: found.update({(name, index): block}), threads)
     assert list(found) == backwards
     for (_, index), block in found.items():
         np.testing.assert_array_equal(block, array.blocks[index].compute(scheduler="sync"))
@@ -260,8 +251,8 @@ def test_blocks_needed_by_later_pieces_are_computed_once(monkeypatch, piece):
     cells = tiles(source, grid, 10, tile=10)
     around = neighbourhood(lambda block: block[1:-1, 1:-1] + block[:-2, 2:], cells * 2, 1)
     arrays = {"cells": cells.data, "around": around.data}
-    run_on_threads(
-        *tasks_of(arrays, [(name, index) for index in np.ndindex(6, 4) for name in arrays]),
+    workers.run_on_threads(
+        *workers.tasks_of(arrays, [(name, index) for index in np.ndindex(6, 4) for name in arrays]),
         lambda name, index, block: found.update({(name, *index): block}),
         2,
     )
@@ -296,5 +287,5 @@ def test_only_the_margins_of_chunks_are_kept_for_later_blocks(monkeypatch, piece
     watched, sizes = Watch(), ((10,) * 4, (10,) * 20)
     cells = da.ones((40, 200), chunks=10).map_blocks(watched, dtype=float, meta=np.empty((0, 0)))
     blocks = array_from_windows(lambda window: window[1:, 1:] + window[:-1, :-1], [cells], sizes, ask, token="before")
-    run_on_threads(*tasks_of({"blocks": blocks}, block_keys(blocks, "blocks")), lambda *block: None, 1)
+    workers.run_on_threads(*workers.tasks_of({"blocks": blocks}, block_keys(blocks, "blocks")), lambda *block: None, 1)
     assert watched.most <= 3
