@@ -1,5 +1,7 @@
 """Windows of a lattice of tiles, and its random seeds and streams."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -81,12 +83,7 @@ def test_integer_types_give_the_same_seed(draw):
 
 def test_places_streams_and_seeds_give_independent_numbers():
     """Neighbouring integers above 2**63 are equal in double precision; place indices are 64-bit words."""
-    keys = [
-        (seed, stream, (0, 0, place_code, 0))
-        for seed in (0, 2**63 - 1)
-        for stream in (1, 2**63)
-        for place_code in (0, -1)
-    ]
+    keys = [(seed, stream, (0, 0, place, 0)) for seed, stream, place in product((0, 2**63 - 1), (1, 2**63), (0, -1))]
     keys += [(2**63 - 2, 1, (0, 0, 0, 0)), (0, 2**63 + 1, (0, 0, 0, 0)), (0, 1, (0, 0, -2, 0)), (0, 1, (0, 0, 0, -1))]
     drawn = [generator(*key).standard_normal(40_000) for key in keys]
     np.testing.assert_allclose(np.corrcoef(drawn), np.eye(len(keys)), rtol=0, atol=4.5 / 200)

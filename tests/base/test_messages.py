@@ -41,16 +41,9 @@ def test_class_keeps_its_signature_and_names_misspelt_arguments():
 
 def test_misspelt_names_give_a_suggestion(lai):
     typed = [
-        (lambda: fifesim.sens, AttributeError, "no attribute 'sens': did you mean 'sense'"),
         (lambda: lai.fifesim.sens, AttributeError, "no method 'sens' of an xarray.DataArray: did you mean 'sense'"),
         (lambda: lai.fifesim.fife_site, AttributeError, "fife_site is no method of a raster.* fifesim.fife_site is"),
-        (lambda: lai.fifesim.fpar(canpoy=fifesim.Canopy()), TypeError, "fpar has no .* did you mean 'canopy'"),
-        (lambda: fifesim.Canopy(leaf_angels="spherical"), TypeError, "Canopy has no .* did you mean 'leaf_angles'"),
-        (
-            lambda: lai.fifesim.fpar(leaf_angles="spherical"),
-            TypeError,
-            r"type canopy=fifesim.Canopy\(leaf_angles=...\)",
-        ),
+        (lambda: lai.fifesim.fpar(leaf_angles="spherical"), TypeError, r"type canopy=.*\.Canopy\(leaf_angles=...\)"),
         (lambda: fifesim.Atmosphere(visibilty=23), TypeError, "Atmosphere has no .* did you mean 'visibility'"),
     ]
     for call, kind, said in typed:

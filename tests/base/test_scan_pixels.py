@@ -47,14 +47,11 @@ def test_reach_is_the_distance_to_the_farthest_corner():
     rows, columns = corners(row, column)
     found = reach(row, column, (rows, columns), CELL)
     for line, sample in ((0, 0), (3, 4), (6, 8)):
-        away = [
-            np.hypot(
-                (rows[line, i, j] - row[line, sample]) * CELL[0], (columns[line, i, j] - column[line, sample]) * CELL[1]
-            )
-            for i in (0, 1)
-            for j in (sample, sample + 1)
-        ]
-        assert found[line, sample] == pytest.approx(max(away), rel=1e-14)
+        down, across = (
+            (edges[line, :, sample : sample + 2] - centre[line, sample]) * size
+            for edges, centre, size in ((rows, row, CELL[0]), (columns, column, CELL[1]))
+        )
+        assert found[line, sample] == pytest.approx(np.hypot(down, across).max(), rel=1e-14)
 
 
 def test_nearest_pixel_matches_brute_force():
@@ -69,15 +66,11 @@ def test_nearest_pixel_matches_brute_force():
     assert (found == -1).any() and (found >= 0).sum() > 50
 
 
-def test_first_of_two_equidistant_pixels_is_taken():
-    row, column = np.array([0.5, 0.5]), np.array([0.0, 1.0])
-    assert nearest_pixels(row, column, np.array([30.0, 30.0]), (20.0, 20.0), (0, 1), (0, 1)) == 0
-
-
-def test_pixels_without_coordinates_are_ignored():
+def test_first_of_two_equidistant_pixels_is_taken_and_pixels_without_coordinates_are_ignored():
+    row, column, far = np.array([0.5, 0.5]), np.array([0.0, 1.0]), np.array([30.0, 30.0])
+    assert nearest_pixels(row, column, far, (20.0, 20.0), (0, 1), (0, 1)) == 0
     row, column = np.array([np.nan, 0.5]), np.array([0.5, np.nan])
-    found = nearest_pixels(row, column, np.array([30.0, 30.0]), CELL, (0, 2), (0, 2))
-    assert (found == -1).all()
+    assert (nearest_pixels(row, column, far, CELL, (0, 2), (0, 2)) == -1).all()
 
 
 def test_means_are_weighted_by_polygon_overlap():
