@@ -74,26 +74,20 @@ def test_blocks_along_bands_are_not_copied():
     assert all(any(np.shares_memory(block, each) for each in made) for block in seen)
 
 
-def test_rasters_on_different_grids_are_rejected():
-    other = raster(fifesim.fife_site(30 / 9, window=((0, 36), (6, 51))), seed=1)
-    with pytest.raises(ValueError, match="'raster0' and 'raster1' have different grids"):
-        chunks.pointwise(np.add, raster(), other)
-
-
-def test_rasters_whose_coordinates_differ_by_rounding_are_combined():
-    """xarray's own sum of these rasters is empty, without a warning."""
-    one, two = raster(), raster(seed=1)
+def test_only_rasters_on_the_same_cells_under_the_same_sun_are_combined():
+    """xarray's own sum of rasters whose coordinates differ by rounding is empty, without a warning."""
+    one, two, three = (raster(seed=seed).assign_coords(sza=float(sza)) for seed, sza in enumerate((20, 20, 30)))
     shifted = two.assign_coords(x=two["x"].values + 1e-7)
     np.testing.assert_array_equal(chunks.pointwise(np.add, one, shifted), one.values + two.values)
-
-
-def test_rasters_with_different_sun_angles_are_rejected():
-    suns = [raster(seed=seed).assign_coords(sza=float(sza)) for seed, sza in enumerate((20, 20, 30))]
-    chunks.pointwise(np.add, *suns[:2])
-    with pytest.raises(ValueError, match="sza is 20 in 'raster0' and 30 in 'raster2'"):
-        chunks.pointwise(np.add, suns[0], suns[2])
-    with pytest.raises(ValueError, match="sza is 20 in 'raster1' and 30 in 'raster2'"):
-        chunks.pointwise(lambda a, b, c: a, suns[0].drop_vars("sza"), *suns[1:])
+    other = raster(fifesim.fife_site(30 / 9, window=((0, 36), (6, 51))), seed=1)
+    refused = {
+        "'raster0' and 'raster1' have different grids": (one, other),
+        "sza is 20 in 'raster0' and 30 in 'raster2'": (one, three),
+        "sza is 20 in 'raster1' and 30 in 'raster2'": (one.drop_vars("sza"), two, three),
+    }
+    for message, arrays in refused.items():
+        with pytest.raises(ValueError, match=message):
+            chunks.pointwise(lambda *cells: cells[0], *arrays)
 
 
 @pytest.mark.parametrize("lazy", [True, False])
@@ -110,31 +104,27 @@ def test_entries_along_the_first_axis_are_views(lazy):
         assert np.shares_memory(found[1], whole)
 
 
-def test_second_pass_starts_after_the_first_has_finished():
-    """The mean needs all chunks; without a barrier, every chunk would stay in memory until the mean is known."""
-    order = []
-
-    def made(block_info=None):
-        order.append(block_info[None]["chunk-location"])
-        return np.ones((10, 10))
-
-    source = xr.DataArray(da.map_blocks(made, chunks=((10, 10), (10,)), dtype=float), dims=("y", "x"))
-    mean = source.data.mean()
-    again = chunks.second_pass(source, mean)
-    with dask.config.set(scheduler="sync"):
-        np.testing.assert_array_equal((again - mean).compute(), np.zeros((20, 10)))
-    assert sorted(order[:2]) == sorted(order[2:]) == [(0, 0), (1, 0)]
+POSITIONS = np.add.outer(1000.0 * np.arange(60), np.arange(80))
 
 
 def counting_array(calls):
-    """A lazy array that records each block when it is computed."""
+    """A lazy array of positions that records each block when it is computed."""
 
-    def make(zeros, block_info):
-        calls.append(tuple(block_info[None]["chunk-location"]))
-        (top, bottom), (left, right) = block_info[None]["array-location"]
-        return zeros + np.add.outer(1000.0 * np.arange(top, bottom), np.arange(left, right))
+    def count(block, block_info):
+        calls.append(block_info[0]["chunk-location"])
+        return block
 
-    return da.zeros((60, 80), chunks=(20, 30)).map_blocks(make, dtype=float, meta=np.empty((0, 0)))
+    return da.from_array(POSITIONS, chunks=(20, 30)).map_blocks(count, dtype=float, meta=np.empty((0, 0)))
+
+
+def test_second_pass_starts_after_the_first_has_finished():
+    """The mean needs all chunks; without a barrier, every chunk would stay in memory until the mean is known."""
+    calls = []
+    source = xr.DataArray(counting_array(calls), dims=("y", "x"))
+    mean = source.data.mean()
+    found = (chunks.second_pass(source, mean) - mean).compute(scheduler="sync")
+    np.testing.assert_allclose(found, POSITIONS - POSITIONS.mean(), rtol=1e-12)
+    assert len(calls) == 18 and sorted(calls[:9]) == sorted(calls[9:])
 
 
 def rechunked_array():
@@ -163,7 +153,7 @@ def test_separate_copy_has_the_values_of_the_array(scheduler, dtype, request):
     np.testing.assert_array_equal(found.compute(scheduler=scheduler, **workers), array.compute())
 
 
-def test_separate_copy_is_computed_in_one_thread():
+def test_separate_copy_is_computed_in_one_thread_or_on_a_client():
     """The task waits for no other task, so it also finishes in a pool of one thread or a cluster of one worker."""
     threads = set()
 
@@ -176,8 +166,11 @@ def test_separate_copy_is_computed_in_one_thread():
         assert apart(blocks).sum().compute() == 4800
     assert len(threads) == 1
     options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    assert found_client() is None
     with LocalCluster(**options) as cluster, Client(cluster) as client:
+        assert found_client() is client
         assert client.compute(apart(blocks).sum()).result(timeout=20) == 4800
+    assert found_client() is None
 
 
 def test_blocks_are_computed_once_for_the_sample_and_once_for_its_use():
@@ -187,8 +180,7 @@ def test_blocks_are_computed_once_for_the_sample_and_once_for_its_use():
     total = apart(array[::4, ::4]).sum()
     found = (array - total).sum(axis=1).compute(scheduler="synchronous")
     assert sorted(calls) == sorted(2 * [(row, column) for row in range(3) for column in range(3)])
-    whole = np.add.outer(1000.0 * np.arange(60), np.arange(80))
-    np.testing.assert_allclose(found, (whole - whole[::4, ::4].sum()).sum(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(found, (POSITIONS - POSITIONS[::4, ::4].sum()).sum(axis=1), rtol=1e-12)
 
 
 def test_equal_arrays_have_equal_keys_and_shared_parts_are_computed_once():
@@ -202,8 +194,8 @@ def test_equal_arrays_have_equal_keys_and_shared_parts_are_computed_once():
     assert len(calls) == 9
     found = dask.compute(*all_apart([array[::4, ::4], array.sum(axis=0)]), scheduler="synchronous")
     assert len(calls) == 18
-    np.testing.assert_array_equal(found[0], array.compute()[::4, ::4])
-    np.testing.assert_array_equal(found[1], array.compute().sum(axis=0))
+    np.testing.assert_array_equal(found[0], POSITIONS[::4, ::4])
+    np.testing.assert_array_equal(found[1], POSITIONS.sum(axis=0))
 
 
 def test_nested_samples_are_computed_once_with_several_threads():
@@ -240,10 +232,3 @@ def test_layers_are_selected_by_name_or_shared(lai):
         layers_of(0.5, ["a"], "soil")
     with pytest.raises(ValueError, match=r"a must be a number, or one raster .* got dimensions \('band', 'y', 'x'\)"):
         by_band({"a": both}, lai)
-
-
-def test_client_is_found_while_it_exists():
-    assert found_client() is None
-    with LocalCluster(n_workers=1, processes=False, dashboard_address=None) as cluster, Client(cluster) as client:
-        assert found_client() is client
-    assert found_client() is None

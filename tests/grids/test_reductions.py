@@ -63,10 +63,15 @@ CELLS = fifesim.grid_at("EPSG:26914", 705600.0, 4334000.0, 120.0, 90.0, 3.0)
 PIXELS = fifesim.grid_at("EPSG:26914", 705604.0, 4333991.5, 96.0, 75.0, (25.0, 16.0))
 
 
+def raster(grid, *bands):
+    values = np.random.default_rng(4).random((*bands, *grid.shape))
+    raster = xr.DataArray(values, dims=("band", "y", "x")[-values.ndim :], name="cells", attrs={"units": "1"})
+    return grids.place(raster, grid)
+
+
 @pytest.fixture
 def cells():
-    values = np.random.default_rng(4).random(tuple(CELLS.shape))
-    return grids.place(xr.DataArray(values, dims=("y", "x"), name="cells", attrs={"units": "1"}), CELLS)
+    return raster(CELLS)
 
 
 def overlaps(cell_edges, pixel_edges):
@@ -101,35 +106,24 @@ def test_shifts_go_southward_and_eastward(cells):
     np.testing.assert_array_equal(drift[0], regularized(cells, areas(PIXELS), PIXELS, min_valid=0.0)[0])
 
 
-def test_spreads_are_given_as_down_and_across():
-    rows, columns = operators((Boxcar(9.0), Boxcar(30.0)), CELLS, PIXELS)
-    assert len(rows) == 3 and len(columns) == 6
-    assert rows.count.max() == 4 and columns.count.max() == 11
-
-
-def raster(seed=0, bands=None):
-    shape = tuple(SITE.shape) if bands is None else (bands, *SITE.shape)
-    values = np.random.default_rng(seed).random(shape)
-    return grids.place(xr.DataArray(values, dims=("band", "y", "x")[-len(shape) :], name=f"raster{seed}"), SITE)
-
-
 SITE = fifesim.fife_site(30 / 9, window=((0, 36), (5, 50)))
 ANYWHERE = [
     grids.aligned_grid(SITE, 30.0),
     fifesim.grid_at("EPSG:26914", 704950.0, 4334300.0, 400.0, 400.0, 23.0),
     fifesim.grid_at("EPSG:26914", 705001.0, 4334200.0, 60.0, 60.0, 1.7),
+    GeoBox((3, 4), SITE.affine * SITE.affine.translation(900, 900), SITE.crs),
 ]
 
 
-@pytest.mark.parametrize("pixels", ANYWHERE, ids=["aligned", "beyond-the-scene", "finer-than-cells"])
-@pytest.mark.parametrize("bands", [None, 2])
+@pytest.mark.parametrize("pixels", ANYWHERE, ids=["aligned", "around", "finer", "elsewhere"])
+@pytest.mark.parametrize("bands", [[], [2]], ids=str)
 def test_resampling_gives_the_same_bits_in_any_chunks(pixels, bands):
-    scene = raster(bands=bands).assign_coords(sza=28.5)
+    scene = raster(SITE, *bands).assign_coords(sza=28.5)
     scene[..., 10:12, 20:22] = np.nan
     rows, columns = operators((Boxcar(30.0), Boxcar(30.0)), SITE, pixels)
     whole = resample(rows, columns, scene, pixels)
     np.testing.assert_array_equal(whole, regularize(scene.values, rows, columns))
-    assert grids.same_grid(grids.geobox(whole), pixels)
+    assert grids.same_grid(grids.geobox(whole), pixels) and np.isnan(whole).all() == (pixels is ANYWHERE[-1])
     assert float(whole["sza"]) == 28.5
     for pieces in (ODD_CHUNKS, ODD_CHUNKS | {"band": 1}, {"y": 1, "x": 45}, {"y": 36, "x": 9}):
         with no_compute():
@@ -144,7 +138,7 @@ def test_resampling_gives_the_same_bits_in_any_chunks(pixels, bands):
 
 def test_output_chunks_read_only_the_required_cells():
     """A chunk that fails affects only the pixels over it."""
-    scene = in_chunks(raster(), {"y": 9, "x": 9})
+    scene = in_chunks(raster(SITE), {"y": 9, "x": 9})
     rows, columns = operators((Boxcar(30.0), Boxcar(30.0)), SITE, ANYWHERE[0])
 
     def spoil(block, block_info=None):
@@ -157,13 +151,6 @@ def test_output_chunks_read_only_the_required_cells():
     assert np.isfinite(image[2:, 2:].compute()).all()
     with pytest.raises(RuntimeError, match="read"):
         image[0, 0].compute()
-
-
-def test_grid_without_pixels_in_the_scene_is_all_missing():
-    far = GeoBox((3, 4), SITE.affine * SITE.affine.translation(900, 900), SITE.crs)
-    rows, columns = operators((Boxcar(30.0), Boxcar(30.0)), SITE, far)
-    for scene in (raster(), in_chunks(raster(), ODD_CHUNKS)):
-        assert np.isnan(resample(rows, columns, scene, far)).all()
 
 
 WEIGHTS = np.array([[0.5, 0.25, 0.0, 0.0, 0.25], [0.0, 0.0, 2.0, -1.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0]])
@@ -181,6 +168,11 @@ def test_combination_equals_the_matrix_product(cube):
     np.testing.assert_allclose(found, np.einsum("bn,nyx->byx", WEIGHTS, cube), rtol=1e-15)
     assert found.dims == ("band", "y", "x") and found.name == "rho"
     assert set(found.coords) == {"sza", "y"}
+    # Bands come before rows; the order of other dimensions is kept.
+    xr.testing.assert_identical(combined(cube.transpose("y", "x", "band"), "band", WEIGHTS), found)
+    assert combined(cube.isel(y=0).transpose("x", "band"), "band", WEIGHTS).dims == ("x", "band")
+    seasons = cube.expand_dims(time=2).rename(band="wavelength_number")
+    assert combined(seasons, "wavelength_number", WEIGHTS).dims == ("time", "band", "y", "x")
 
 
 @pytest.mark.parametrize("in_turn", [0, reductions._IN_TURN])
@@ -226,21 +218,13 @@ def test_chunks_without_weight_are_not_read(cube):
     cube[2, 1, 1] = np.nan
     found = combined(cube, "band", WEIGHTS)
     assert np.argwhere(np.isnan(found.values)).tolist() == [[1, 1, 1]]
+
+    def fail_on_third_band(block):
+        assert block.size == 0 or float(block["wavelength"][0]) != 2.0
+        return block
+
     whole = cube.chunk(band=1).map_blocks(fail_on_third_band, template=cube.chunk(band=1))
     assert combined(whole, "band", WEIGHTS[:1]).compute().notnull().all()
-
-
-def fail_on_third_band(block):
-    assert block.size == 0 or float(block["wavelength"][0]) != 2.0
-    return block
-
-
-def test_order_of_dimensions_is_kept_but_bands_come_before_rows(cube):
-    assert combined(cube.transpose("y", "x", "band"), "band", WEIGHTS).dims == ("band", "y", "x")
-    spectra = cube.isel(y=0).transpose("x", "band")
-    assert combined(spectra, "band", WEIGHTS).dims == ("x", "band")
-    seasons = cube.expand_dims(time=2).rename(band="wavelength_number")
-    assert combined(seasons, "wavelength_number", WEIGHTS).dims == ("time", "band", "y", "x")
 
 
 def test_single_precision_is_kept_and_summed_in_double(cube):
