@@ -47,11 +47,11 @@ def check_refused_everywhere(path, reason, error=ValueError):
         assert len(str(said.value)) <= 500 and str(said.value).isprintable()
 
 
-def write_mosaic(path, source, relative=0, inside="", band=""):
+def write_mosaic(path, source, relative=0):
     path.write_text(
-        f'<VRTDataset rasterXSize="60" rasterYSize="60"><SRS>EPSG:26914</SRS>{inside}'
+        f'<VRTDataset rasterXSize="60" rasterYSize="60"><SRS>EPSG:26914</SRS>'
         "<GeoTransform>707900,10,0,4332100,0,-10</GeoTransform>"
-        f'<VRTRasterBand dataType="Float32" band="1" {band}><SimpleSource><SourceFilename relativeToVRT="{relative}">'
+        f'<VRTRasterBand dataType="Float32" band="1"><SimpleSource><SourceFilename relativeToVRT="{relative}">'
         f"{source}</SourceFilename><SourceBand>1</SourceBand></SimpleSource></VRTRasterBand></VRTDataset>"
     )
     return str(path)
@@ -117,13 +117,9 @@ def test_no_request_is_sent_unless_allowed(tmp_path, server):
         with pytest.raises(ValueError, match="404"):
             door(address.replace("x.tif", f"{number}.tif"), allow_remote=True)
         assert len(asked) > number
-
-
-def test_context_manager_allows_requests(server):
-    address, asked = server
     with opening.remote_allowed(), pytest.raises(ValueError, match="404"):
         opening.raster_file(address.replace("x.tif", "context.tif"))
-    assert asked
+    assert len(asked) > len(DOORS)
     with pytest.raises(ValueError, match="--allow-remote"):
         opening.raster_file(address)
 
