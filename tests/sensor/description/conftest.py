@@ -8,10 +8,10 @@ from fifesim.sensor.description.instruments import read_instrument
 
 @pytest.fixture
 def changed(tmp_path):
-    """Function that reads the TM file after text replacements, given as old, new, old, new, ..."""
+    """Function that reads the TM file, or another text, after replacements, given as old, new, old, new, ..."""
 
-    def read(*replacements):
-        text = paper_text()
+    def read(*replacements, text=None):
+        text = paper_text() if text is None else text
         for old, new in zip(replacements[::2], replacements[1::2], strict=True):
             assert old in text
             text = text.replace(old, new, 1)
