@@ -53,12 +53,12 @@ def test_method_keeps_documentation_and_signature(lai):
     assert list(inspect.signature(lai.fifesim.sense).parameters) == parameters[1:]
 
 
-def test_functions_are_class_attributes():
+def test_accessors_of_classes_datasets_and_trees_have_their_functions(lai):
     assert accessor.DataArrayAccessor.fpar is fifesim.fpar
-
-
-def test_dataset_accessor_has_to_geotiff(lai):
     assert lai.to_dataset(name="lai").fifesim.to_geotiff.__func__ is fifesim.to_geotiff
+    tree = xr.DataTree.from_dict({"/TM": lai.to_dataset(name="lai")})
+    assert tree.fifesim.comparison_table.__func__ is fifesim.comparison_table
+    assert tree.fifesim.comparison_table.__self__ is tree
 
 
 def test_any_array_has_the_accessor_and_copies_keep_it():
@@ -79,9 +79,3 @@ def test_repr_lists_methods_by_group(lai):
     assert "compare" in said and "comparison_table" not in said
     assert max(map(len, said.splitlines())) <= 100
     assert "to_geotiff" in repr(lai.to_dataset(name="lai").fifesim)
-
-
-def test_datatree_accessor_has_comparison_table(lai):
-    tree = xr.DataTree.from_dict({"/TM": lai.to_dataset(name="lai")})
-    assert tree.fifesim.comparison_table.__func__ is fifesim.comparison_table
-    assert tree.fifesim.comparison_table.__self__ is tree

@@ -79,13 +79,8 @@ def wait_for_a_block(folder, process):
 
 def signalled(signal_number, *arguments):
     """Run that is ended by a signal after its first block."""
-    command = [
-        sys.executable,
-        "-c",
-        SIGNALLED.replace("SIGNAL", str(int(signal_number))),
-        "simulate",
-        *map(str, arguments),
-    ]
+    code = SIGNALLED.replace("SIGNAL", str(int(signal_number)))
+    command = [sys.executable, "-c", code, "simulate", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
 
 
@@ -204,11 +199,8 @@ def test_killed_worker_does_not_change_the_files(scenario, whole, tmp_path):
     out = tmp_path / "out"
     process = start(scenario, "-o", out, "--workers", 2)
     wait_for_a_block(out, process)
-    workers = [
-        child
-        for child in psutil.Process(process.pid).children(recursive=True)
-        if any("spawn_main" in word for word in child.cmdline())
-    ]
+    children = psutil.Process(process.pid).children(recursive=True)
+    workers = [child for child in children if any("spawn_main" in word for word in child.cmdline())]
     assert len(workers) >= 2
     workers[0].kill()
     _, errors = process.communicate(timeout=PATIENCE)

@@ -200,17 +200,7 @@ def test_package_has_few_files():
 
 # Names that several files may define: commands have the names of functions, every verification file has a list of
 # checks, and experiments and sweeps list their regressed variables.
-SHARED_NAMES = {
-    "CHECKS",
-    "VARIABLES",
-    "budget",
-    "dataset",
-    "explore",
-    "reproduce",
-    "rerun",
-    "simulate",
-    "verify",
-}
+SHARED_NAMES = {"CHECKS", "VARIABLES", "budget", "dataset", "explore", "reproduce", "rerun", "simulate", "verify"}
 
 
 def test_names_are_defined_in_one_file():
@@ -279,9 +269,3 @@ def test_functions_have_their_docstrings():
         missing = [each for each in sections_needed(function) if f"\n{each}\n{'-' * len(each)}\n" not in text]
         lacking += [f"{name}: {', '.join(missing) or 'no docstring'}"] if missing or not text else []
     assert lacking == []
-
-
-def test_public_names_are_documented_and_importable():
-    for name in fifesim.__all__:
-        found = getattr(fifesim, name)
-        assert name == "__version__" or found.__doc__

@@ -50,10 +50,10 @@ def test_reflectance_follows_the_raster_rules(lai_with_hole, swath):
 
 def test_background_may_be_a_raster(lai, swath):
     litter = (lai * 0 + 0.2).drop_attrs(deep=False)
-    mapped = lai.fifesim.surface_reflectance(
-        "TM", bands=BANDS, geometry=swath, canopy=fifesim.Canopy(background=litter)
+    mapped, uniform = (
+        lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath, canopy=fifesim.Canopy(background=each))
+        for each in (litter, 0.2)
     )
-    uniform = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath, canopy=fifesim.Canopy(background=0.2))
     np.testing.assert_allclose(mapped, uniform, rtol=1e-14)
 
 
@@ -89,16 +89,11 @@ def test_constant_angle_raster_equals_a_single_geometry(lai):
     assert np.abs(images[0].astype(int) - images[1].astype(int)).max() <= 1
 
 
-@pytest.mark.parametrize("call", ["slopes", "fpar"])
-def test_functions_that_need_one_geometry_raise(lai, swath, call):
+def test_functions_of_one_geometry_and_views_below_the_horizon_raise(lai, swath):
     with pytest.raises(ValueError, match="needs one direction of sun and sensor, got rasters of sza, vza, vaa"):
-        if call == "fpar":
-            lai.fifesim.fpar(geometry=swath)
-        else:
-            lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath, dem=ramp(lai, 0, 10))
-
-
-def test_view_below_the_horizon_raises(lai):
+        lai.fifesim.fpar(geometry=swath)
+    with pytest.raises(ValueError, match="needs one direction of sun and sensor, got rasters of sza, vza, vaa"):
+        lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath, dem=ramp(lai, 0, 10))
     low = by_cell(28.5, 117.0, ramp(lai, 20.0, 95.0), 200.0)
     with pytest.raises(ValueError, match=r"vza must be in \[0, 90\) degrees in every cell, got"):
         lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=low)
