@@ -29,6 +29,11 @@ SIEWERT = np.array(
 )
 
 
+def henyey_greenstein(asymmetry, scattering_cosine):
+    """Phase function of a given asymmetry, whose mean is 1. [1]"""
+    return (1 - asymmetry**2) / (1 + asymmetry**2 - 2 * asymmetry * scattering_cosine) ** 1.5
+
+
 def eddington_intensities(tau, albedo, asymmetry, mu_s):
     """Mean (J) and net upward (H) diffuse intensity as functions of depth, for solar flux pi and black surface. [1]"""
 

@@ -7,17 +7,14 @@ import pytest
 
 from fifesim.atmosphere.coupling import (
     WAVELENGTHS,
-    BandTerms,
     Scattering,
     TargetTerms,
     apparent_reflectance,
     apparent_reflectance_of_cell,
     corrected_reflectance,
     corrected_reflectance_of_cell,
-    inhomogeneous_reflectance,
     on_wavelengths,
     spectral_nodes,
-    target_reflectance,
 )
 from fifesim.atmosphere.engines import band_terms
 from fifesim.atmosphere.models import Atmosphere
@@ -25,16 +22,6 @@ from fifesim.base.bands import Band, solar_irradiance
 
 UNIFORM = (0.09, 0.8, 0.83, 0.19, 0.98)
 TERMS = TargetTerms(0.09, 0.8, 0.52, 0.31, 0.19, 0.98)
-
-
-def test_inverse_is_exact():
-    rho = np.linspace(0, 1, 11)
-    np.testing.assert_allclose(corrected_reflectance(apparent_reflectance(rho, *UNIFORM), *UNIFORM), rho, atol=1e-12)
-
-
-def test_missing_cell_stays_missing():
-    toa = apparent_reflectance(np.array([np.nan, 0.2]), 0.1, 0.8, 0.9, 0.1)
-    assert np.isnan(toa).tolist() == [True, False]
 
 
 def test_reflectance_in_percent_raises():
@@ -80,23 +67,6 @@ def test_opaque_gas_gives_non_finite_surface_reflectance():
     assert not np.isfinite(corrected_reflectance(np.array([0.0]), 0.1, 0.8, 0.9, 0.0, 0.0)).any()
 
 
-def test_uniform_ground_uses_the_total_transmittance():
-    path, down, direct, diffuse, albedo, gas = TERMS
-    uniform = gas * (path + down * (direct + diffuse) * 0.3 / (1 - 0.3 * albedo))
-    assert inhomogeneous_reflectance(0.3, 0.3, TERMS) == pytest.approx(uniform, rel=1e-14)
-
-
-def test_target_reflectance_inverts_the_forward_equation():
-    target, around = np.meshgrid(np.linspace(0, 1, 11), np.linspace(0, 1, 11))
-    toa = inhomogeneous_reflectance(target, around, TERMS)
-    np.testing.assert_allclose(target_reflectance(toa, around, TERMS), target, atol=1e-13)
-
-
-def test_environment_in_percent_raises():
-    with pytest.raises(ValueError, match=r"must be below 1, got 5\.7: reflectance is a fraction"):
-        inhomogeneous_reflectance(30.0, 30.0, TERMS)
-
-
 # ------------------------------------------------------------------------------------------ bands
 
 
@@ -111,11 +81,6 @@ def test_band_terms_approximate_the_spectral_sum(visibility):
     parts = apparent_reflectance(0.5, **band_terms(atmosphere, slices, 40.0, 20.0, 60.0).uniform)
     once = apparent_reflectance(0.5, **band_terms(atmosphere, [whole], 40.0, 20.0, 60.0).uniform)
     assert once[0] == pytest.approx(np.average(parts, weights=weight), abs=5e-4)
-
-
-def test_thermal_band_raises():
-    with pytest.raises(ValueError, match=r"band TM6 spans 10.4 to 12.5 um, the gas tables only 0.4 to 2.5 um"):
-        band_terms(Atmosphere(), [Band("TM6", (10.4, 12.5), (1, 1))], 30.0, 0.0, 0.0)
 
 
 def test_power_laws_in_wavelength_are_interpolated_exactly():
@@ -138,18 +103,3 @@ def test_spectral_interval_has_two_nodes_on_each_side(low, high):
     assert (nodes <= low).sum() >= min(2, (low >= WAVELENGTHS).sum())
     assert (nodes >= high).sum() >= min(2, (high <= WAVELENGTHS).sum())
     assert np.array_equal(nodes[inside], WAVELENGTHS[(low < WAVELENGTHS) & (high > WAVELENGTHS)])
-
-
-def test_uniform_terms_follow_the_argument_order():
-    terms = BandTerms(*np.arange(len(BandTerms._fields)))
-    names = apparent_reflectance.__code__.co_varnames[1:6]
-    assert tuple(terms.uniform) == names
-    assert all(value is getattr(terms, name) for name, value in terms.uniform.items())
-
-
-def test_skylight_is_total_minus_direct_transmittance():
-    terms = band_terms(Atmosphere(visibility=8.0), [Band("red", (0.63, 0.69), (1, 1))], 50.0, 0.0, 0.0)
-    assert terms.transmittance_down * (1 - terms.diffuse_fraction) == pytest.approx(terms.direct_transmittance_down)
-    depth = -np.log(terms.direct_transmittance_down) * np.cos(np.radians(50.0))
-    # The band mean of exponentials is not the exponential of the mean.
-    assert depth == pytest.approx(terms.optical_depth, rel=2e-3)

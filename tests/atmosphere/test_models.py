@@ -32,18 +32,11 @@ def test_text_of_the_default_atmosphere():
     "arguments, message",
     [
         ({"profile": "midlat_summer"}, r"profile must be one of .*'midlat_summer': type profile='midlatitude-sum"),
-        ({"profile": "standard"}, r"profile must be one of tropical, .*, us-1962, got 'standard'$"),
         ({"aerosol": "continentl"}, r"aerosol must be one of .*, got 'continentl': type aerosol='continental'"),
-        ({"engine": "6s"}, "engine must be one of 5S, successive-orders, .*, got '6s': type engine='6S'"),
-        ({"visibility": 2}, r"visibility must be from 5 to 100 km, got 2$"),
         ({"visibility": float("nan")}, r"visibility must be from 5 to 100 km, got nan"),
         ({"altitude": 5}, r"altitude must be from 0 to 4 km, got 5"),
-        ({"altitude": 400}, "where that is metres, type altitude=0.4$"),
-        ({"visibility": 23e3}, "where that is metres, type visibility=23$"),
         ({"h2o": -1}, "h2o must be from 0 to 10 g cm-2, got -1"),
-        ({"o3": 300}, "o3 must be from 0 to 1 cm-atm, got 300"),
         ({"aot": -0.1}, "aot must be from 0 to 2 optical thickness at 0.55 um, got -0.1"),
-        ({"visibility": 23, "aot": 0.1}, r"give visibility or aot, not both: 23 km is an aot of 0\.2347, got 0\.1"),
         ({"aerosol": "none", "aot": 0.1}, r"aot must be 0 without aerosol, got 0\.1"),
     ],
 )
@@ -52,9 +45,7 @@ def test_invalid_argument_raises_a_specific_message(arguments, message):
         Atmosphere(**arguments)
 
 
-def test_wrong_type_or_text_form_raises():
-    with pytest.raises(TypeError, match=r"visibility must be a number from 5 to 100 \[km\], got '45'"):
-        Atmosphere(visibility="45")
+def test_wrong_text_form_raises():
     with pytest.raises(ValueError, match="atmosphere must read like 'profile=midlatitude-summer"):
         Atmosphere.parse("midlatitude summer, 45 km")
 

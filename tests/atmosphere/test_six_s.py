@@ -194,12 +194,6 @@ def test_missing_engine_error_gives_the_install_command(monkeypatch):
         six_s.sixs_band_terms(Atmosphere(), [RED], 30.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("angles, name", [((81.0, 0.0), "sza"), ((0.0, -1.0), "vza"), ((np.nan, 0.0), "sza")])
-def test_angle_out_of_range_raises(angles, name):
-    with pytest.raises(ValueError, match=f"{name} must be from 0 to 75 degrees, got"):
-        engines.band_terms(Atmosphere(engine="6S"), [RED], *angles, 0.0)
-
-
 def test_band_outside_the_spectrum_of_6s_raises():
     with pytest.raises(ValueError, match=r"band thermal spans 10 to 12 um, 6S only 0\.25 to 4 um"):
         six_s.sixs_band_terms(Atmosphere(), [Band("thermal", (10, 12), (1, 1))], 30.0, 0.0, 0.0)
