@@ -20,6 +20,8 @@ CHIP = fifesim.Scenario(
     terrain={"dem": "flat"},
     sensor={"instrument": "MSI", "bands": ["MSI3", "MSI4", "MSI8"]},
 )
+SURFACE = "surface_bidirectional_reflectance"
+SL2P_BANDS = [f"MSI{name}" for name in ("3", "4", "5", "6", "7", "8A", "11", "12")]
 STUDY = fifesim.Study(
     CHIP,
     {"visibility": {"uniform": [20, 60]}, "soil": {"normal": [0, 0.02], "within": [-0.1, 0.1]}},
@@ -49,6 +51,12 @@ def image():
     return fifesim.simulate(CHIP.replace(width=180, height=150, **{"ground.seed": 1234}))
 
 
+@pytest.fixture(scope="module")
+def light(image):
+    """Reflectance at the top of the atmosphere; tests must not change it."""
+    return image["image"]["dn"].fifesim.to_reflectance().compute()
+
+
 def test_intervals_have_their_coverage_on_unseen_landscapes(retrieval):
     """The test part has 6 landscapes, so that coverage has a standard error of a few percent."""
     score = retrieval.score
@@ -58,8 +66,7 @@ def test_intervals_have_their_coverage_on_unseen_landscapes(retrieval):
         assert abs(float(found.coverage) - level) < 0.05 + 3 * float(found.coverage_se)
 
 
-def test_retrieved_map_is_near_the_truth_and_on_its_grid(retrieval, image):
-    light = image["image"]["dn"].fifesim.to_reflectance()
+def test_retrieved_map_is_near_the_truth_and_on_its_grid(retrieval, image, light):
     found, truth = light.fifesim.retrieve(retrieval), image["truth"]["lai"]
     score = fifesim.score(found, truth)
     assert float(score.rmse) < 0.25
@@ -76,14 +83,17 @@ def test_retrieved_map_is_near_the_truth_and_on_its_grid(retrieval, image):
     assert np.array_equal(found.flag.values == -1, missing.values) and np.array_equal(found.lai.isnull(), missing)
 
 
-def test_retrieve_is_lazy_and_the_same_in_any_chunks(retrieval, image):
-    light = image["image"]["dn"].fifesim.to_reflectance().compute()
+def test_retrieve_is_lazy_and_the_same_in_any_chunks(retrieval, light, monkeypatch):
+    """Batches of pixels agree to single precision."""
+    light = light.copy()
     light.attrs.pop("_FillValue", None)
     whole = light.fifesim.retrieve(retrieval)
     for chunks in (CHUNKS, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}):
         with no_compute():
             lazy = in_chunks(light, chunks).fifesim.retrieve(retrieval)
         xr.testing.assert_identical(lazy.compute(), whole)
+    monkeypatch.setattr(labels, "_BATCH", 100)
+    xr.testing.assert_allclose(light.fifesim.retrieve(retrieval), whole, rtol=1e-6, atol=1e-6)
 
 
 def test_training_is_reproducible_to_the_bit(chips):
@@ -94,18 +104,17 @@ def test_training_is_reproducible_to_the_bit(chips):
     assert not np.array_equal(one.tables["weight0"], other.tables["weight0"])
 
 
-def test_retrieval_is_restored_from_its_file(retrieval, image, tmp_path):
+def test_retrieval_is_restored_from_its_file(retrieval, light, tmp_path):
     retrieval.to_netcdf(tmp_path / "mine.nc")
     again = fifesim.read_retrieval(tmp_path / "mine.nc")
     assert replace(again, tables={}, score=None) == replace(retrieval, tables={}, score=None)
-    light = image["image"]["dn"].fifesim.to_reflectance()
     assert again.score.coverage.values == pytest.approx(retrieval.score.coverage.values)
     assert light.fifesim.retrieve(again).identical(light.fifesim.retrieve(retrieval))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.nc"]
 
 
-def test_geotiff_has_a_band_for_each_level(retrieval, image, tmp_path):
-    found = image["image"]["dn"].fifesim.to_reflectance().fifesim.retrieve(retrieval, intervals=[0.5, 0.95])
+def test_geotiff_has_a_band_for_each_level(trained, light, tmp_path):
+    found = light.fifesim.retrieve(trained("line"), intervals=[0.5, 0.95])
     path = found.fifesim.to_geotiff(tmp_path / "lai.tif")
     again = fifesim.open_image(path)
     names = again.band.values.tolist()
@@ -113,18 +122,15 @@ def test_geotiff_has_a_band_for_each_level(retrieval, image, tmp_path):
     assert np.array_equal(again.sel(band="lai_low_95"), found.lai_low.sel(level=0.95), equal_nan=True)
 
 
-def test_spectra_outside_the_training_are_flagged(retrieval, image):
-    light = image["image"]["dn"].fifesim.to_reflectance().compute()
+def test_spectra_outside_the_training_are_flagged(retrieval, light):
     water = light.copy(data=np.broadcast_to(np.array([0.03, 0.02, 0.01])[:, None, None], light.shape).copy())
     assert (water.fifesim.retrieve(retrieval).flag.values & 1).all()
     assert float((light.fifesim.retrieve(retrieval).flag > 0).mean()) < 0.1
     # Dense grass is brighter in the near infrared and darker in the red than all training pixels.
     dense = light.where(light.band == "MSI8", 0.04).where(light.band != "MSI8", 0.42)
     assert (dense.fifesim.retrieve(retrieval).flag.values[1:-1, 1:-1] > 0).all()
-
-
-def test_ends_of_intervals_are_ordered_around_the_median():
-    np.testing.assert_allclose(methods.probabilities_of((0.5, 0.8)), [0.1, 0.25, 0.5, 0.75, 0.9])
+    # Digital numbers with fractions are indistinguishable from reflectance.
+    assert ((1e4 * light).assign_attrs(light.attrs).fifesim.retrieve(retrieval).flag != 0).all()
 
 
 def test_quantiles_of_a_network_are_sorted_and_give_the_standard_deviation():
@@ -198,9 +204,8 @@ def test_table_of_optimal_estimation_agrees_with_the_chain(chips):
         assert slopes[:, :, at] == pytest.approx((ends[0] - ends[1]) / 2e-5, abs=1e-7)
 
 
-def test_diagnostics_of_optimal_estimation(chips, image, monkeypatch):
-    retrieval = fifesim.train(chips, "optimal-estimation")
-    light = image["image"]["dn"].fifesim.to_reflectance()
+def test_diagnostics_of_optimal_estimation(chips, trained, light, monkeypatch):
+    retrieval = trained("optimal-estimation")
     found = light.fifesim.retrieve(retrieval).compute()
     kernels = [found[f"averaging_kernel_{name}"] for name in ("lai", "soil", "log_aot")]
     assert np.allclose(sum(kernels), found.degrees_of_freedom, atol=1e-5, equal_nan=True)
@@ -229,13 +234,10 @@ def test_uniform_ground_is_corrected_exactly(chips):
 
 
 @pytest.mark.parametrize("method", ["quantiles", "optimal-estimation"])
-def test_training_at_the_surface_or_on_uniform_ground_is_as_accurate(chips, trained, image, method):
+def test_training_at_the_surface_or_on_uniform_ground_is_as_accurate(chips, trained, image, light, method):
     """The RMSE of these retrievals is at most 1.5 times the RMSE at the top of the atmosphere."""
-    light = image["image"]["dn"].fifesim.to_reflectance()
-    surface = light.fifesim.to_surface()
-    cases = [(trained(method), light)]
-    for pixels in ("chain", "uniform"):
-        cases.append((fifesim.train(chips, method, level="surface", pixels=pixels), surface))
+    trainings = (fifesim.train(chips, method, level="surface", pixels=pixels) for pixels in ("chain", "uniform"))
+    cases = [(trained(method), light), *((each, light.fifesim.to_surface()) for each in trainings)]
     rmse = []
     for retrieval, own in cases:
         rmse.append(float(fifesim.score(own.fifesim.retrieve(retrieval), image["truth"]["lai"]).rmse))
@@ -243,32 +245,15 @@ def test_training_at_the_surface_or_on_uniform_ground_is_as_accurate(chips, trai
     assert max(rmse) < 1.5 * rmse[0]
 
 
-def test_training_without_the_required_study_is_rejected(chips):
-    bare = chips.drop_attrs(deep=False).assign_attrs(instrument="MSI")
-    for options in ({"method": "optimal-estimation"}, {"level": "surface"}, {"pixels": "uniform"}):
-        with pytest.raises(ValueError, match="needs the study of the chips"):
-            fifesim.train(bare, **options)
-    corrected = bare.assign(surface_reflectance=bare.toa_reflectance)
-    assert fifesim.train(corrected, "line", level="surface").level == "surface"
-    with pytest.raises(ValueError, match="is not of uniform ground"):
-        fifesim.train(corrected, "line", level="surface", pixels="uniform")
-    pastures = fifesim.Study(CHIP.replace(cover="pastures"), {"visibility": {"uniform": [20, 60]}}, landscapes=3)
-    several = chips.assign_attrs(study=pastures.to_toml())
-    for options in ({"method": "optimal-estimation"}, {"pixels": "uniform"}):
-        with pytest.raises(ValueError, match=r"single stand|of one stand"):
-            fifesim.train(several, **options)
-
-
 def test_sl2p_maps_sentinel_2_reflectance(image):
-    names = [f"MSI{name}" for name in ("3", "4", "5", "6", "7", "8A", "11", "12")]
     spectrum = [0.058, 0.0079, 0.0936, 0.2585, 0.2825, 0.3087, 0.1708, 0.0698]
     grid = image["truth"]["lai"].isel(x=slice(2), y=slice(3)).compute()
-    light = (grid * 0 + xr.DataArray(spectrum, dims="band", coords={"band": names})).transpose("band", "y", "x")
+    light = (grid * 0 + xr.DataArray(spectrum, dims="band", coords={"band": SL2P_BANDS})).transpose("band", "y", "x")
     light = light.assign_coords(
         sza=np.degrees(np.arccos(0.40581)), vza=np.degrees(np.arccos(0.98434)), saa=10.0,
         vaa=10.0 + np.degrees(np.arccos(-0.55142)),
     )  # fmt: skip
-    light.attrs["standard_name"] = "surface_bidirectional_reflectance"
+    light.attrs["standard_name"] = SURFACE
     light[:, 0, 0] = np.nan
     found = light.fifesim.retrieve("sl2p")
     assert list(found.data_vars) == ["lai", "fpar", "fcover", "flag"]
@@ -281,75 +266,72 @@ def test_sl2p_maps_sentinel_2_reflectance(image):
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("change", "options", "message"),
     [
-        (lambda light: light.sel(band=["MSI3", "MSI4"]), "lacks MSI8"),
-        (lambda light: light.drop_vars("vaa"), "no coordinate vaa"),
-        (lambda light: light.assign_coords(sza=50.0), r"sza of the image is 50\.0 degrees, the training had 28\.5"),
-        (lambda light: light.assign_attrs(standard_name="surface_bidirectional_reflectance"), "top of the atmosphere"),
-        (lambda light: light.assign_coords(wavelength=("band", [0.56, 0.66, 0.9])), "band MSI8 of the image is at 0.9"),
-        (lambda light: light.isel(band=0, drop=True), "no dimension band"),
+        (lambda light: light.sel(band=["MSI3", "MSI4"]), {}, "lacks MSI8"),
+        (lambda light: light.drop_vars("vaa"), {}, "no coordinate vaa"),
+        (lambda light: light.assign_coords(sza=50.0), {}, r"image is 50\.0 degrees, the training had 28\.5"),
+        (lambda light: light.assign_attrs(standard_name=SURFACE), {}, "top of the atmosphere"),
+        (lambda light: light.assign_coords(wavelength=("band", [0.56, 0.66, 0.9])), {}, "band MSI8 .* is at 0.9"),
+        (lambda light: light.isel(band=0, drop=True), {}, "no dimension band"),
+        (lambda light: light, {"intervals": [0.9]}, r"levels of the training, 0\.5, 0\.8, 0\.95, got \[0\.9\]"),
+        (lambda light: light, {"retrieval": "s2lp"}, r"'sl2p' or from fifesim\.train"),
+        (lambda light: light.assign_attrs(standard_name=SURFACE), {"retrieval": "sl2p"}, "lacks MSI5"),
+        (
+            lambda light: light[[0] * 8].assign_coords(band=SL2P_BANDS),
+            {"retrieval": "sl2p"},
+            "needs reflectance of the surface",
+        ),
+        (lambda light: light.assign_coords(gain=1.0, offset=0.0), {}, "digital numbers"),
+        (lambda light: (1e4 * light).fillna(0).astype("uint16"), {}, "digital numbers"),
     ],
 )
-def test_unsuitable_images_are_rejected(chips, image, change, message):
-    retrieval = fifesim.train(chips, "line")
+def test_unsuitable_images_and_options_are_rejected(trained, light, change, options, message):
     with pytest.raises(ValueError, match=message):
-        change(image["image"]["dn"].fifesim.to_reflectance()).fifesim.retrieve(retrieval)
+        change(light).fifesim.retrieve(**{"retrieval": trained("line")} | options)
 
 
-def test_digital_numbers_and_unknown_levels_are_refused(chips, image):
-    retrieval = fifesim.train(chips, "line")
-    with pytest.raises(ValueError, match="digital numbers"):
-        image["image"]["dn"].fifesim.retrieve(retrieval)
-    with pytest.raises(ValueError, match="digital numbers"):
-        image["image"]["dn"].drop_vars(["gain", "offset"]).fifesim.retrieve(retrieval)
-    # Digital numbers with fractions are indistinguishable from reflectance; they are flagged.
-    light = image["image"]["dn"].fifesim.to_reflectance()
-    assert bool((light.copy(data=1e4 * light.data).fifesim.retrieve(retrieval).flag != 0).all())
-    light = image["image"]["dn"].fifesim.to_reflectance()
-    with pytest.raises(ValueError, match=r"among the levels of the training, 0\.5, 0\.8, 0\.95, got \[0\.9\]"):
-        light.fifesim.retrieve(retrieval, intervals=[0.9])
-    with pytest.raises(ValueError, match=r"'sl2p' or from fifesim\.train"):
-        light.fifesim.retrieve("s2lp")
+# The study of other chips has several stands.
+PASTURES = fifesim.Study(CHIP.replace(cover="pastures"), {"visibility": {"uniform": [20, 60]}}, landscapes=3)
+SEVERAL, BARE = {"study": PASTURES.to_toml()}, {"instrument": "MSI"}
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("attrs", "options", "message"),
     [
-        ({"method": "trees"}, "method must be one of|'line'"),
-        ({"quantities": "lia"}, "different names among lai, fpar, green_fpar"),
-        ({"quantities": "green_fpar"}, "no green_fpar"),
-        ({"levels": [0.5, 1.0]}, "between 0 and 1"),
-        ({"level": "boa"}, "level must be one of toa, surface|'surface'"),
-        ({"pixels": "mixed"}, "pixels must be one of chain, uniform|'uniform'"),
-        ({"bands": "MSI2"}, "no band MSI2, they have MSI3, MSI4, MSI8"),
-        ({"method": "line", "bands": ["MSI3", "MSI4"]}, "needs a red and a near infrared band"),
+        (None, {"method": "trees"}, "method must be one of|'line'"),
+        (None, {"quantities": "lia"}, "different names among lai, fpar, green_fpar"),
+        (None, {"quantities": "green_fpar"}, "no green_fpar"),
+        (None, {"levels": [0.5, 1.0]}, "between 0 and 1"),
+        (None, {"level": "boa"}, "level must be one of toa, surface|'surface'"),
+        (None, {"pixels": "mixed"}, "pixels must be one of chain, uniform|'uniform'"),
+        (None, {"bands": "MSI2"}, "no band MSI2, they have MSI3, MSI4, MSI8"),
+        (None, {"method": "line", "bands": ["MSI3", "MSI4"]}, "needs a red and a near infrared band"),
+        (BARE, {"method": "optimal-estimation"}, "needs the study of the chips"),
+        (BARE, {"level": "surface"}, "needs the study of the chips"),
+        (BARE, {"pixels": "uniform"}, "needs the study of the chips"),
+        (SEVERAL, {"method": "optimal-estimation"}, "single stand|of one stand"),
+        (SEVERAL, {"pixels": "uniform"}, "single stand|of one stand"),
     ],
 )
-def test_invalid_training_options_are_rejected(chips, options, message):
+def test_invalid_training_is_rejected(chips, attrs, options, message):
+    given = chips if attrs is None else chips.drop_attrs(deep=False).assign_attrs(attrs)
     with pytest.raises(ValueError, match=message):
-        fifesim.train(chips, **options)
+        fifesim.train(given, **options)
 
 
-def test_files_without_a_retrieval_are_rejected(tmp_path, chips):
-    with pytest.raises(ValueError, match="no such file"):
-        fifesim.read_retrieval(tmp_path / "none.nc")
+def test_corrected_chips_are_trained_at_the_surface_without_a_study(chips):
+    corrected = chips.drop_attrs(deep=False).assign_attrs(BARE).assign(surface_reflectance=chips.toa_reflectance)
+    assert fifesim.train(corrected, "line", level="surface").level == "surface"
+    with pytest.raises(ValueError, match="is not of uniform ground"):
+        fifesim.train(corrected, "line", level="surface", pixels="uniform")
+
+
+def test_files_without_a_retrieval_are_rejected(tmp_path, trained):
     xr.Dataset({"a": 1.0}).to_netcdf(tmp_path / "other.nc")
-    with pytest.raises(ValueError, match="is not a retrieval"):
-        fifesim.read_retrieval(tmp_path / "other.nc")
     (tmp_path / "text.nc").write_text("no")
-    with pytest.raises(ValueError, match="cannot read the retrieval"):
-        fifesim.read_retrieval(tmp_path / "text.nc")
-    newer = replace(fifesim.train(chips, "line"), version=2)
-    newer.to_netcdf(tmp_path / "newer.nc")
-    with pytest.raises(ValueError, match="has the format 2"):
-        fifesim.read_retrieval(tmp_path / "newer.nc")
-
-
-def test_batches_do_not_change_the_estimates(chips, image, monkeypatch):
-    retrieval = fifesim.train(chips, "quantiles")
-    light = image["image"]["dn"].fifesim.to_reflectance().compute()
-    whole = light.fifesim.retrieve(retrieval)
-    monkeypatch.setattr(labels, "_BATCH", 100)
-    for name, values in light.fifesim.retrieve(retrieval).data_vars.items():
-        assert np.allclose(values, whole[name], rtol=1e-6, atol=1e-6, equal_nan=True), name
+    replace(trained("line"), version=2).to_netcdf(tmp_path / "newer.nc")
+    messages = {"none": "no such file", "other": "is not a retrieval", "text": "cannot read", "newer": "the format 2"}
+    for name, message in messages.items():
+        with pytest.raises(ValueError, match=message):
+            fifesim.read_retrieval(tmp_path / f"{name}.nc")
