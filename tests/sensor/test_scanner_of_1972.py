@@ -1,19 +1,16 @@
 """Landsat-1 MSS: 6-bit counts on a square-root scale."""
 
 import numpy as np
+import products
 import pytest
 import xarray as xr
 from lazy import check_raster_function
 
 import fifesim
-from fifesim.base.geometry import Geometry
-from fifesim.grids import directions
-from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response.calibration import radiance_to_dn
 
 MSS = instrument("MSS")
-NAMES = [band.name for band in MSS.bands]
 FULL = np.array([band.full_scale_radiance for band in MSS.bands])
 
 
@@ -22,8 +19,7 @@ def radiance():
     """Radiance from nearly dark to full scale in every band."""
     grid = fifesim.fife_site(20.0, window=((0, 60), (0, 66)))
     values = np.random.default_rng(4).uniform(0.02, 0.98, (4, *grid.shape)) * FULL[:, None, None]
-    array = xr.DataArray(values, dims=("band", "y", "x"), coords={"band": NAMES}, attrs={"units": "W m-2 sr-1 um-1"})
-    return directions.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
+    return products.radiance(values, grid, [band.name for band in MSS.bands])
 
 
 @pytest.fixture(scope="module")

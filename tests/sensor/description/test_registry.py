@@ -99,9 +99,11 @@ def test_common_names_of_instruments_and_bands_are_recognized(row):
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
-def test_file_passes_the_checks_for_user_files(path):
+def test_file_passes_the_checks_for_user_files_and_can_be_pickled(path):
     item = read_instrument(path)
     assert item == instrument(item.name) and item.name in instrument_names()
+    again = pickle.loads(pickle.dumps(item))
+    assert again == item and {item: 1}[again] == 1
     assert "left out" in " ".join(path.read_text(encoding="utf-8").replace("\n#", " ").split())
 
 
@@ -137,13 +139,6 @@ def test_blur_noise_and_geolocation_have_an_origin_or_a_search_note(name):
         assert quantity in item.not_found or all(row.origin != "unknown" for row in own)
     text = instrument_in_words(item)
     assert text.count("not known: ") == len(item.not_found) and all(who in text for who in item.not_found.values())
-
-
-@EACH
-def test_instrument_is_picklable_and_hashable(name):
-    item = instrument(name)
-    again = pickle.loads(pickle.dumps(item))
-    assert again == item and {item: 1}[again] == 1
 
 
 def test_band_names_are_unique_to_an_instrument_family():

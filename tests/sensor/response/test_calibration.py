@@ -24,6 +24,8 @@ def test_tm_gain_is_the_range_divided_by_255():
     # Bands broadcast: (50 + 1.2) / 0.805882 = 63.53, (50 + 1.5) / 0.814510 = 63.23.
     dn = radiance_to_dn(np.full((2, 3, 4), 50.0), gain[:, None, None], offset[:, None, None], 8)
     assert dn.shape == (2, 3, 4) and dn[:, 0, 0].tolist() == [64, 63]
+    # Halves round to even.
+    assert radiance_to_dn([2.5, 3.5, 4.5], 1.0, 0.0, 8).tolist() == [2, 4, 4]
 
 
 @pytest.mark.parametrize(("bits", "dtype"), [(2, np.uint8), (8, np.uint8), (9, np.uint16), (12, "u2"), (16, "u2")])
@@ -49,10 +51,6 @@ def test_out_of_range_radiance_is_clipped_and_missing_is_zero(bits, compression)
     np.testing.assert_array_equal(np.isnan(dn_to_radiance(dn, gain, offset, compression * largest)), dn == 0)
 
 
-def test_halves_round_to_even():
-    assert radiance_to_dn([2.5, 3.5, 4.5], 1.0, 0.0, 8).tolist() == [2, 4, 4]
-
-
 def test_planetary_reflectance_by_hand():
     """pi 50 1.0148^2 / (1536 cos 28.5 degrees) = 161.763 / 1349.86, by hand."""
     mu_s = np.cos(np.radians(28.5))
@@ -64,16 +62,16 @@ def test_planetary_reflectance_by_hand():
 
 
 @pytest.mark.parametrize(
-    ("call", "error", "said"),
+    ("call", "said"),
     [
-        (lambda: reflectance_to_radiance(0.3, 1536.0, -0.1), ValueError, "mu_s must be positive"),
-        (lambda: radiance_to_reflectance(50.0, 1536.0, 0.9, 0.0), ValueError, "earth_sun_distance"),
-        (lambda: product_gain_offset(1e-4, -0.1, 1512.06, 0.0), ValueError, "mu_s must be positive"),
-        (lambda: calibration.filled(np.full((3, 2, 2), np.nan)), ValueError, "no direction of the view: .*'centre'"),
+        (lambda: reflectance_to_radiance(0.3, 1536.0, -0.1), "mu_s must be positive"),
+        (lambda: radiance_to_reflectance(50.0, 1536.0, 0.9, 0.0), "earth_sun_distance"),
+        (lambda: product_gain_offset(1e-4, -0.1, 1512.06, 0.0), "mu_s must be positive"),
+        (lambda: calibration.filled(np.full((3, 2, 2), np.nan)), "no direction of the view: .*'centre'"),
     ],
 )
-def test_invalid_arguments_raise(call, error, said):
-    with pytest.raises(error, match=said):
+def test_invalid_arguments_raise(call, said):
+    with pytest.raises(ValueError, match=said):
         call()
 
 
@@ -104,16 +102,6 @@ def test_compressed_count_decodes_to_the_centre_of_its_interval():
         np.testing.assert_allclose(dn_to_radiance(count, 1.0, 0.0, 63), middle, atol=1e-4)
         step = calibration.digital_step(count**2 / 63, 1.0, 0.0, 63)
         np.testing.assert_allclose(step, seen[-1] - seen[0], atol=1e-4)
-
-
-def test_scale_is_per_band_and_linear_bands_are_unchanged():
-    gain, offset = gain_offset(FULL[..., None], LOW[..., None], 6)
-    radiance, scale = np.random.default_rng(3).uniform(-2, 210, (2, 30, 40)), np.array([63, 0])[:, None, None]
-    mixed, linear = radiance_to_dn(radiance, gain, offset, 6, scale), radiance_to_dn(radiance, gain, offset, 6)
-    np.testing.assert_array_equal(mixed[1], linear[1])
-    np.testing.assert_array_equal(mixed[0], radiance_to_dn(radiance, gain, offset, 6, 63)[0])
-    decoded = dn_to_radiance(mixed, gain, offset, scale)
-    np.testing.assert_array_equal(decoded[1], dn_to_radiance(linear, gain, offset)[1])
 
 
 # ------------------------------------------------------------------------------------------ products
@@ -154,8 +142,6 @@ def test_direction_vectors_round_trip_and_average():
     zenith, azimuth = np.array([[10.0, np.nan], [10.0, np.nan]]), np.array([[350.0, 0.0], [30.0, 0.0]])
     vectors = calibration.mean_direction(zenith, azimuth)
     assert np.isnan(vectors[:, 1]).all() and calibration.direction_angles(vectors[:, 0])[1] == pytest.approx(10.0)
-    degrees = calibration.hundredths(np.array([-7500, 10500, 0], np.int16), np.array([False, False, True]), turns=True)
-    np.testing.assert_array_equal(degrees, [285.0, 105.0, np.nan])
     assert calibration.hundredths(np.int16(-10), False) == -0.1
 
 

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.signal import butter, freqs
 from scipy.special import k0
 
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.base.footprints import Boxcar, axis_operator
 from fifesim.sensor.response.spatial import (
     CosineSpread,
     Difference,
@@ -56,47 +56,40 @@ def mean_of(density, low, high, reach=250.0):
     return integral(low, high) / integral(-reach, reach)
 
 
-def columns_of(spread, n_cells, cell, pixel=30.315, origin=300.7, n_pixels=6):
+def operator_of(spread, cells, cell, origin, pixel):
+    """Operator of one pixel."""
     return axis_operator(
-        spread, cell_origin=0.0, cell_size=cell, n_cells=n_cells, pixel_origin=origin, pixel_size=pixel,
-        n_pixels=n_pixels,
-    )  # fmt: skip
-
-
-def image_of(line, spread, cell, **pixels):
-    """Image of a scene with one row, and the centres of the pixels."""
-    row = axis_operator(
-        Boxcar(1.0), cell_origin=0.0, cell_size=1.0, n_cells=1, pixel_origin=0.0, pixel_size=1.0, n_pixels=1
+        spread, cell_origin=0.0, cell_size=cell, n_cells=cells, pixel_origin=origin, pixel_size=pixel, n_pixels=1
     )
-    columns = columns_of(spread, line.size, cell, **pixels)
-    pixel, origin = pixels.get("pixel", 30.315), pixels.get("origin", 300.7)
-    return regularize(line[None, :], row, columns)[0], origin + (np.arange(len(columns)) + 0.5) * pixel
 
 
 @EACH
-def test_point_source_gives_the_line_spread(spread, density):
-    """A bright cell of 1 m at several distances from the pixel centre."""
-    for distance in (-24.3, -15.0, -7.7, 0.0, 3.1, 14.9, 22.0):
-        line = np.zeros(601)
-        line[300] = 1.0
-        image, centers = image_of(line, spread, 1.0, n_pixels=1, origin=300.5 - distance - 15.0, pixel=30.0)
-        low = 300 - centers[0]
-        assert abs(image[0] - mean_of(density, low, low + 1)) < tolerance(spread)
+def test_cumulative_response_is_the_integral_of_the_density(spread, density):
+    for low in (-38.3, -24.3, -15.0, -7.7, 0.0, 3.1, 14.9, 22.0):
+        found = spread.cumulative(low + 1) - spread.cumulative(low)
+        assert abs(found - mean_of(density, low, low + 1)) < tolerance(spread)
+
+
+def test_image_of_an_asymmetric_response_is_not_mirrored():
+    """Each cell is seen with the response at its distance from the pixel centre, positive to the right."""
+    spread, _ = SPREADS["table"]
+    operator = operator_of(spread, 601, 1.0, origin=285.5, pixel=30.0)
+    distances = operator.start[0] + np.arange(operator.count[0] + 1) - (285.5 + 15.0)
+    found = operator.weights[0, : operator.count[0]]
+    np.testing.assert_allclose(found, np.diff(spread.cumulative(distances)), rtol=0, atol=1e-12)
+    assert abs(found - found[::-1]).max() > 0.001
 
 
 @EACH
 @pytest.mark.parametrize("period", [47.0, 60.63, 200.0])
-def test_sinusoid_gives_the_modulation_transfer(spread, density, period):
-    """Cells of 2 cm reduce the amplitude by (pi cell / period)^2 / 3 = 6e-7."""
-    x = (np.arange(32000) + 0.5) * FINE
-    image = {}
-    for name, wave in (("even", np.cos), ("odd", np.sin)):
-        image[name], centers = image_of(wave(2 * np.pi * x / period), spread, FINE)
-    amplitude = np.hypot(image["even"], image["odd"])
-    np.testing.assert_allclose(amplitude, np.abs(spread.mtf(1 / period)), rtol=0, atol=1e-6)
+def test_mtf_is_the_transform_of_the_response(spread, density, period):
+    """Steps of 2 cm reduce the amplitude by (pi step / period)^2 / 6 = 3e-7."""
+    edges = np.arange(-16000, 16001) * FINE
+    middle, weights = (edges[1:] + edges[:-1]) / 2, np.diff(spread.cumulative(edges))
+    transform = weights @ np.exp(2j * np.pi * middle / period)
+    assert abs(transform) == pytest.approx(abs(float(spread.mtf(1 / period))), abs=1e-6)
     if not isinstance(spread, TableSpread):
-        phase = 2 * np.pi * centers / period
-        np.testing.assert_allclose(image["even"], spread.mtf(1 / period) * np.cos(phase), rtol=0, atol=1e-6)
+        assert transform == pytest.approx(float(spread.mtf(1 / period)), abs=1e-6)
 
 
 # ------------------------------------------------------------------------------------------ system components
@@ -151,7 +144,7 @@ def test_system_mtf_is_the_product_of_its_parts():
 def sampled_contrast(spread, frequency, recorded, cell=10.0, pixel=30.0):
     """Contrast of a recorded wave, sampled at cell centres and averaged with a line spread function."""
     cells = 400
-    operator = columns_of(spread, cells, cell, pixel, cells * cell / 2 - pixel / 2, n_pixels=1)
+    operator = operator_of(spread, cells, cell, cells * cell / 2 - pixel / 2, pixel)
     places = (np.arange(cells) + 0.5) * cell - cells * cell / 2
     wave = float(recorded.mtf(frequency)) * np.cos(2 * np.pi * frequency * places)
     window = slice(operator.start[0], operator.start[0] + operator.count[0])
