@@ -110,20 +110,28 @@ def test_brdf_normalise_converts_between_views():
     np.testing.assert_allclose(found.fifesim.brdf_normalise(land, geometry=nadir, to=slant), seen, rtol=1e-12)
 
 
-def test_invalid_arguments_are_named():
-    with pytest.raises(ValueError, match=r"sza .* vza .* raa"):
-        check_surface(fifesim.RossLi(0.05, 0.19, 0.06))
-    with pytest.raises(ValueError, match="more than it receives"):
-        check_surface(fifesim.RossLi(1.1, 0.0, 0.0))
-    check_surface(fifesim.RossLi([0.1, 0.3], 0.05, 0.01))
-    with pytest.raises(ValueError, match="c must be a number"):
-        scene(DEM).fifesim.topographic_correction(DEM, "c", c=[0.1, 0.2, 0.3])
-    with pytest.raises(ValueError, match=f"k has no number for {BANDS[1]}"):
-        scene(DEM).fifesim.topographic_correction(DEM, "minnaert", k={BANDS[0]: 0.5})
-    with pytest.raises(ValueError, match="iso must be a number, or one for each band"):
-        scene().fifesim.brdf_normalise(fifesim.RossLi(scene(), 0.0, 0.0))
-    with pytest.raises(ValueError, match="dimension stream"):
-        scene().expand_dims(stream=2).fifesim.brdf_normalise(fifesim.RossLi(0.3, 0.0, 0.0))
+ROSS = fifesim.RossLi(0.3, 0.1, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: check_surface(fifesim.RossLi(0.05, 0.19, 0.06)), r"sza .* vza .* raa"),
+        (lambda: check_surface(fifesim.RossLi([0.1, 1.1], 0.0, 0.0)), "more than it receives"),
+        (lambda: scene(DEM).fifesim.topographic_correction(DEM, "c", c=[0.1, 0.2, 0.3]), "c must be a number"),
+        (lambda: scene(DEM).fifesim.topographic_correction(DEM, "minnaert", k={"TM3": 0.5}), "k has no number for TM4"),
+        (
+            lambda: scene().fifesim.brdf_normalise(fifesim.RossLi(scene(), 0, 0)),
+            "iso must be a number, or one for",
+        ),
+        (lambda: scene().expand_dims(stream=2).fifesim.brdf_normalise(ROSS), "dimension stream"),
+    ],
+)
+def test_invalid_arguments_are_named(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def test_low_view_is_a_warning():
     with pytest.warns(UserWarning, match="75 degrees"):
-        far = fifesim.Geometry(sza=40.0, saa=120.0, vza=80.0, vaa=300.0)
-        scene().fifesim.brdf_normalise(fifesim.RossLi(0.3, 0.1, 0.01), geometry=far)
+        scene().fifesim.brdf_normalise(ROSS, geometry=fifesim.Geometry(sza=40.0, saa=120.0, vza=80.0, vaa=300.0))

@@ -22,19 +22,35 @@ CLASSES = {
 }
 
 
+def landscape_of(grid, grass=CLASSES["grass"], **variables):
+    cover = fifesim.Patches("voronoi", 30)
+    return fifesim.landscape(grid, cover=cover, classes=CLASSES | {"grass": grass}, seed=7, **variables)
+
+
+def seen(scene, canopy=None, **options):
+    return scene.fifesim.surface_reflectance("TM", bands=TM34, canopy=canopy or fifesim.Canopy(), **options)
+
+
+def check_grass(land, made, alone, others):
+    """Check that the first class has the values of one raster, and the other classes have the values of another."""
+    grass = (land.cover == 1).values
+    np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
+    np.testing.assert_array_equal(made.values[:, ~grass], others.values[:, ~grass])
+
+
 @pytest.fixture(scope="module")
 def land(site):
-    return fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=CLASSES, seed=7)
+    return landscape_of(site)
 
 
 @pytest.fixture(scope="module")
 def rho(land):
-    return land.fifesim.surface_reflectance("TM", bands=TM34)
+    return seen(land)
 
 
 def test_class_is_identical_to_a_scene_of_this_class(land, rho):
     for code, canopy in enumerate((GRASS, WOOD, BARE), 1):
-        alone = land.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=canopy)
+        alone = seen(land.lai, canopy)
         of_class = (land.cover == code).values
         assert 400 < of_class.sum() < 1600
         np.testing.assert_array_equal(rho.values[:, of_class], alone.values[:, of_class])
@@ -45,35 +61,24 @@ def test_class_is_identical_to_a_scene_of_this_class(land, rho):
 def test_reflectance_is_lazy_and_identical_in_chunks(land, rho, chunks, exact):
     lazy = xr.Dataset({name: in_chunks(each, chunks) for name, each in land.data_vars.items()})
     with no_compute():
-        made = lazy.fifesim.surface_reflectance("TM", bands=TM34, exact=exact)
+        made = seen(lazy, exact=exact)
     assert made.chunks is not None
-    expected = land.fifesim.surface_reflectance("TM", bands=TM34, exact=True) if exact else rho
+    expected = seen(land, exact=True) if exact else rho
     xr.testing.assert_identical(made.compute(), expected)
 
 
 def test_arguments_apply_to_classes_that_do_not_set_them(land, rho, lai):
     """Arguments can be rasters, here the background of the only class that sets none."""
-    open_one = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed")}
-    scene = fifesim.landscape(grids.geobox(land.lai), cover=fifesim.Patches("voronoi", 30), classes=open_one, seed=7)
-    litter = (0.1 + lai / 20).rename("litter").drop_attrs(deep=False)
-    made = scene.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=litter))
-    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=litter))
-    grass = (land.cover == 1).values
-    np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
-    np.testing.assert_array_equal(made.values[:, ~grass], rho.values[:, ~grass])
-
-
-def test_argument_without_effect_is_rejected(land):
-    with pytest.raises(ValueError, match="background is given and also defined by all classes of the landscape"):
-        land.fifesim.surface_reflectance("TM", canopy=fifesim.Canopy(background=0.1))
+    scene = landscape_of(grids.geobox(land.lai), fifesim.CoverClass(lai="burned-grazed"))
+    litter = fifesim.Canopy(background=(0.1 + lai / 20).rename("litter").drop_attrs(deep=False))
+    check_grass(land, seen(scene, litter), seen(scene.lai, litter), rho)
 
 
 def test_varying_directions_are_combined_with_classes(land):
     """Where directions vary, SAIL is evaluated at every cell with the canopy of its class."""
     sza = (xr.zeros_like(land.lai) + 30 + 0.01 * np.arange(land.sizes["x"])).rename("sza").drop_attrs(deep=False)
     sun = xr.Dataset({"sza": sza, "saa": 120.0, "vza": 10.0, "vaa": 90.0, "earth_sun_distance": 1.0})
-    made = land.fifesim.surface_reflectance("TM", bands=TM34, geometry=sun)
-    alone = land.lai.fifesim.surface_reflectance("TM", bands=TM34, geometry=sun, canopy=WOOD)
+    made, alone = seen(land, geometry=sun), seen(land.lai, WOOD, geometry=sun)
     wood = (land.cover == 2).values
     np.testing.assert_array_equal(made.values[:, wood], alone.values[:, wood])
 
@@ -82,7 +87,7 @@ def test_cells_without_class_or_leaf_area_have_no_reflectance(land, rho):
     holes = land.copy(deep=True)
     holes.cover[3:5, 4] = -1
     holes.lai[10, 10:12] = np.nan
-    made = holes.fifesim.surface_reflectance("TM", bands=TM34)
+    made = seen(holes)
     missing = np.zeros(land.lai.shape, bool)
     missing[3:5, 4] = missing[10, 10:12] = True
     assert np.isnan(made.values[:, missing]).all()
@@ -92,26 +97,20 @@ def test_cells_without_class_or_leaf_area_have_no_reflectance(land, rho):
 def test_landscape_is_restored_from_a_file(tmp_path, land, rho):
     land.to_netcdf(tmp_path / "land.nc")
     again = xr.open_dataset(tmp_path / "land.nc", decode_coords="all")
-    xr.testing.assert_equal(again.fifesim.surface_reflectance("TM", bands=TM34), rho)
-
-
-def test_code_without_a_class_is_named(land):
-    other = land.copy(deep=True)
-    other.cover[0, 0] = 77
-    with pytest.raises(ValueError, match="codes without a class: 77, in 1 of"):
-        other.fifesim.surface_reflectance("TM", bands=TM34)
+    xr.testing.assert_equal(seen(again), rho)
 
 
 @pytest.mark.parametrize(
-    "change, message",
+    "call, message",
     [
-        (lambda land: land[["cover"]], "a landscape needs a variable lai, this Dataset has cover"),
-        (lambda land: land.assign(cover=land.cover.drop_attrs(deep=False)), "the classes of the cover are unknown"),
+        (lambda land: seen(land[["cover"]]), "a landscape needs a variable lai, this Dataset has cover"),
+        (lambda land: seen(land.assign(cover=land.cover.drop_attrs())), "the classes of the cover are unknown"),
+        (lambda land: seen(land, BARE), "background is given and also defined by all classes of the landscape"),
     ],
 )
-def test_other_datasets_are_refused(land, change, message):
+def test_unusable_landscapes_and_arguments_are_refused(land, call, message):
     with pytest.raises(ValueError, match=message):
-        change(land).fifesim.surface_reflectance("TM", bands=TM34)
+        call(land)
 
 
 # A canopy of one leaf inclination over dark ground, next to bare soil.
@@ -122,12 +121,9 @@ def two_uniform_classes():
     """Two classes that divide pixels of 9 x 9 cells after 0, 1, ... 9 rows."""
     grid = fifesim.fife_site(30 / 9, window=((0, 9), (0, 90)))
     codes = np.where(np.arange(9)[:, None] < np.repeat(np.arange(10), 9), 1, 2)
-    table = {
-        "canopy": fifesim.CoverClass(
-            lai=DENSE, canopy=fifesim.Canopy(leaf_optics=LEAF, background=DARK, leaf_angles="45: 1")
-        ),
-        "soil": fifesim.CoverClass(lai=0, canopy=fifesim.Canopy(leaf_optics=LEAF, background=SOIL)),
-    }
+    dense = fifesim.Canopy(leaf_optics=LEAF, background=DARK, leaf_angles="45: 1")
+    soil = fifesim.CoverClass(lai=0, canopy=fifesim.Canopy(leaf_optics=LEAF, background=SOIL))
+    table = {"canopy": fifesim.CoverClass(lai=DENSE, canopy=dense), "soil": soil}
     return fifesim.landscape(grid, cover=labelled(grid, codes).drop_attrs(deep=False), classes=table)
 
 
@@ -202,47 +198,36 @@ def test_fpar_depends_on_the_leaf_angles_of_the_class(land):
     xr.testing.assert_identical(land[["lai"]].fifesim.fpar(), land.lai.fifesim.fpar())
 
 
-DEAD = fifesim.Canopy(brown=0.4, dissociation=0.5, crown_cover=0.7, crown_shape=0.5)
-
-
-def test_dead_leaves_and_crowns_can_be_set_by_class(site, land):
+def test_dead_leaves_and_crowns_can_be_set_by_class(site, land, rho):
     """The class is identical to a scene of this class alone, and other classes are unchanged."""
-    canopy = DEAD.replace(brown_leaf={"TM3": (0.3, 0.1), "TM4": (0.4, 0.3)})
-    table = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed", canopy=canopy)}
-    scene = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=table, seed=7)
-    made = scene.fifesim.surface_reflectance("TM", bands=TM34)
-    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=canopy)
-    grass = (land.cover == 1).values
-    np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
-    others = land.fifesim.surface_reflectance("TM", bands=TM34)
-    np.testing.assert_array_equal(made.values[:, ~grass], others.values[:, ~grass])
-    green = scene.fifesim.fpar(leaves="green")
+    canopy = fifesim.Canopy(
+        brown=0.4, dissociation=0.5, crown_cover=0.7, crown_shape=0.5, brown_leaf={"TM3": (0.3, 0.1), "TM4": (0.4, 0.3)}
+    )
+    scene = landscape_of(site, fifesim.CoverClass(lai="burned-grazed", canopy=canopy))
+    check_grass(land, seen(scene), seen(scene.lai, canopy), rho)
     expected = fpar_of_green_leaves(scene.lai.values, fifesim.fife_geometry().sza, 0.4, 0.5, 0.7, 0.94)
-    np.testing.assert_allclose(green.values[grass], expected[grass], rtol=1e-12)
+    grass = (land.cover == 1).values
+    np.testing.assert_allclose(scene.fifesim.fpar(leaves="green").values[grass], expected[grass], rtol=1e-12)
 
 
 def test_variables_of_a_landscape_override_its_classes(site, land):
     brown = (land.lai / 5).drop_attrs(deep=False).rename("brown")
-    table = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed", canopy=fifesim.Canopy(brown=0.9))}
-    scene = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=table, seed=7, brown=brown)
-    made = scene.fifesim.surface_reflectance("TM", bands=TM34)
-    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(brown=scene.brown))
-    grass = (land.cover == 1).values
-    np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
-    with pytest.raises(ValueError, match="brown is given and also a variable of the landscape"):
-        scene.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(brown=0.1))
-    number = fifesim.landscape(site, lai=land.lai, brown=0.3).fifesim.surface_reflectance("TM", bands=TM34)
-    xr.testing.assert_equal(
-        number, land.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(brown=0.3))
+    scene = landscape_of(site, fifesim.CoverClass(lai="burned-grazed", canopy=fifesim.Canopy(brown=0.9)), brown=brown)
+    made, grass = seen(scene), (land.cover == 1).values
+    np.testing.assert_array_equal(
+        made.values[:, grass], seen(scene.lai, fifesim.Canopy(brown=scene.brown)).values[:, grass]
     )
+    with pytest.raises(ValueError, match="brown is given and also a variable of the landscape"):
+        seen(scene, fifesim.Canopy(brown=0.1))
+    number = seen(fifesim.landscape(site, lai=land.lai, brown=0.3))
+    xr.testing.assert_equal(number, seen(land.lai, fifesim.Canopy(brown=0.3)))
 
 
 def test_landscape_of_several_dates_is_computed_by_date(land, rho):
     days = xr.Variable("time", np.array(["1987-06-06T16:35", "1987-07-06T16:35"], "M8[ns]"))
     season = land.assign(lai=xr.concat([land.lai, 1.2 * land.lai], dim=days, combine_attrs="override"))
-    made = season.fifesim.surface_reflectance("TM", bands=TM34)
+    made = seen(season)
     assert made.dims[0] == "time" and made.sza.dims == ("time",)
-    second = season.isel(time=1).fifesim.surface_reflectance("TM", bands=TM34)
-    np.testing.assert_array_equal(made[1], second)
+    np.testing.assert_array_equal(made[1], seen(season.isel(time=1)))
     means = season.fifesim.aggregate(30)
     assert means.lai.dims == ("time", "y", "x") and means.class_share.dims == ("class", "y", "x")

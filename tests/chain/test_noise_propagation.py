@@ -6,6 +6,7 @@ import xarray as xr
 from lazy import check_raster_function
 
 import fifesim
+from fifesim.grids import directions
 
 MODEL = fifesim.NoiseModel(0.5, 0.006, detectors=100, gain_spread=0.004, offset_spread=0.2)
 RED, NEAR_INFRARED = (0.02, 0.05, 0.1, 0.2, 0.3), (0.5, 0.4, 0.3, 0.3, 0.32)
@@ -20,22 +21,11 @@ def toa():
     values = np.broadcast_to(stripes[:, None], (2, 100, 100))
     place = fifesim.lai_scene(grid, seed=7)
     raster = xr.DataArray(values, dims=("band", "y", "x"), coords=place.coords | {"band": ["OLI4", "OLI5"]})
-    raster = raster.assign_coords(fifesim_coordinates(place)).assign_attrs(units="1", site="FIFE")
     raster.encoding = place.encoding
-    return raster
+    return directions.with_geometry(raster.assign_attrs(units="1", site="FIFE"), fifesim.fife_geometry())
 
 
-def fifesim_coordinates(place):
-    sun = fifesim.fife_geometry()
-    return {"sza": sun.sza, "saa": sun.saa, "vza": 0.0, "vaa": 0.0, "earth_sun_distance": sun.earth_sun_distance}
-
-
-def value(image, quantity):
-    return {
-        "radiance": image.fifesim.to_radiance,
-        "reflectance": image.fifesim.to_reflectance,
-        "ndvi": image.fifesim.ndvi,
-    }[quantity]()
+METHODS = {"radiance": "to_radiance", "reflectance": "to_reflectance", "ndvi": "ndvi"}
 
 
 @pytest.mark.parametrize("quantity", ["radiance", "reflectance", "ndvi"])
@@ -54,23 +44,16 @@ def test_propagated_noise_agrees_with_many_images(toa, quantity, model):
     for seed in range(20):
         image = toa.fifesim.sense("OLI", noise="all", seed=seed, **options)
         exact = toa.fifesim.sense("OLI", quantise=False)
-        expected = exact if quantity == "radiance" else value_of_radiance(exact, quantity)
-        squares.append(((value(image, quantity) - expected) / std) ** 2)
+        found = getattr(image.fifesim, METHODS[quantity])()
+        expected = exact if quantity == "radiance" else getattr(exact.fifesim, METHODS[quantity])()
+        squares.append(((found - expected) / std) ** 2)
     mean = xr.concat(squares, "seed").coarsen(x=20).mean().mean(["seed", "y"])
     np.testing.assert_allclose(np.sqrt(mean), 1, atol=0.02)
 
 
-def value_of_radiance(radiance, quantity):
-    return radiance.fifesim.to_reflectance() if quantity == "reflectance" else radiance.fifesim.ndvi()
-
-
 def test_noise_std_is_a_raster_function(toa):
     image = toa.fifesim.sense("OLI")
-    for quantity, name in (
-        ("radiance", "toa_radiance_std"),
-        ("reflectance", "toa_reflectance_std"),
-        ("ndvi", "ndvi_std"),
-    ):
+    for quantity, name in zip(METHODS, ("toa_radiance_std", "toa_reflectance_std", "ndvi_std"), strict=True):
         found = check_raster_function(lambda each, what=quantity: each.fifesim.noise_std(what), image, quantity=name)
         assert found.attrs["history"].splitlines()[-1].startswith(f"noise_std: {quantity}, OLI, ")
         assert found.dims == (("y", "x") if quantity == "ndvi" else ("band", "y", "x"))
@@ -79,9 +62,8 @@ def test_noise_std_is_a_raster_function(toa):
 def test_missing_pixel_affects_only_its_cell_and_band(toa):
     image = toa.fifesim.sense(fifesim.instrument("OLI", "detector")).copy(deep=True)
     image[0, 5, 6] = 0
-    assert np.argwhere(np.isnan(image.fifesim.noise_std("radiance").values)).tolist() == [[0, 5, 6]]
-    assert np.argwhere(np.isnan(image.fifesim.noise_std("reflectance").values)).tolist() == [[0, 5, 6]]
-    assert np.argwhere(np.isnan(image.fifesim.noise_std().values)).tolist() == [[5, 6]]
+    for quantity, place in (("radiance", [0, 5, 6]), ("reflectance", [0, 5, 6]), ("ndvi", [5, 6])):
+        assert np.argwhere(np.isnan(image.fifesim.noise_std(quantity).values)).tolist() == [place]
 
 
 def test_radiance_reflectance_and_digital_numbers_agree(toa):
@@ -97,11 +79,9 @@ def test_radiance_reflectance_and_digital_numbers_agree(toa):
 
 def test_kinds_of_noise_add_up_in_variance(toa):
     radiance = toa.fifesim.sense("OLI", quantise=False)
-    parts = [
-        radiance.fifesim.noise_std(noise=kind, noise_models=MODEL) for kind in ("shot", "thermal", "fixed-pattern")
-    ]
-    whole = radiance.fifesim.noise_std(noise_models=MODEL)
-    np.testing.assert_allclose(sum(part**2 for part in parts), whole**2, rtol=1e-12)
+    kinds, whole = ("shot", "thermal", "fixed-pattern"), radiance.fifesim.noise_std(noise_models=MODEL)
+    parts = sum(radiance.fifesim.noise_std(noise=kind, noise_models=MODEL) ** 2 for kind in kinds)
+    np.testing.assert_allclose(parts, whole**2, rtol=1e-12)
     assert float(radiance.fifesim.noise_std(noise=()).max()) == 0
 
 
@@ -132,11 +112,7 @@ def test_square_root_scale_has_increasing_steps(toa):
         (lambda image: image, {"quantity": "evi"}, "quantity"),
         (lambda image: image.drop_vars("sza"), {}, "carries no sza"),
         (lambda image: image.isel(band=[1]), {}, "no red band"),
-        (
-            lambda image: image,
-            {"noise": "shot", "noise_models": fifesim.NoiseModel(0.5, 0.0)},
-            "has no shot noise for OLI5",
-        ),
+        (lambda image: image, {"noise": "shot", "noise_models": fifesim.NoiseModel(0.5, 0)}, "no shot noise for OLI5"),
         (lambda image: image.fifesim.ndvi(), {}, "NDVI|reflectance"),
         (lambda image: image.fifesim.to_reflectance().fifesim.to_surface(), {}, "to_toa"),
     ],

@@ -7,7 +7,7 @@ from lazy import no_compute
 
 import fifesim
 from fifesim.atmosphere import engines
-from fifesim.base.geometry import Geometry
+from fifesim.chain.steps import kt_and_reflectance
 from fifesim.grids import directions
 from fifesim.grids import grid as grids
 from fifesim.ground.canopy import optics
@@ -67,19 +67,14 @@ def test_skylight_of_the_atmosphere_reaches_the_ground(lai):
 
 
 def test_background_is_a_number_a_mapping_or_a_raster(lai):
-    number, mapping = (
-        lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=value))
-        for value in (0.2, {"TM3": 0.2, "TM4": 0.2})
-    )
+    def over(background, **options):
+        canopy = fifesim.Canopy(background=background)
+        return lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=canopy, **options)
+
     raster = xr.full_like(lai, 0.2)
-    np.testing.assert_array_equal(number, mapping)
-    from_raster = lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=raster))
-    np.testing.assert_allclose(from_raster, number, rtol=0, atol=1e-6)
-    exact = [
-        lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=value), exact=True)
-        for value in (0.2, raster)
-    ]
-    np.testing.assert_allclose(exact[0], exact[1], rtol=1e-12)
+    np.testing.assert_array_equal(over(0.2), over({"TM3": 0.2, "TM4": 0.2}))
+    np.testing.assert_allclose(over(raster), over(0.2), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(over(raster, exact=True), over(0.2, exact=True), rtol=1e-12)
 
 
 def test_to_surface_inverts_to_toa(whole):
@@ -104,36 +99,64 @@ def test_gap_in_the_ground_is_no_data_in_the_image(lai):
     np.testing.assert_array_equal(np.isnan(image.fifesim.ndvi()), holes[0])
 
 
-@pytest.mark.parametrize(
-    "options, message",
-    [
-        (
-            {"horizon": xr.DataArray(np.zeros((16, 2, 2)), dims=("direction", "y", "x"))},
-            "a horizon needs an elevation",
-        ),
-        ({"instrument": "TN"}, "TM"),
-        ({"bands": ["TM33"]}, "TM3"),
-    ],
-)
-def test_impossible_ground_is_refused(lai, options, message):
-    with pytest.raises(ValueError, match=message):
-        fifesim.surface_reflectance(lai, **({"bands": TM34} | options))
+def test_impossible_ground_is_refused(lai):
+    with pytest.raises(ValueError, match="a horizon needs an elevation"):
+        horizon = xr.DataArray(np.zeros((16, 2, 2)), dims=("direction", "y", "x"))
+        fifesim.surface_reflectance(lai, bands=TM34, horizon=horizon)
+    with pytest.raises(ValueError, match="background"):
+        fifesim.surface_reflectance(lai, bands=TM34, canopy=fifesim.Canopy(background=-0.1))
+    for dem, slopes in ((None, "uprigt"), (fifesim.flint_hills(grids.geobox(lai), seed=7), "Upright")):
+        with pytest.raises(ValueError, match=f"slopes must be 'kt' or 'upright', got '{slopes}'"):
+            fifesim.surface_reflectance(lai, bands=TM34, dem=dem, slopes=slopes)
 
 
-@pytest.mark.parametrize(
-    "field, message",
-    [
-        ({"leaf_optics": {"TM3": (0.8, 0.3), "TM4": (0.5, 0.4)}}, "TM3|sum|1"),
-        ({"background": -0.1}, "background|0"),
-        ({"leaf_angles": "sphere"}, "spherical"),
-        ({"hotspot": -1}, "hotspot"),
-    ],
-)
-def test_impossible_canopy_is_refused(lai, field, message):
-    with pytest.raises(ValueError, match=message):
-        fifesim.surface_reflectance(lai, bands=TM34, canopy=fifesim.Canopy(**field))
+def test_indices_are_from_planetary_reflectance(whole):
+    rho = whole["image"].fifesim.to_reflectance()
+    red, nir = rho.sel(band="TM3").values, rho.sel(band="TM4").values
+    np.testing.assert_array_equal(whole["ndvi"], (nir - red) / (nir + red))
+    for image in (whole["image"].fifesim.to_radiance(), rho):
+        np.testing.assert_array_equal(image.fifesim.ndvi(), whole["ndvi"])
+    np.testing.assert_array_equal(whole["image"].fifesim.index("EVI2"), 2.5 * (nir - red) / (nir + 2.4 * red + 1))
+    np.testing.assert_array_equal(whole["image"].fifesim.index("NDVI"), whole["ndvi"])
 
 
-def test_low_sun_is_refused_by_the_atmosphere(lai):
-    with pytest.raises(ValueError, match=r"sza.*89"):
-        fifesim.surface_reflectance(lai, geometry=Geometry(89.0, 100.0))
+def test_band_names_that_contradict_wavelengths_are_rejected():
+    """Swapped wavelengths of TM3 and TM4 would change the sign. Bands with other names may have any wavelength."""
+    values = np.stack([np.full((4, 4), 0.06), np.full((4, 4), 0.30)])
+    rho = xr.DataArray(values, dims=("band", "y", "x"), coords={"wavelength": ("band", [0.83, 0.66])})
+    rho = rho.assign_coords(x=705000 + 30.0 * np.arange(4), y=4334000 - 30.0 * np.arange(4)).rio.write_crs(26914)
+    for index in (fifesim.ndvi, lambda each: fifesim.index(each, "NDVI")):
+        with pytest.raises(ValueError, match=r"band TM3 has the wavelength 0.83 um, .*contradict each other"):
+            index(rho.assign_coords(band=["TM3", "TM4"]))
+    assert float(fifesim.ndvi(rho.assign_coords(band=["first", "second"])).mean()) < 0
+    right = rho.assign_coords(band=["TM3", "TM4"], wavelength=("band", [0.66, 0.83]))
+    assert float(fifesim.ndvi(right).mean()) > 0
+
+
+def test_reflectance_and_kt_share_the_sky_view_in_the_graph(lai):
+    """Reflectance on slopes and Kt share all layers of the graph except the last layer of each."""
+    grid = grids.geobox(lai)
+    lai, dem = lai.chunk({"y": 20, "x": 30}), fifesim.flint_hills(grid, seed=7, chunks=25)
+    level, slopes = (lai.fifesim.surface_reflectance("TM", bands=["TM4"], dem=each) for each in (None, dem))
+    own = set(level.fifesim.kt(dem).data.dask.layers) - set(slopes.data.dask.layers)
+    assert len(own) == 1, own
+
+
+def test_kt_warns_if_elevation_and_atmosphere_altitude_differ(lai):
+    """Reflectance on the same slopes warns too."""
+    level = lai.fifesim.surface_reflectance("TM", bands=["TM4"])
+    dem = fifesim.flint_hills(grids.geobox(lai), seed=7)
+    with pytest.warns(UserWarning, match="beside an altitude of the atmosphere of 0.4 km"):
+        level.fifesim.kt(dem + 2000.0)
+
+
+@pytest.mark.parametrize("upwelling", [True, False])
+def test_one_pass_equals_both_steps(lai, upwelling):
+    """Labels are equal too, and the results are lazy."""
+    dem = fifesim.flint_hills(grids.geobox(lai), seed=7)
+    level = fifesim.surface_reflectance(lai.chunk(20), bands=TM34)
+    found = kt_and_reflectance(level, dem, upwelling=upwelling)
+    on_slopes = fifesim.surface_reflectance(lai, bands=TM34, dem=dem, upwelling=upwelling)
+    for one, other in zip(found, (level.fifesim.kt(dem), on_slopes), strict=True):
+        assert one.chunks is not None
+        xr.testing.assert_identical(one.compute(), other.compute())
