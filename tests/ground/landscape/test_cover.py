@@ -62,11 +62,9 @@ def test_neighbouring_levels_differ_by_one_class():
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        (("hexagons", 100), "the pattern of patches is one of voronoi, levels, pastures, got 'hexagons'"),
         (("voronoi", 0), "a number above 0, in metres, got 0"),
         (("voronoi", "300 m"), "a number above 0, in metres, got '300 m'"),
         (("voronoi", 300, (0.5, 0.4)), r"must sum to 1, got 0.9 of 0.5, 0.4"),
-        (("voronoi", 300, {"a": 1.5, "b": -0.5}), r"the share of a class is in \[0, 1\], got 1.5"),
     ],
 )
 def test_impossible_patches_are_refused(arguments, message):

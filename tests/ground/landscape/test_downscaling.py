@@ -173,9 +173,8 @@ def test_means_outside_the_distribution_are_refused(mean):
     kriging, transform, deviation = of_distribution(0.15, "burned-ungrazed")
     pixels = np.full(SHAPE, 1.5)
     pixels[3, 4] = mean
-    with pytest.raises(
-        ValueError, match=rf"mean LAI {mean}, which cells .* from 0.475 to 2.345 cannot have: give .* cv="
-    ):
+    said = rf"mean LAI {mean}, which cells .* from 0.475 to 2.345 cannot have: give .* cv="
+    with pytest.raises(ValueError, match=said):
         downscaled(pixels, np.zeros(CELLS), kriging, transform, deviation)
 
 

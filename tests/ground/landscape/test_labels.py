@@ -100,10 +100,9 @@ def test_landscapes_have_the_same_bits_in_windows_and_chunks(grid, hills, land, 
     for name in land:
         xr.testing.assert_identical(found[name], land[name])
     part = make(grid[WINDOW], hills[WINDOW], reference={"elevation": hills})
+    lazy_hills = {"elevation": in_chunks(hills, {"y": 50})}
     with no_compute():
-        lazy_part = make(
-            grid[WINDOW], hills[WINDOW], reference={"elevation": in_chunks(hills, {"y": 50})}, chunks=33
-        )  # fmt: skip
+        lazy_part = make(grid[WINDOW], hills[WINDOW], reference=lazy_hills, chunks=33)
     for name in land:
         np.testing.assert_array_equal(part[name], land[name][WINDOW], err_msg=name)
         np.testing.assert_array_equal(lazy_part[name], land[name][WINDOW], err_msg=name)
@@ -127,17 +126,11 @@ def test_numbers_and_rasters_replace_fields(grid, make, land):
         ({"brown": Field(mean=0.2, sd=0.5)}, ValueError, "brown lies between 0 and 1: with a mean of 0.2"),
         ({"moisture": Field(sd=0.1)}, ValueError, "moisture lies between 0 and 1"),
         ({"soil": 0.02}, ValueError, "soil"),
-        ({"dem": None}, ValueError, r"covary names elevation, .* give dem="),
         ({"covary": {"soil": -0.9, "brown": 0.9}}, ValueError, "lai-soil -0.9, lai-brown 0.9 cannot be"),
-        ({"covary": {"soil": 1.5}}, ValueError, r"must be in \[-1, 1\], got 1.5"),
         ({"reference": {}}, ValueError, "reference has no 'elevation'"),
         ({"soil": "none.tif", "covary": None}, ValueError, "cannot read none.tif as a raster"),
         ({"moisture": 1.2, "covary": None}, ValueError, r"moisture must be in \[0, 1\], got 1.2"),
-        (
-            {"moisture": [0.2]},
-            TypeError,
-            "moisture must be a number, .*Field, the path of a raster or an xarray.DataArray",
-        ),
+        ({"moisture": [0.2]}, TypeError, "moisture must be a number, .*Field, the path of a raster or an xarray"),
     ],
 )
 def test_impossible_properties_are_refused_with_a_short_message(make, changes, error, message):
