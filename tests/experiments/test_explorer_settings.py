@@ -25,24 +25,16 @@ def test_default_is_the_paper_with_arp_0_24_on_flat_ground():
 
 
 def test_sliders_have_the_values_of_the_scenario():
-    own = FLAT | {
-        "grid": SITE,
-        "ground": {"arp": 0.2},
-        "atmosphere": {"visibility": 30.0},
-        "geometry": {"sza": 33.0, "saa": 90.0},
-    }
+    own = FLAT | {"grid": SITE, "ground": {"arp": 0.2}, "geometry": {"sza": 33.0, "saa": 90.0}}
+    own |= {"atmosphere": {"visibility": 30.0}}
     sweep = sweep_of(parse_scenario(own | {"sensor": {"instrument": "OLI", "offset": [0.3, 0.4]}}))
     assert sweep.arps == (0.15, 0.2, 0.249) and sweep.hazes == (10.0, 30.0, 45.0) and sweep.szas == (20.0, 33.0, 60.0)
     assert "OLI" in sweep.instruments and (0.3, 0.4) in sweep.offsets and len(sweep.offsets) == 4
 
 
 def test_setting_changes_only_its_values_of_the_scenario(small):
-    sweep = sweep_of(
-        parse_scenario(
-            small.model_dump(exclude_unset=True)
-            | {"sensor": {"instrument": "L4TM", "noise": ["thermal"], "min_valid": 0.9}}
-        )
-    )
+    sensor = {"sensor": {"instrument": "L4TM", "noise": ["thermal"], "min_valid": 0.9}}
+    sweep = sweep_of(parse_scenario(small.model_dump(exclude_unset=True) | sensor))
     own = sweep.at(Setting(0.249, 10.0, 60.0, "L4TM"), (0.0, 0.5))
     assert (own.ground.arp, own.atmosphere.visibility, own.sensor.offset) == (0.249, 10.0, [0.0, 0.5])
     assert own.sun_and_view().sza == 60.0 and own.sun_and_view().saa == sweep.scenario.sun_and_view().saa
@@ -61,14 +53,10 @@ def test_instruments_fit_the_ground_and_its_cells(small):
 
 
 def test_maps_have_no_arp_slider_and_clear_air_no_haze_slider(tmp_path):
-    lai = fifesim.lai_scene(
-        fifesim.grid_at("EPSG:26914", 707970.0, 4331220.0, 400.0, 400.0, 10.0), "burned-grazed", arp=0.24, seed=1
-    )
-    path = tmp_path / "lai.tif"
-    lai.fifesim.to_geotiff(path)
-    own = parse_scenario(
-        FLAT | {"ground": {"lai_file": str(path)}, "grid": {"cell": 10.0}, "atmosphere": {"aerosol": "none"}}
-    )
+    grid, path = fifesim.grid_at("EPSG:26914", 707970.0, 4331220.0, 400.0, 400.0, 10.0), tmp_path / "lai.tif"
+    fifesim.lai_scene(grid, "burned-grazed", arp=0.24, seed=1).fifesim.to_geotiff(path)
+    ground = {"ground": {"lai_file": str(path)}, "grid": {"cell": 10.0}}
+    own = parse_scenario(FLAT | ground | {"atmosphere": {"aerosol": "none"}})
     sweep = sweep_of(own)
     assert sweep.arps == (None,) and sweep.hazes == (None,)
     np.testing.assert_array_equal(sweep.at(sweep.settings[0]).ground.arp, own.ground.arp)
@@ -76,10 +64,8 @@ def test_maps_have_no_arp_slider_and_clear_air_no_haze_slider(tmp_path):
 
 def test_landscape_with_many_stages_has_fewer_settings():
     sweep = sweep_of(fifesim.default_scenario())
-    assert sweep.shape == (3, 2, 2, 2, 4)
+    assert sweep.shape == (3, 2, 2, 2, 4) and sweep_of(fifesim.Scenario()).shape == (3, 3, 3, 4, 4)
     assert sweep.hazes == (10.0, 45.0) and sweep.szas[1] == 60.0 and sweep.instruments == ("MSI", "TM")
-    hills = sweep_of(fifesim.Scenario())
-    assert hills.shape == (3, 3, 3, 4, 4)
 
 
 def test_ground_and_atmosphere_limit_the_sliders(small):

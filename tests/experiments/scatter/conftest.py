@@ -2,6 +2,7 @@
 
 import pytest
 
+import fifesim
 from fifesim.scenario.scenario import parse_scenario
 
 GRID = {"west": 707970.0, "north": 4331220.0, "width": 420.0, "height": 360.0}
@@ -9,9 +10,8 @@ GRID = {"west": 707970.0, "north": 4331220.0, "width": 420.0, "height": 360.0}
 
 def scenario_of(sensor=None, dem="flat", **ground):
     terrain = {"dem": dem} | ({} if dem == "flat" else {"horizon_reach": 300})
-    return parse_scenario(
-        {"grid": GRID, "sensor": sensor or {"response": "paper"}, "terrain": terrain, "ground": ground}
-    )
+    sections = {"grid": GRID, "sensor": sensor or {"response": "paper"}, "terrain": terrain}
+    return parse_scenario(sections | {"ground": ground})
 
 
 @pytest.fixture(scope="session")
@@ -25,3 +25,11 @@ def rough(scenario):
     """A scenario in which every stage has an effect."""
     sensor = {"instrument": "L4TM", "interval": "native", "offset": [0.1, 0.0], "noise": ["thermal"]}
     return scenario(sensor, dem="flint-hills")
+
+
+@pytest.fixture(scope="session")
+def retrieval():
+    """Line of LAI on reflectance, trained with ten chips."""
+    chip = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
+    study = fifesim.Study(chip, {"visibility": {"uniform": [20, 60]}}, landscapes=10)
+    return fifesim.train(study, "line", chips=10)

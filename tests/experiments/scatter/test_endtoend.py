@@ -14,6 +14,9 @@ SECTIONS = {"grid": SQUARE, "terrain": {"dem": "flat"}, "sensor": {"offset": [0.
 
 def test_report_has_the_numbers_of_the_budget(tmp_path):
     scenario = fifesim.Scenario(**SECTIONS)
+    with pytest.raises(ValueError, match="quantity must be"):
+        endtoend.endtoend_to_folder(scenario, tmp_path / "out", quantity="yield")
+    assert not (tmp_path / "out").exists()
     files = endtoend.endtoend_to_folder(scenario, tmp_path / "out", realisations=2)
     assert [path.name for path in files] == list(endtoend.ENDTOEND_FILES)
     table = pd.read_csv(tmp_path / "out" / "budget.csv").set_index("stage")
@@ -31,10 +34,7 @@ def test_report_has_the_numbers_of_the_budget(tmp_path):
     assert fifesim.read_scenario(tmp_path / "out" / "scenario.toml").sensor.offset == [0.3, 0.0]
 
 
-def test_maps_show_the_retrieval_and_the_width_of_its_interval():
-    chip = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
-    study = fifesim.Study(chip, {"visibility": {"uniform": [20, 60]}}, landscapes=10)
-    retrieval = fifesim.train(study, "line", chips=10)
+def test_maps_show_the_retrieval_and_the_width_of_its_interval(retrieval):
     (case,) = budget_cases(fifesim.Scenario(**SECTIONS), realisations=1, cells=333)
     run = fifesim.simulate(case)
     image, truth = run["image"]["dn"], run["truth"]["lai"]
@@ -48,9 +48,3 @@ def test_maps_show_the_retrieval_and_the_width_of_its_interval():
     figure = endtoend.map_figure(case, errors.target_of("photosynthesis"), retrieval)
     titles = [axis.get_title() for axis in figure.axes if axis.get_title()]
     assert titles[0].startswith("1. Truth: GPP of cells of 3.33 m [g m-2 d-1]") and len(titles) == 6
-
-
-def test_unknown_quantity_writes_nothing(tmp_path):
-    with pytest.raises(ValueError, match="quantity must be"):
-        endtoend.endtoend_to_folder(fifesim.Scenario(**SECTIONS), tmp_path / "out", quantity="yield")
-    assert not (tmp_path / "out").exists()

@@ -25,13 +25,10 @@ ALL = {
     },
     "classes": {
         "grass": {"background_spectra": {"soil_dry": 0.5, "shade": 0.5}},
-        "litter": {
-            "background_spectra": {"dead_grass": 0.6, "shade": 0.4},
-            "distribution": "unburned-ungrazed",
-            "leaf_angles": "planophile",
-        },
+        "litter": {"background_spectra": {"dead_grass": 0.6, "shade": 0.4}, "distribution": "unburned-ungrazed"},
     },
 }
+ALL["classes"]["litter"]["leaf_angles"] = "planophile"
 
 
 def case_of(**sections):

@@ -156,24 +156,12 @@ def test_tangent_has_the_value_and_slope_of_the_curve_at_the_middle():
     assert np.ptp(np.diff(found.ravel()) / np.diff(lai.ravel())) < 1e-10
 
 
-IDEAL = ((False,), (False,), (False,), (False,), (False,))
-
-
-@pytest.fixture(scope="module")
-def scene():
-    return scene_of(
-        Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"}, sensor={"offset": [0.0, 1.0]})
-    )
-
-
-@pytest.fixture(scope="module")
-def cells(scene):
-    red, nir = np.random.default_rng(2).uniform([[[0.04]], [[0.2]]], [[[0.1]], [[0.4]]], (2, 90, 90))
-    return np.stack([red, nir, (nir - red) / (nir + red)])
-
-
-def test_quantisation_changes_ndvi_of_cells_and_of_means_alike(scene, cells):
+def test_quantisation_changes_ndvi_of_cells_and_of_means_alike():
     """The quantisation error is the same for NDVI of cells and of means, and at most one or two counts."""
+    sections = {"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}, "sensor": {"offset": [0.0, 1.0]}}
+    scene = scene_of(Scenario(**sections))
+    red, nir = np.random.default_rng(2).uniform([[[0.04]], [[0.2]]], [[[0.1]], [[0.4]]], (2, 90, 90))
+    cells = np.stack([red, nir, (nir - red) / (nir + red)])
     found = images_of(scene, cells, ((False, True), (False,), (False,), (False, True), (False,)))[:, 0, 0, :, 0]
     steps = found[:, 1] - found[:, 0]
     np.testing.assert_allclose(steps[0], steps[1], atol=1e-12)
@@ -191,15 +179,13 @@ def land():
     return lai.copy(data=np.arange(49.0).reshape(7, 7))
 
 
-def test_cells_of_a_block_have_the_block_mean(land):
+def test_cells_of_a_block_have_the_block_mean_and_blocks_without_a_mean_keep_their_cells(land):
+    """Cells without data stay missing."""
     found = spread_out(land, BLOCKS, 0.98).values
     expected = [[8.0, 11.0], [29.0, 32.0]]
     np.testing.assert_array_equal(found[:6, :6], np.kron(expected, np.ones((3, 3))))
     np.testing.assert_array_equal(found[6], land.values[6])
     np.testing.assert_array_equal(found[:, 6], land.values[:, 6])
-
-
-def test_cells_without_data_stay_missing_and_blocks_without_a_mean_keep_their_cells(land):
     land[0, 0] = np.nan
     found = spread_out(land, BLOCKS, 0.98).values
     np.testing.assert_array_equal(found[:3, :3], land.values[:3, :3])
