@@ -1,5 +1,6 @@
 """Models of production, evaporation and albedo against tables from other programs, quadrature and limits."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,10 @@ from fifesim.models.radiation import two_stream
 DATA = Path(__file__).parents[1] / "data"
 
 
+reference = evaporation.reference_evapotranspiration
+penman = partial(evaporation.penman_monteith, fpar=0.7, rn=600.0, tmin_k=280.0)
+
+
 def mod17(table):
     return {
         "tmin_scalar": production.ramp(table["tmin_c"], *production.TMIN_RAMP),
@@ -26,12 +31,11 @@ def given(table, names):
     return [table[name].to_numpy() for name in names.split()]
 
 
-def of_fields(function, names):
+def of_fields(function, names, column=None):
+    """Function of a table, whose result is a column or a tuple of named columns."""
+    if column:
+        return lambda table: {column: function(*given(table, names))}
     return lambda table: function(*given(table, names))._asdict()
-
-
-def of_column(function, column, names):
-    return lambda table: {column: function(*given(table, names))}
 
 
 # Function that computes the columns of each table.
@@ -40,14 +44,10 @@ TABLES = {
     "penman_monteith": of_fields(evaporation.penman_monteith, "ta_k rh_percent pressure_pa lai fpar rn tmin_k"),
     "pt_jpl": of_fields(evaporation.pt_jpl, "ta_k rh_percent pressure_pa ndvi fapar_max lai rn g"),
     "sellers_two_stream": of_fields(two_stream, "leaf_reflectance leaf_transmittance chi sza lai ground"),
-    "canopy_photosynthesis": of_column(
-        canopy_photosynthesis, "canopy_quadrature", "lai extinction par quantum_yield p_max"
+    "canopy_photosynthesis": of_fields(
+        canopy_photosynthesis, "lai extinction par quantum_yield p_max", "canopy_quadrature"
     ),
-    "reference_et_daily": of_column(
-        evaporation.reference_evapotranspiration,
-        "eto_asce",
-        "tmin tmax ea_kpa rs_mj u2 elevation latitude day_of_year",
-    ),
+    "reference_et_daily": of_fields(reference, "tmin tmax ea_kpa rs_mj u2 elevation latitude day_of_year", "eto_asce"),
 }
 
 
@@ -68,14 +68,14 @@ def test_reference_evapotranspiration_agrees_with_refet_and_fao_56():
     day = (low, low + random.uniform(3, 15, 200), random.uniform(0.2, 1.5, 200), random.uniform(3, 30, 200),
            random.uniform(0.3, 6, 200), random.uniform(0, 2000, 200), random.uniform(-60, 70, 200),
            random.integers(1, 366, 200))  # fmt: skip
-    made = evaporation.reference_evapotranspiration(*day, wind_height=10.0)
+    made = reference(*day, wind_height=10.0)
     tmin, tmax, ea, rs, wind, elevation, latitude, number = day
     expected = refet.Daily(
         tmin=tmin, tmax=tmax, ea=ea, rs=rs, uz=wind, zw=10.0, elev=elevation, lat=latitude, doy=number
     ).eto()
     np.testing.assert_allclose(made, expected, rtol=1e-6)
     # Example 18 of FAO-56.
-    uccle = evaporation.reference_evapotranspiration(12.3, 21.5, 1.409, 22.07, 2.078, 100.0, 50.8, 187)
+    uccle = reference(12.3, 21.5, 1.409, 22.07, 2.078, 100.0, 50.8, 187)
     assert abs(uccle - 3.9) < 0.1
 
 
@@ -132,8 +132,6 @@ def test_conductance_agrees_with_quadrature_over_leaves():
     # SiB2 multiplies the uppermost leaf by intercepted light over extinction.
     sib2 = evaporation.canopy_conductance(4.0, 900.0, 290.15, 1200.0, **options, integral="sib2")
     assert np.isclose(sib2, leaf(0) * (1 - np.exp(-2.4)) / 0.6, rtol=1e-12)
-    with pytest.raises(ValueError, match="integral must be 'leaves' or 'sib2'"):
-        evaporation.canopy_conductance(4.0, 900.0, 290.15, 1200.0, integral="leaf")
 
 
 def test_two_stream_is_continuous_where_printed_solutions_divide_by_zero():
@@ -163,33 +161,22 @@ def test_missing_cells_stay_missing_and_bare_ground_has_no_flux():
 
 
 @pytest.mark.parametrize(
-    "call, message",
+    ("call", "message"),
     [
-        (
-            lambda: evaporation.latent_heat(-3.0),
-            r"ta_k must be in \[150, 350\] K, got -3: degC was given for K: add 27",
-        ),
+        (lambda: evaporation.latent_heat(-3.0), r"ta_k .* \[150, 350\] K, got -3: degC was given for K: add 27"),
         (lambda: evaporation.saturation_pressure([290.0, np.nan, 25.0]), "ta_k must be in .* got 25"),
-        (
-            lambda: evaporation.penman_monteith(290.0, 120.0, 95e3, 2.0, 0.7, 600.0, 280.0),
-            r"rh_percent must be in \[0, 100\] %, got 120: air that holds more water is fog",
-        ),
-        (lambda: evaporation.penman_monteith(290.0, 50.0, 950.0, 2.0, 0.7, 600.0, 280.0), "pressure_pa .* got 950"),
+        (lambda: penman(290.0, 120.0, 95e3, 2.0), r"rh_percent .* \[0, 100\] %, got 120: air that holds more water is"),
+        (lambda: penman(290.0, 50.0, 950.0, 2.0), "pressure_pa .* got 950"),
         (lambda: evaporation.pt_jpl(290.0, 50.0, 95e3, 8500.0, 0.9, 1.2, 500.0, 50.0), "ndvi .* got 8500: .*scaled"),
         (
-            lambda: evaporation.reference_evapotranspiration(285.0, 295.0, 1.4, 22.0, 2.0, 100.0, 50.0, 187),
-            "tmin must be in .* degC, got 285: K was given for degC",
+            lambda: reference(285.0, 295.0, 1.4, 22.0, 2.0, 100.0, 50.0, 187),
+            "tmin .* degC, got 285: K was given for deg",
         ),
         (lambda: evaporation.canopy_conductance(2.0, 900.0, 290.0, -1.0), "vpd_pa must be in .* got -1"),
-        (
-            lambda: production.light_use_gpp(15.0, 650.0, 50.0, 10.0),
-            r"fpar must be in \[0, 1\], got 50: .*percent by 100",
-        ),
+        (lambda: evaporation.canopy_conductance(4.0, 900.0, 290.0, 1200.0, integral="leaf"), "'leaves' or 'sib2'"),
+        (lambda: production.light_use_gpp(15.0, 650.0, 50.0, 10.0), r"fpar .* \[0, 1\], got 50: .*percent by 100"),
         (lambda: canopy_photosynthesis(-1.0, 0.5, 9.0, 0.05, 20.0), r"lai must be in \[0, 100\] m2 m-2, got -1"),
-        (
-            lambda: canopy_photosynthesis(3.0, 0.5, -1.0, 0.05, 20.0),
-            r"par must be in \[0, inf\], got -1: it is not neg",
-        ),
+        (lambda: canopy_photosynthesis(3.0, 0.5, -1.0, 0.05, 20.0), r"par .* \[0, inf\], got -1: it is not neg"),
         (lambda: farquhar_canopy(3.0, 900.0, 0.2, 95.0, 290.0), r"sza must be in \[0, 90\] degree, got 95"),
         (lambda: two_stream(0.1, 0.1, 0.7, 30.0, 1.0, 0.1), r"chi must be in \[-0.4, 0.6\], got 0.7: 0 is spherical"),
         (lambda: two_stream(0.6, 0.5, 0.0, 30.0, 1.0, 0.1), r"leaf_transmittance must be at most 1, got 1.1"),

@@ -1,12 +1,12 @@
 """Metadata of real products: each opens with its stated values, or raises an error with reason and remedy."""
 
-import csv
 import shutil
 import tarfile
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+import pandas as pd
 import products
 import pytest
 
@@ -22,17 +22,9 @@ OTHER_TILE = "S2A_MSIL1C_20210908T042701_N0301_R133_T46RER_20210908T070248.SAFE"
 NAN_SUN = "S2A_MSIL2A_20230625T234621_N0509_R073_T01WCP_20230626T022158.SAFE"
 OFF_NADIR = "LC08_L2SP_017036_20130419_20200913_02_T2"
 
-
-def expected_rows():
-    """Rows of expected.csv, grouped by product."""
-    found = {}
-    with open(DATA / "expected.csv", newline="", encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            found.setdefault(row["product"], []).append(row)
-    return found
-
-
-EXPECTED = expected_rows()
+# Rows of expected.csv, grouped by product.
+TABLE = pd.read_csv(DATA / "expected.csv", dtype=str, keep_default_na=False)
+EXPECTED = {product: rows.to_dict("records") for product, rows in TABLE.groupby("product", sort=False)}
 OPENED = [product for product, rows in EXPECTED.items() if rows[0]["expect"] != "refused"]
 LANDSAT = [product for product in OPENED if product.startswith("L")]
 SENTINEL2 = [product for product in OPENED if product.startswith("S2")]
@@ -63,19 +55,15 @@ def landsat(metadata, folder, product):
 def sentinel2(metadata, folder, product, tile=None):
     """Sentinel-2 .SAFE folder: each band has the number of expected.csv, no data, and saturation."""
     path = folder / product
-    given = metadata / "sentinel2" / product
-    (file,) = given.glob("MTD_MSIL*.xml")
     path.mkdir()
+    (file,) = (metadata / "sentinel2" / product).glob("MTD_MSIL*.xml")
     shutil.copy(file, path)
     values = np.array([[10000, 0], [65535, 10000]], np.uint16)
     for (band, size), name in products.safe_files(file.read_text(encoding="utf-8")).items():
         if band.startswith("B"):
             products.write(path / f"{name}.jp2", values, pixel=float(size), **PLACE, driver="JP2OpenJPEG")
     granule = path / Path(name).parents[-3]
-    if tile is None and (given / "MTD_TL.xml").exists():
-        shutil.copy(given / "MTD_TL.xml", granule)
-    elif tile is not None:
-        shutil.copy(metadata / "sentinel2" / tile / "MTD_TL.xml", granule)
+    shutil.copy(metadata / "sentinel2" / (tile or product) / "MTD_TL.xml", granule)
     return path
 
 
