@@ -94,6 +94,11 @@ def test_scores_are_identical_in_any_chunks(estimate, truth):
     xr.testing.assert_identical(lazy.fifesim.score(truth.chunk(pieces)), estimate.fifesim.score(truth))
 
 
+def test_maps_without_other_dimensions_have_intervals_by_level(estimate, truth):
+    found = estimate.isel(landscape=1, drop=True).fifesim.score(truth.isel(landscape=1, drop=True), pair="index")
+    xr.testing.assert_identical(found, estimate.isel(landscape=[1]).fifesim.score(truth.isel(landscape=[1])))
+
+
 def test_groups_are_scored_separately(estimate, truth):
     by = xr.where(truth["x"] < 300, 3, 7).rename("cover")
     found = estimate.fifesim.score(truth, by)

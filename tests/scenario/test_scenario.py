@@ -1,5 +1,6 @@
 """Scenario: units, ranges, one line per mistake, and a round trip through TOML."""
 
+import inspect
 import re
 import tomllib
 from dataclasses import fields
@@ -50,6 +51,23 @@ def test_default_scenario_is_the_paper_case_on_the_whole_site():
     assert (sun.sza, sun.saa) == pytest.approx((fifesim.fife_geometry().sza, fifesim.fife_geometry().saa), abs=1e-9)
     assert (default.ground.distribution, default.ground.arp, default.ground.seed) == ("burned-grazed", 0.15, 7)
     assert (default.sensor.instrument, default.sensor.bands) == ("TM", ["TM3", "TM4"])
+
+
+@pytest.mark.parametrize(
+    ("section", "keys", "function"),
+    [
+        ("ground", ("fpar_inf",), fifesim.fpar),
+        ("ground", ("distribution", "arp", "method"), fifesim.lai_scene),
+        ("terrain", ("upwelling", "slopes"), fifesim.surface_reflectance),
+        ("atmosphere", ("profile", "aerosol", "altitude", "engine"), fifesim.Atmosphere),
+        ("clouds", ("thickness", "length"), fifesim.cloud_field),
+        ("sensor", ("min_valid",), fifesim.sense),
+    ],
+)
+def test_keys_have_the_defaults_of_the_functions(section, keys, function):
+    arguments = inspect.signature(function).parameters
+    for key in keys:
+        assert getattr(getattr(Scenario(), section), key) == arguments[key].default, key
 
 
 @pytest.mark.parametrize(

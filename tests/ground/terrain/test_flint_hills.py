@@ -202,6 +202,10 @@ def test_creep_without_streams_is_diffusion():
     k = np.pi / ((size - 1) * law.node)
     found = erode(100 + wave, np.zeros((size, size)), without_preference(size), law)
     np.testing.assert_allclose(found - 100, wave * np.exp(-2 * law.creep * k**2), rtol=0, atol=1e-3)
+    # Far from the border, creep does not change the uplift, also in parts of a step.
+    size, law = 81, LAW._replace(creep=20_000.0)
+    risen = erode(np.full((size, size), 100.0), np.zeros((size, size)), without_preference(size), law)
+    assert risen[40, 40] == pytest.approx(130.0, abs=1e-3)
 
 
 def test_ridge_is_eroded_by_one_implicit_step():

@@ -18,6 +18,8 @@ def test_summary_of_thematic_mapper():
     assert "    line spread cosine, modulation transfer at the Nyquist frequency of the own interval 0.69" in lines
     # The cosine has a higher MTF than a detector as wide as the field of view.
     assert "    the detector alone has 0.64: images are sharper" in lines
+    assert "whose blur is not known" not in text
+    assert "that of the detector alone" in instrument_in_words(instrument("SuperDove"))
     (red,) = [line.split() for line in lines if line.startswith("  TM3")]
     assert red[5:8] == ["-1.20", "204.30", "0.8059"]
 
