@@ -16,8 +16,9 @@ from fifesim.grids import cf, directions
 from fifesim.grids import grid as grids
 from fifesim.sensor.description.instrument_file import Noise
 from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.labels import noisy
 from fifesim.sensor.response import calibration
-from fifesim.sensor.response.noise import NoiseModel
+from fifesim.sensor.response.noise import NoiseModel, add_noise
 
 TM, PAPER = instrument("TM"), instrument("TM", "paper")
 RED_NIR = TM.select(["TM3", "TM4"])
@@ -333,9 +334,8 @@ def uniform(shape, row=0, column=0):
 
 
 def test_noise_does_not_depend_on_chunks_windows_or_bands():
-    own = {"TM4": NoiseModel(0.8, 0.02, 8, 0.03, 0.2)}
     for quantity, quantise in (("dn", True), ("toa_radiance", False)):
-        options = {"noise": ALL, "seed": 3, "quantise": quantise, "noise_models": own}
+        options = {"noise": ALL, "seed": 3, "quantise": quantise}
         noisy_image = partial(fifesim.sense, instrument=NOISY, **options)
         check_raster_function(noisy_image, uniform((90, 99)), quantity=quantity)
     whole = fifesim.sense(uniform((180, 198)), NOISY, noise=ALL, seed=3)
@@ -360,3 +360,19 @@ def test_all_noise_uses_every_defined_kind_and_models_override():
     both = seen(PAPER, "thermal", noise_models=NoiseModel(0.8, 0.0), quantise=False)
     # 810 pixels: four standard errors.
     assert float(both.sel(band="TM3").std()) == pytest.approx(0.8, rel=0.1)
+
+
+@pytest.mark.parametrize("chunk", [1, 2, 3])
+def test_noise_does_not_depend_on_band_chunks(chunk):
+    """Each band uses its number in the instrument and its noise model, wherever its chunk begins."""
+    names = ["TM5", "TM1", "TM4", "TM3", "TM2"]
+    models = {name: NoiseModel(0.2 + 0.1 * k, 0.01) for k, name in enumerate(names)}
+    radiance = xr.DataArray(np.full((5, 9, 11), 50.0), dims=("band", "y", "x"))
+    bands, kinds = TM.select(names), ("shot", "thermal")
+    whole = noisy(radiance, TM, bands, kinds, 5, (3, 4), models)
+    parts = noisy(radiance.chunk(band=chunk, y=4), TM, bands, kinds, 5, (3, 4), models)
+    np.testing.assert_array_equal(parts, whole)
+    for layer, name in enumerate(names):
+        number = [band.name for band in TM.bands].index(name)
+        alone = add_noise(radiance.values[layer], models[name], kinds, seed=5, band=number, row=3, column=4)
+        np.testing.assert_array_equal(whole[layer], alone)
