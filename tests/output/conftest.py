@@ -16,10 +16,20 @@ TRAVELLED = {
 
 
 @pytest.fixture(scope="session")
-def small_run(tmp_path_factory):
+def run_without_pictures():
+    """Function that writes a run folder with empty pictures and returns its files."""
+
+    def run(*given, **options):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(report, "png", lambda figure, dpi: b"")
+            return simulate_to_folder(*given, **options)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def small_run(tmp_path_factory, run_without_pictures):
     """Folder of the run, written without pictures."""
     folder = tmp_path_factory.mktemp("travelled") / "out"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "png", lambda figure, dpi: b"")
-        simulate_to_folder(parse_scenario(TRAVELLED), folder, scene=True, threads=1)
+    run_without_pictures(parse_scenario(TRAVELLED), folder, scene=True, threads=1)
     return folder

@@ -2,6 +2,7 @@
 
 import base64
 import re
+from types import SimpleNamespace
 
 import jinja2
 import matplotlib
@@ -26,35 +27,35 @@ def test_title_names_files_without_their_folders():
     assert report.title(oli).endswith("arp 0.15, seen by OLI (synthetic landscape, hypothetical overpass)")
 
 
-def engine_row(sza, **atmosphere):
-    rows = report.engine_rows(parse_scenario({"geometry": {"sza": sza, "saa": 120.0}, "atmosphere": atmosphere}))
-    assert len(rows) == 1
-    return rows[0][1]
-
-
 def test_report_lists_bands_where_5s_errs_by_more_than_two_percent():
     """Urban haze under a low sun exceeds 2 % in both bands; clear air stays within 2 %."""
-    haze = engine_row(70.0, aerosol="urban", visibility=6)
+
+    def rows(sza, **atmosphere):
+        scenario = {"geometry": {"sza": sza, "saa": 120.0}, "atmosphere": atmosphere}
+        return [text for _, text in report.engine_rows(parse_scenario(scenario))]
+
+    (haze,), (clear,) = rows(70.0, aerosol="urban", visibility=6), rows(25.0, aerosol="none", visibility=None)
     assert 'beyond 2 % in TM3, TM4: engine = "successive-orders"' in haze and "TM4 +" in haze
-    clear = engine_row(25.0, aerosol="none", visibility=None)
-    assert clear.endswith("within 2 %")
-    other = parse_scenario({"atmosphere": {"engine": "successive-orders"}})
-    assert report.engine_rows(other) == []
+    assert clear.endswith("within 2 %") and rows(25.0, engine="successive-orders") == []
 
 
 GROUND = {"grid": {"width": 600, "height": 300}, "terrain": {"dem": "flat"}}
 
 
+def run_of(**sensor):
+    scenario = parse_scenario(GROUND | {"sensor": sensor}).complete()
+    tree = fifesim.simulate(scenario).compute()
+    return scenario, tree["image"].to_dataset(), tree["truth"].to_dataset(), tree["scene"]["lai"]
+
+
 @pytest.fixture(scope="module", params=[{}, {"interval": "native"}, {"offset": [0.5, 0.0]}], ids=["", "native", "off"])
 def simulated_run(request):
-    scenario = parse_scenario(GROUND | {"sensor": request.param}).complete()
-    tree = fifesim.simulate(scenario)
-    return scenario, tree["image"].to_dataset().compute(), tree["truth"].to_dataset().compute()
+    return run_of(**request.param)
 
 
 def test_pairing_reports_the_offset_between_pixels_and_blocks(simulated_run):
     """Nineteen intervals of 30.315 m between the first and last pixel centre extend 6 m beyond as many 30 m blocks."""
-    scenario, image, truth = simulated_run
+    scenario, image, truth, _ = simulated_run
     text = report.pairing(scenario, image, truth)
     assert "9 x 9 cells of 3.33 m, a square of 30 m" in text
     native = scenario.sensor.interval == "native"
@@ -67,7 +68,7 @@ def test_pairing_reports_the_offset_between_pixels_and_blocks(simulated_run):
 
 def test_main_results_match_the_regression(simulated_run):
     """Residuals are recomputed with numpy, paired by row and column like the regression."""
-    _, image, truth = simulated_run
+    _, image, truth, _ = simulated_run
     fit = regress(truth["lai"], image["ndvi"], pair="index")
     (value, name, text), (span, *_) = report.main_results(truth, image, truth, {"lai": fit})
     share = fit.residual_deviation / float(truth["lai"].mean())
@@ -89,13 +90,8 @@ def test_finding_without_a_regression_gives_the_reason():
 
 def test_headline_names_instrument_place_and_time():
     far = {"crs": "EPSG:32735", "west": 600000.0, "north": 7200000.0, "width": 600.0, "height": 600.0}
-    case = {
-        "grid": far,
-        "geometry": {"time": "2022-06-01T10:05Z"},
-        "atmosphere": {"altitude": 1.0},
-        "terrain": {"dem": "flat"},
-        "sensor": {"instrument": "OLI"},
-    }
+    case = {"grid": far, "geometry": {"time": "2022-06-01T10:05Z"}, "atmosphere": {"altitude": 1.0}}
+    case |= {"terrain": {"dem": "flat"}, "sensor": {"instrument": "OLI"}}
     text = report.headline(parse_scenario(case).complete())
     assert re.fullmatch(
         r"Simulated .*Operational Land Imager.* image, 25\.\d\d° S, 2[78]\.\d\d° E, 1 June 2022 10:05 UTC \(.*\)", text
@@ -103,7 +99,7 @@ def test_headline_names_instrument_place_and_time():
 
 
 def test_cautions_name_the_omitted_effects(simulated_run):
-    scenario, image, _ = simulated_run
+    scenario, image, *_ = simulated_run
     said = " ".join(report.cautions(scenario))
     assert ("perfectly registered" in said) is not any(scenario.sensor.offset)
     assert "No detector noise" in said
@@ -112,19 +108,14 @@ def test_cautions_name_the_omitted_effects(simulated_run):
     )
 
 
-GRID = {"width": 1110, "height": 1110}
-
-
-class Fit:
-    """A stub of a regression."""
-
-    r2 = 0.931
+PAPER = {"grid": {"width": 1110, "height": 1110}, "ground": {"distribution": "burned-grazed", "arp": 0.15}}
+PAPER |= {"sensor": {"response": "paper"}}
 
 
 def compare_with_paper(fits=None, **sections):
-    values = {"grid": GRID, "ground": {"distribution": "burned-grazed", "arp": 0.15}}
-    values |= {"sensor": {"response": "paper"}} | sections
-    return report.pairing_rows(parse_scenario(values).complete(), {"lai": Fit} if fits is None else fits)
+    return report.pairing_rows(
+        parse_scenario(PAPER | sections).complete(), {"lai": SimpleNamespace(r2=0.931)} if fits is None else fits
+    )
 
 
 def test_report_explains_the_difference_from_the_published_r2():
@@ -133,8 +124,7 @@ def test_report_explains_the_difference_from_the_published_r2():
     assert 'interval = "native" in [sensor]' in typed and "fifesim reproduce" in typed
     # The predicted R2 is reached by a run with that key, on level ground.
     sections = {"terrain": {"dem": "flat"}, "sensor": {"interval": "native", "response": "paper"}}
-    ground = {"distribution": "burned-grazed", "arp": 0.15}
-    run = simulate(parse_scenario({"grid": GRID, "ground": ground, **sections}), chunks=None)
+    run = simulate(parse_scenario(PAPER | sections), chunks=None)
     truth, ndvi = run["truth"]["lai"].values, run["image"]["ndvi"].values
     n = min(len(truth), len(ndvi))
     pairs = np.stack([truth[:n, :n].ravel(), ndvi[:n, :n].ravel()])
@@ -158,74 +148,39 @@ def test_other_runs_are_not_compared_with_the_paper(sections):
     assert compare_with_paper(**sections) == []
 
 
-@pytest.fixture(scope="module")
-def level_run():
-    scenario = parse_scenario({"grid": {"width": 600, "height": 300}, "terrain": {"dem": "flat"}})
-    tree = fifesim.simulate(scenario.complete()).compute()
-    image = tree["image"].to_dataset()
-    return image.assign(ndvi=image["dn"].fifesim.ndvi()), tree["truth"].to_dataset(), tree["scene"]["lai"]
-
-
-def test_figure_title_gives_the_regression_of_its_line(level_run):
-    image, truth, _ = level_run
+def test_figures_show_the_regression_and_each_pixel():
+    """Each band of the histogram sums to one."""
+    _, image, truth, detail = run_of()
     fit = regress(truth["lai"], image["ndvi"], pair="index")
     axis = report.fit_figure(image, truth, "lai", fit).axes[0]
+    (line,), (density,) = axis.lines, axis.images
     assert f"n = {fit.n}" in axis.get_title()
-    (line,) = axis.lines
     np.testing.assert_allclose(line.get_ydata(), fit.intercept + fit.slope * line.get_xdata())
-
-
-def test_density_counts_every_pixel_at_its_values(level_run):
-    image, truth, _ = level_run
-    axis = report.fit_figure(image, truth, "lai", regress(truth["lai"], image["ndvi"], pair="index")).axes[0]
-    (density,) = axis.images
-    counts = 10.0 ** density.get_array()
+    counts, (low, high) = 10.0 ** density.get_array(), density.get_extent()[:2]
     ndvi = image["ndvi"].values[np.isfinite(image["ndvi"].values)]
-    assert counts.sum() == pytest.approx(ndvi.size)
-    assert density.get_extent()[:2] == pytest.approx([ndvi.min(), ndvi.max()])
-    centres = np.linspace(*density.get_extent()[:2], 2 * counts.shape[1] + 1)[1::2]
-    step = centres[1] - centres[0]
+    assert counts.sum() == pytest.approx(ndvi.size) and (low, high) == pytest.approx((ndvi.min(), ndvi.max()))
+    centres, step = np.linspace(low, high, 2 * counts.shape[1] + 1)[1::2], (high - low) / counts.shape[1]
     assert (counts.filled(0).sum(axis=0) @ centres) / ndvi.size == pytest.approx(float(ndvi.mean()), abs=step / 2)
-
-
-def test_frequencies_of_each_band_sum_to_one(level_run):
-    image, truth, detail = level_run
     axis = report.histogram_figures(image, truth, detail)[2].axes[0]
     shares = {line.get_label(): line.get_ydata().sum() for line in axis.lines}
     assert shares == pytest.approx(dict.fromkeys(map(str, image["band"].values), 1.0))
     assert [text.get_text() for text in axis.get_legend().get_texts()] == list(shares)
 
 
-@pytest.fixture
-def template(tmp_path):
-    def write(content):
-        path = tmp_path / "own.html.j2"
-        path.write_text(f'{{% extends "page.html.j2" %}}{{% block content %}}{content}{{% endblock %}}')
-        return path
-
-    return write
-
-
-def drawn_png():
+def test_picture_is_embedded_unchanged_and_an_undefined_name_is_an_error(tmp_path):
+    template, content = tmp_path / "own.html.j2", '<img src="{{ picture | embedded }}">{{ text }}'
+    template.write_text(f'{{% extends "page.html.j2" %}}{{% block content %}}{content}{{% endblock %}}')
     figure = Figure(figsize=(2, 1))
     figure.subplots().plot([0, 1])
-    return report.png(figure, 50)
-
-
-def test_picture_is_embedded_unchanged(template):
-    page = report.page_html(
-        template('<img src="{{ picture | embedded }}">{{ text }}'), picture=drawn_png(), text="a < b"
-    )
+    png = report.png(figure, 50)
+    page = report.page_html(template, picture=png, text="a < b")
     (content,) = re.findall(r'src="data:image/png;base64,([^"]*)"', page)
-    assert base64.b64decode(content) == drawn_png()
+    assert base64.b64decode(content) == png
     # A PNG holds its width and height in bytes 16 to 24.
-    assert [int.from_bytes(drawn_png()[start : start + 4]) for start in (16, 20)] == [100, 50]
+    assert [int.from_bytes(png[start : start + 4]) for start in (16, 20)] == [100, 50]
     assert "a &lt; b" in page and f"matplotlib {matplotlib.__version__}" in page
-
-
-def test_undefined_template_name_is_an_error(template):
-    with pytest.raises(jinja2.UndefinedError, match="forgotten"):
-        report.page_html(template("{{ forgotten }}"))
+    with pytest.raises(jinja2.UndefinedError, match="text"):
+        report.page_html(template, picture=png)
 
 
 def test_zero_has_no_sign():

@@ -19,9 +19,7 @@ from typer.testing import CliRunner
 import fifesim
 from fifesim.atmosphere import engines, six_s
 from fifesim.cli import app
-from fifesim.output import report
-from fifesim.output import run_folder as estimates
-from fifesim.output import run_folder as run_folder
+from fifesim.output import report, run_folder
 from fifesim.output.folders import UNFINISHED
 from fifesim.output.run_folder import FILES, estimate, estimate_in_words, run_engine, simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario, read_scenario
@@ -36,16 +34,6 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "small"
     simulate_to_folder(parse_scenario(SMALL), folder)
     return folder
-
-
-def test_image_and_truth_match_the_chain(folder):
-    grid = fifesim.fife_site(30 / 9, window=((0, 180), (0, 270)))
-    lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.24, seed=3)
-    image = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa().fifesim.sense("TM")
-    np.testing.assert_array_equal(fifesim.open_image(folder / "image.tif").values, image.values)
-    truth = fifesim.open_image(folder / "truth.tif")
-    for name, cells in (("lai", lai), ("fpar", lai.fifesim.fpar())):
-        np.testing.assert_array_equal(truth.sel(band=name), cells.fifesim.aggregate(30).values.astype(np.float32))
 
 
 def test_report_matches_regressions_and_statistics_of_its_files(folder):
@@ -122,12 +110,10 @@ HILLS = {"grid": {"width": 4500, "height": 3900}, "ground": {"seed": 3}, "terrai
 
 
 @pytest.fixture(scope="module")
-def hills(tmp_path_factory):
+def hills(tmp_path_factory, run_without_pictures):
     """A multi-chunk scene on terrain with its cells, written without pictures."""
     folder = tmp_path_factory.mktemp("hills") / "out"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "png", lambda figure, dpi: b"")
-        simulate_to_folder(parse_scenario(HILLS), folder, scene=True, threads=2)
+    run_without_pictures(parse_scenario(HILLS), folder, scene=True, threads=2)
     return folder
 
 
@@ -185,8 +171,7 @@ def test_image_without_valid_pixels_is_an_error_with_the_reason(tmp_path, values
     assert not (tmp_path / "out").exists()
 
 
-def test_input_that_changes_during_a_run_is_an_error(tmp_path, monkeypatch):
-    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
+def test_input_that_changes_during_a_run_is_an_error(tmp_path, monkeypatch, run_without_pictures):
     scenario = parse_scenario(write_lai_map(tmp_path / "lai.tif", 2.0))
     write_files = run_folder._write_files
 
@@ -196,15 +181,14 @@ def test_input_that_changes_during_a_run_is_an_error(tmp_path, monkeypatch):
 
     monkeypatch.setattr(run_folder, "_write_files", while_another_writes)
     with pytest.raises(ValueError, match=r"lai\.tif changed while it was read"):
-        simulate_to_folder(scenario, tmp_path / "out")
+        run_without_pictures(scenario, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
-def test_overwriting_removes_the_cells_of_an_earlier_run(tmp_path, monkeypatch):
-    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
-    simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True)
+def test_overwriting_removes_the_cells_of_an_earlier_run(tmp_path, run_without_pictures):
+    run_without_pictures(parse_scenario(SMALL), tmp_path / "out", scene=True)
     (tmp_path / "out" / "notes.txt").touch()
-    simulate_to_folder(parse_scenario(SMALL | {"ground": {"seed": 4}}), tmp_path / "out", overwrite=True)
+    run_without_pictures(parse_scenario(SMALL | {"ground": {"seed": 4}}), tmp_path / "out", overwrite=True)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {*FILES, "notes.txt"}
 
 
@@ -219,28 +203,26 @@ def test_resuming_a_finished_run_computes_nothing(folder, tmp_path, monkeypatch)
         simulate_to_folder(scenario, tmp_path / "out", resume=True, scene=True)
 
 
-def test_finished_run_with_a_newer_input_is_not_resumed(tmp_path, monkeypatch):
-    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
+def test_finished_run_with_a_newer_input_is_not_resumed(tmp_path, run_without_pictures):
     scenario = parse_scenario(write_lai_map(tmp_path / "lai.tif", 2.0))
-    simulate_to_folder(scenario, tmp_path / "out")
-    simulate_to_folder(scenario, tmp_path / "out", resume=True)
+    run_without_pictures(scenario, tmp_path / "out")
+    run_without_pictures(scenario, tmp_path / "out", resume=True)
     write_lai_map(tmp_path / "lai.tif", 3.0)
     with pytest.raises(ValueError, match=r"older than its input .*lai\.tif.*--overwrite"):
-        simulate_to_folder(scenario, tmp_path / "out", resume=True)
+        run_without_pictures(scenario, tmp_path / "out", resume=True)
 
 
-def test_changed_chunk_is_recomputed_on_resume(tmp_path, monkeypatch):
-    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
-    simulate_to_folder(parse_scenario(SMALL), tmp_path / "whole", scene=True)
+def test_changed_chunk_is_recomputed_on_resume(tmp_path, monkeypatch, run_without_pictures):
+    run_without_pictures(parse_scenario(SMALL), tmp_path / "whole", scene=True)
 
     def full(*given):
         raise OSError("disk full")
 
     with monkeypatch.context() as broken, pytest.raises(OSError, match=r"disk full.*--resume"):
         broken.setattr(run_folder, "_write_files", full)
-        simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True)
+        run_without_pictures(parse_scenario(SMALL), tmp_path / "out", scene=True)
     zarr.open_array(str(tmp_path / "out" / UNFINISHED / "scene.zarr"), path="lai")[3, 4] = 9.0
-    simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True, resume=True)
+    run_without_pictures(parse_scenario(SMALL), tmp_path / "out", scene=True, resume=True)
     found, whole = (xr.open_zarr(tmp_path / name / "scene.zarr")["lai"].values for name in ("out", "whole"))
     np.testing.assert_array_equal(found, whole)
 
@@ -283,9 +265,9 @@ def test_estimate_counts_cells_and_pixels_of_the_scenario(monkeypatch):
 def test_timed_piece_lies_in_the_middle_of_the_scene():
     """It consists of whole pixels and is no larger than a tile."""
     scenario = parse_scenario({"grid": {"width": 24000, "height": 300}, "terrain": {"dem": "flat"}}).complete()
-    piece, whole = estimates._piece(scenario), scenario.geobox()
+    piece, whole = run_folder._piece(scenario), scenario.geobox()
     box = piece.geobox()
-    assert box.shape.y == whole.shape.y and 1900 < box.shape.x <= estimates._PIECE
+    assert box.shape.y == whole.shape.y and 1900 < box.shape.x <= run_folder._PIECE
     assert np.hypot(*np.subtract(box.center_pixel.boundingbox[:2], whole.center_pixel.boundingbox[:2])) <= 30
     assert (box.affine.c - whole.affine.c) % 30 == pytest.approx(0, abs=1e-6)
 

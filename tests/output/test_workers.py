@@ -24,8 +24,7 @@ from fifesim.grids import grid as grids
 from fifesim.grids.chunks import neighbourhood
 from fifesim.grids.reductions import resample
 from fifesim.grids.windows import array_from_windows, tiles
-from fifesim.output import report, workers
-from fifesim.output.run_folder import simulate_to_folder
+from fifesim.output import workers
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
@@ -69,10 +68,9 @@ def test_workers_write_one_file_together(client, lai_file, tmp_path):
     xr.testing.assert_identical(fifesim.open_image(tmp_path / "image.tif"), make_image(scene(lai_file, None)))
 
 
-def test_run_on_workers_gives_the_same_files(client, tmp_path, monkeypatch):
-    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
+def test_run_on_workers_gives_the_same_files(client, tmp_path, run_without_pictures):
     scenario = parse_scenario({"grid": {"width": 900, "height": 600}, "ground": {"seed": 3}})
-    simulate_to_folder(scenario, tmp_path / "workers")
+    run_without_pictures(scenario, tmp_path / "workers")
     expected = simulate(scenario)["image"]["dn"].compute(scheduler="threads")
     np.testing.assert_array_equal(fifesim.open_image(tmp_path / "workers" / "image.tif").values, expected.values)
 

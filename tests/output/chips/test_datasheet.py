@@ -10,18 +10,13 @@ import xarray as xr
 from fifesim.output.chips import datasheet
 from fifesim.output.chips.datasheet import contact_sheet
 from fifesim.output.colours import dark_and_bright
-from fifesim.scenario.chips import chips_of
-from fifesim.scenario.scenario import parse_scenario
-from fifesim.scenario.studies import Study
 
-SMALL = {"grid": {"width": 180.0, "height": 180.0}, "terrain": {"dem": "flat"}}
-DRAWS = {"visibility": {"uniform": [10, 60]}, "distribution": {"choice": ["burned-grazed", "burned-ungrazed"]}}
 COUNT = 11
 
 
 @pytest.fixture(scope="module")
-def chips():
-    return chips_of(Study(parse_scenario(SMALL), DRAWS, landscapes=3), COUNT)
+def chips(chips_on):
+    return chips_on(COUNT, draws={"distribution": {"choice": ["burned-grazed", "burned-ungrazed"]}})
 
 
 @pytest.fixture(scope="module")
@@ -68,8 +63,8 @@ def test_page_counts_chips_and_landscapes(page, chips):
 
 
 @pytest.mark.parametrize(("count", "said"), [(1, "<b>{} have none</b>"), (2, "<b>{} has none</b>"), (3, None)])
-def test_page_explains_a_part_without_chips(count, said, dataset):
-    chips = chips_of(Study(parse_scenario(SMALL), DRAWS, landscapes=3), count)
+def test_page_explains_a_part_without_chips(count, said, dataset, chips_on):
+    chips = chips_on(count)
     part = dataset.isel(chip=range(count))
     page = datasheet.datasheet_page(part, chips, datasheet.ranges_of(part, 4), b"")
     empty = [name for name in ("train", "validation", "test") if name not in chips.split]

@@ -1,5 +1,6 @@
 """Dataset folders are complete or absent, and have the same bits after interruptions and with any workers."""
 
+import multiprocessing
 import os
 import re
 import shutil
@@ -17,11 +18,10 @@ from fifesim.output.chips import datasheet, store
 from fifesim.output.chips import folder as chips_folder
 from fifesim.output.chips.folder import dataset_to_folder, study_to_resume
 from fifesim.output.folders import UNFINISHED
-from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.studies import Study
 
-SMALL = {"grid": {"width": 180.0, "height": 180.0}, "terrain": {"dem": "flat"}}
-DRAWS = {"visibility": {"uniform": [10, 60]}, "ground.brown": {"choice": [0.0, 0.3]}}
+DRAWS = {"visibility": {"uniform": [10, 60]}, "ground.brown": {"choice": [0.0, 0.3]}, "sza": {"uniform": [20, 50]}}
+SUN = {"sza": 30.0, "saa": 120.0}
 COUNT = 7
 
 
@@ -35,8 +35,8 @@ def small_shards():
 
 
 @pytest.fixture(scope="module")
-def study():
-    return Study(parse_scenario(SMALL), DRAWS, landscapes=3, seed=5)
+def study(small):
+    return Study(small(geometry=SUN), DRAWS, landscapes=3, seed=5)
 
 
 @pytest.fixture(scope="module")
@@ -77,18 +77,34 @@ def test_function_returns_the_written_dataset(study, whole, tmp_path):
 def test_chip_equals_its_simulated_scenario(study, whole):
     run = fifesim.simulate(fifesim.chips_of(study, COUNT).scenario(4), complete=True)
     chip = xr.open_zarr(whole, mask_and_scale=False).isel(chip=4)
-    np.testing.assert_array_equal(chip.dn, run["image"]["dn"])
+    image, truth = run["image"], run["truth"]
+    expected = {"ndvi": image["ndvi"], "toa_reflectance": image["dn"].fifesim.to_reflectance()}
+    for name, values in (expected | {"lai": truth["lai"], "fpar": truth["fpar"]}).items():
+        np.testing.assert_array_equal(chip[name], values.astype(np.float32))
+    np.testing.assert_array_equal(chip.dn, image["dn"])
+    assert float(chip.sza) == float(image["sza"])
     assert float(chip["atmosphere.visibility"]) == fifesim.chips_of(study, 40).scenario(4).atmosphere.visibility
+
+
+def test_green_fpar_equals_fpar_without_dead_leaves(whole):
+    chips = xr.open_zarr(whole)
+    assert set(chips["ground.brown"].values) == {0.0, 0.3}
+    alike = (chips.green_fpar == chips.fpar).all(("y", "x"))
+    np.testing.assert_array_equal(alike, chips["ground.brown"] == 0)
+
+
+def interrupt(monkeypatch, study, folder, after):
+    """Interrupt the writing of a dataset after some chips."""
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        interrupt_after(patch, after)
+        dataset_to_folder(study, folder, COUNT)
 
 
 # There are two chips in each shard.
 @pytest.mark.parametrize("after", [3, 6])
 def test_resumed_run_gives_the_same_bits(after, study, whole, tmp_path, monkeypatch):
     folder = tmp_path / "chips.zarr"
-    with monkeypatch.context() as patch:
-        interrupt_after(patch, after)
-        with pytest.raises(KeyboardInterrupt):
-            dataset_to_folder(study, folder, COUNT)
+    interrupt(monkeypatch, study, folder, after)
     assert {path.name for path in folder.iterdir()} == {UNFINISHED}
     assert study_to_resume(folder) == (study, COUNT)
     with pytest.raises(ValueError, match="has an unfinished run"):
@@ -116,10 +132,7 @@ def test_resuming_a_finished_dataset_computes_nothing(study, whole, tmp_path, mo
 
 def test_truncated_shards_are_ignored(study, whole, tmp_path, monkeypatch):
     folder = tmp_path / "chips.zarr"
-    with monkeypatch.context() as patch:
-        interrupt_after(patch, 6)
-        with pytest.raises(KeyboardInterrupt):
-            dataset_to_folder(study, folder, COUNT)
+    interrupt(monkeypatch, study, folder, 6)
     hidden = folder / UNFINISHED
     half = hidden / "lai" / "c" / "1" / "0" / "0"
     half.write_bytes(half.read_bytes()[:100])
@@ -180,11 +193,11 @@ def test_run_killed_between_moves_leaves_no_mixed_store(earlier, whole, study, t
     assert contents(folder) == contents(whole)
 
 
-def test_invalid_study_is_reported_before_anything_is_written(study, tmp_path, monkeypatch):
+def test_invalid_study_is_reported_before_anything_is_written(study, small, tmp_path, monkeypatch):
     draws = {"brown": {"choice": [0.3, 0.95]}, "landscape.deviations.brown": {"choice": [0.05, 0.25]}}
     with pytest.raises(ValueError, match=r"chip \d+: landscape\.deviations: brown"):
         dataset_to_folder(Study(study.scenario, draws, landscapes=3), tmp_path / "chips.zarr", 20)
-    wide = parse_scenario(SMALL | {"grid": {"width": 30_000.0, "height": 30_000.0}})
+    wide = small(grid={"width": 30_000.0, "height": 30_000.0}, geometry=SUN)
     far = fifesim.chips_of(Study(wide, DRAWS, landscapes=1, split={"all": 1.0}), 60_000)
     monkeypatch.setattr(chips_folder, "_LOOKED_AT", 1)
     with pytest.raises(ValueError, match=r"chip 59999: .*use more landscapes, so that chips are closer"):
@@ -228,18 +241,19 @@ def test_documented_loader_reads_each_chip_of_a_part_once(whole, monkeypatch):
     assert {(x.tobytes(), y.tobytes()) for x, y in found} == expected
 
 
-def test_processes_give_the_same_bits(study, whole, tmp_path):
+def test_processes_give_the_same_bits_and_end(study, whole, tmp_path):
     fifesim.dataset(study, tmp_path / "chips.zarr", COUNT, workers=2)
+    assert not multiprocessing.active_children()
     assert contents(tmp_path / "chips.zarr") == contents(whole)
-
-
-class Client:
-    """Stub of a distributed client."""
 
 
 @pytest.mark.parametrize(
     ("workers", "client", "said"),
-    [(0, None, "at least 1, got 0"), (2.0, None, "at least 1, got 2.0"), (2, Client(), "give one of them")],
+    [
+        (0, None, "at least 1, got 0"),
+        (2.0, None, "at least 1, got 2.0"),
+        (2, type("Client", (), {})(), "give one of them"),
+    ],
 )
 def test_processes_must_be_a_number_or_a_client(workers, client, said, study, tmp_path):
     with pytest.raises(ValueError, match=said):

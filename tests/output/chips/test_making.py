@@ -15,16 +15,6 @@ import pytest
 
 from fifesim.output.chips.makers import Makers, jobs_of, made_shards, processes
 from fifesim.output.chips.store import Shards, chip_arrays, layout_of
-from fifesim.scenario.chips import chips_of
-from fifesim.scenario.scenario import parse_scenario
-from fifesim.scenario.studies import Study
-
-SMALL = {"grid": {"width": 180.0, "height": 180.0}, "terrain": {"dem": "flat"}}
-DRAWS = {"visibility": {"uniform": [10, 60]}}
-
-
-def chips_on(dem="flat", count=30, landscapes=6):
-    return chips_of(Study(parse_scenario(SMALL | {"terrain": {"dem": dem}}), DRAWS, landscapes=landscapes), count)
 
 
 def list_shards(length, count=30):
@@ -35,22 +25,22 @@ def list_shards(length, count=30):
 
 @pytest.mark.parametrize("dem", ["flat", "flint-hills"])
 @pytest.mark.parametrize("wanted", [range(5), [1, 4]])
-def test_each_requested_chip_is_in_one_job(dem, wanted):
-    chips, shards = chips_on(dem), list_shards(6)
+def test_each_requested_chip_is_in_one_job(chips_on, dem, wanted):
+    chips, shards = chips_on(30, 6, terrain={"dem": dem}), list_shards(6)
     found = np.concatenate(jobs_of(chips, shards, wanted, 2))
     expected = np.concatenate([np.arange(*shards.range_of(shard)) for shard in wanted])
     np.testing.assert_array_equal(np.sort(found), expected)
 
 
-def test_chips_on_flat_ground_are_computed_shard_by_shard():
-    jobs = jobs_of(chips_on(), list_shards(6), range(5), 2)
+def test_chips_on_flat_ground_are_computed_shard_by_shard(chips_on):
+    jobs = jobs_of(chips_on(30, 6), list_shards(6), range(5), 2)
     shards = np.concatenate(jobs) // 6
     assert (np.diff(shards) >= 0).all()
     assert all(len(set(job // 6)) == 1 for job in jobs)
 
 
-def test_hills_of_a_landscape_are_computed_once_for_several_shards():
-    chips = chips_on("flint-hills")
+def test_hills_of_a_landscape_are_computed_once_for_several_shards(chips_on):
+    chips = chips_on(30, 6, terrain={"dem": "flint-hills"})
     jobs = jobs_of(chips, list_shards(6), range(5), 2)
     for job in jobs:
         assert len(set(chips.landscape[job])) == 1
@@ -58,8 +48,8 @@ def test_hills_of_a_landscape_are_computed_once_for_several_shards():
 
 
 @pytest.fixture(scope="module")
-def chips():
-    return chips_on(count=7, landscapes=3)
+def chips(chips_on):
+    return chips_on(7)
 
 
 @pytest.fixture(scope="module")
@@ -90,29 +80,15 @@ class Shuffled(Executor):
         return future
 
 
-def check_all(made, told, chips, layout, shards):
-    found = dict(made)
-    assert sum(told) == 7 and set(found) == {0, 1, 2}
-    for shard, arrays in found.items():
-        for name, values in chip_arrays(chips, range(*shards.range_of(shard)), layout).items():
-            np.testing.assert_array_equal(arrays[name], values)
-
-
 @pytest.mark.parametrize("seed", [None, 0, 1, 2])
 def test_shards_equal_those_of_sequential_computation(seed, chips, layout, shards):
     number = len(jobs_of(chips, shards, [0, 1, 2], 1))
     told, makers = [], None if seed is None else Makers(Shuffled(seed, number), 1, ())
-    check_all(made_shards(chips, layout, shards, [0, 1, 2], told.append, makers), told, chips, layout, shards)
-
-
-def test_processes_give_the_same_bits_and_end(chips, layout, shards):
-    told = []
-    with processes(2) as makers:
-        made = made_shards(chips, layout, shards, [0, 1, 2], told.append, makers)
-        check_all(made, told, chips, layout, shards)
-        begun = multiprocessing.active_children()
-        assert 1 <= len(begun) <= 2
-    assert not any(process.is_alive() for process in begun)
+    found = dict(made_shards(chips, layout, shards, [0, 1, 2], told.append, makers))
+    assert sum(told) == 7 and set(found) == {0, 1, 2}
+    for shard, arrays in found.items():
+        for name, values in chip_arrays(chips, range(*shards.range_of(shard)), layout).items():
+            np.testing.assert_array_equal(arrays[name], values)
 
 
 def test_killed_process_is_reported(chips, layout, shards):

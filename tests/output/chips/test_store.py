@@ -11,19 +11,13 @@ import zarr
 
 import fifesim
 from fifesim.output.chips.store import Shards, checksums, chip_arrays, layout_of, make_store, write_shard
-from fifesim.scenario.chips import chips_of
-from fifesim.scenario.scenario import parse_scenario
-from fifesim.scenario.studies import Study
-
-SMALL = {"grid": {"width": 180.0, "height": 180.0}, "terrain": {"dem": "flat"}}
-DRAWS = {"visibility": {"uniform": [10, 60]}, "distribution": {"choice": ["burned-grazed", "burned-ungrazed"]}}
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def made(tmp_path_factory, chips_on):
     """A store of seven chips in shards of four, and the written arrays."""
     folder = tmp_path_factory.mktemp("chips")
-    chips = chips_of(Study(parse_scenario(SMALL), DRAWS, landscapes=3), 7)
+    chips = chips_on(7, draws={"brown": {"choice": [0.0, 0.3]}})
     layout, shards = layout_of(chips), Shards(7, 1, 4)
     shards.length, shards.chunk = 4, 2
     make_store(folder, chips, layout, shards)
@@ -46,7 +40,7 @@ def test_xarray_opens_the_store_without_a_warning(made):
     table = chips.table()
     for name in table.data_vars:
         np.testing.assert_array_equal(dataset[name].values, table[name].values)
-    assert set(dataset.data_vars) == {"dn", "toa_reflectance", "ndvi", "lai", "fpar"}
+    assert set(dataset.data_vars) == {"dn", "toa_reflectance", "ndvi", "lai", "fpar", "green_fpar"}
     assert {"split", "landscape", "atmosphere.visibility", "sza", "gain", "spatial_ref"} <= set(dataset.coords)
 
 
@@ -104,46 +98,8 @@ def test_shards_are_large_enough_to_share_tiles_and_small_enough_for_memory(coun
     assert all(before[1] == after[0] for before, after in pairwise(ranges))
 
 
-SUNNY = {"visibility": {"uniform": [10, 60]}, "brown": {"choice": [0.0, 0.3]}, "sza": {"uniform": [20, 50]}}
-
-
-@pytest.fixture(scope="module")
-def chips():
-    sun = {"geometry": {"sza": 30.0, "saa": 120.0}}
-    return chips_of(Study(parse_scenario(SMALL | sun), SUNNY, landscapes=3), 7)
-
-
-@pytest.fixture(scope="module")
-def layout(chips):
-    return layout_of(chips)
-
-
-@pytest.fixture(scope="module")
-def arrays(chips, layout):
-    return chip_arrays(chips, range(2, 7), layout)
-
-
-def test_chip_has_the_bits_of_its_scenario(chips, arrays):
-    run = fifesim.simulate(chips.scenario(5), complete=True)
-    expected = (
-        run["truth"]
-        .to_dataset()[["lai", "fpar"]]
-        .assign(ndvi=run["image"]["ndvi"], toa_reflectance=fifesim.sensor.labels.to_reflectance(run["image"]["dn"]))
-    )
-    for name, values in expected.data_vars.items():
-        np.testing.assert_array_equal(arrays[name][3], values.values.astype(np.float32))
-    np.testing.assert_array_equal(arrays["dn"][3], run["image"]["dn"])
-    assert arrays["sza"][3] == float(run["image"]["sza"])
-
-
-def test_green_fpar_equals_fpar_without_dead_leaves(chips, arrays):
-    brown = np.array([chips.scenario(chip).ground.brown for chip in range(2, 7)])
-    assert {0.0, 0.3} == set(brown.tolist())
-    alike = (arrays["green_fpar"] == arrays["fpar"]).all(axis=(1, 2))
-    np.testing.assert_array_equal(alike, brown == 0)
-
-
-def test_error_names_the_chip_with_different_truth_variables(chips, layout):
+def test_error_names_the_chip_with_different_truth_variables(made):
+    _, chips, layout, *_ = made
     without = layout._replace(truth=("lai", "fpar"))
     with pytest.raises(ValueError, match=r"chip \d: has a true property that others lack, green_fpar"):
         chip_arrays(chips, range(0, 7), without)
@@ -163,10 +119,9 @@ GRASS = {"landscape": {"cover": "voronoi"}, "classes": {"grass": {}, "burned": {
     ],
     ids=["blur", "offset", "cover", "hills", "adjacency"],
 )
-def test_chips_have_no_missing_pixels(sections):
+def test_chips_have_no_missing_pixels(chips_on, sections):
     """Edge pixels see the surrounding ground; each chip equals its scenario simulated with that ground."""
-    study = Study(parse_scenario(SMALL | sections), {"visibility": {"uniform": [10, 60]}}, landscapes=3)
-    chips = chips_of(study, 3)
+    chips = chips_on(3, **sections)
     found = chip_arrays(chips, range(3), layout_of(chips))
     for name in ("toa_reflectance", "ndvi", "lai", "fpar"):
         assert np.isfinite(found[name]).all(), name
@@ -184,13 +139,12 @@ def test_chips_have_no_missing_pixels(sections):
         np.testing.assert_array_equal(run["image"]["dn"].values[middle], bare["image"]["dn"].values[middle])
 
 
-def test_edge_pixels_equal_those_of_a_larger_scene():
-    scenario = parse_scenario(SMALL | {"sensor": {"instrument": "L4TM"}})
+def test_edge_pixels_equal_those_of_a_larger_scene(small):
+    scenario = small(sensor={"instrument": "L4TM"})
     image = fifesim.simulate(scenario, complete=True)["image"]["dn"]
     grid = scenario.geobox().pad(90)
     larger = {"west": grid.affine.c, "north": grid.affine.f, "width": 780.0, "height": 780.0}
-    whole = fifesim.simulate(parse_scenario({**SMALL, "grid": larger, "sensor": {"instrument": "L4TM"}}))["image"]["dn"]
+    whole = fifesim.simulate(small(grid=larger, sensor={"instrument": "L4TM"}))["image"]["dn"]
     np.testing.assert_array_equal(image, whole.sel(y=image.y, x=image.x, method="nearest", tolerance=0.01))
-    periodic = parse_scenario(SMALL | {"ground": {"method": "periodic"}})
     with pytest.raises(ValueError, match=r"no ground beyond the scene: use method = \"streaming\""):
-        fifesim.simulate(periodic, complete=True)
+        fifesim.simulate(small(ground={"method": "periodic"}), complete=True)
