@@ -38,11 +38,11 @@ def model(function=surface, cell=30.0, margin=600.0, size=900.0, affine=None, sh
     return function(*(affine * (columns, rows))), affine
 
 
-def write(path, values, affine, crs=CRS, unit=None, nodata=-9999.0, **tags):
+def write(path, values, affine, crs=CRS, unit=None, nodata=-9999.0, dtype="float64"):
     values = np.where(np.isnan(values), nodata, values)
-    profile = {"driver": "GTiff", "width": values.shape[1], "height": values.shape[0], "count": 1, "dtype": "float64"}
+    profile = {"driver": "GTiff", "width": values.shape[1], "height": values.shape[0], "count": 1, "dtype": dtype}
     with rasterio.open(path, "w", crs=crs, transform=affine, nodata=nodata, **profile) as file:
-        file.write(values, 1)
+        file.write(values.astype(dtype), 1)
         if unit:
             file.units = (unit,)
     return path

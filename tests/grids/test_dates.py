@@ -23,15 +23,8 @@ def run_chain(lai):
     toa = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa()
     image = toa.fifesim.sense()
     noisy = toa.fifesim.sense(seed=3, **NOISE)
-    rasters = [
-        image,
-        noisy,
-        image.fifesim.ndvi(),
-        image.fifesim.to_surface(),
-        lai.fifesim.fpar(),
-        lai.fifesim.aggregate(30),
-    ]
-    return toa, *rasters
+    of_image = image, noisy, image.fifesim.ndvi(), image.fifesim.to_surface()
+    return toa, *of_image, lai.fifesim.fpar(), lai.fifesim.aggregate(30)
 
 
 def test_each_date_equals_the_date_processed_alone(season):

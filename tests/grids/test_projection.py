@@ -25,6 +25,9 @@ def test_nad27_is_transformed_to_nad83_with_known_accuracy():
     east, north = pyproj.Transformer.from_pipeline(pipeline).transform(705000.0, 4334000.0)
     assert np.hypot(east - 704968, north - 4334211) < 2.0
     assert 0 < accuracy <= 15
+    back, _ = projection.operation("EPSG:26914", "EPSG:26714", FIFE)
+    again = pyproj.Transformer.from_pipeline(back).transform(east, north)
+    np.testing.assert_allclose(again, (705000.0, 4334000.0), rtol=0, atol=1e-3)
 
 
 def test_direct_ballpark_operation_would_be_one_pixel_off():
@@ -36,14 +39,6 @@ def test_direct_ballpark_operation_would_be_one_pixel_off():
     assert 25 < np.hypot(east - 704968, north - 4334211) < 35
     pipeline, _ = projection.operation("EPSG:26714", "EPSG:26914", FIFE)
     assert "helmert" in pipeline
-
-
-def test_operation_runs_in_both_directions():
-    forth, _ = projection.operation("EPSG:26714", "EPSG:26914", FIFE)
-    back, _ = projection.operation("EPSG:26914", "EPSG:26714", FIFE)
-    there = pyproj.Transformer.from_pipeline(forth).transform(705000.0, 4334000.0)
-    again = pyproj.Transformer.from_pipeline(back).transform(*there)
-    np.testing.assert_allclose(again, (705000.0, 4334000.0), rtol=0, atol=1e-3)
 
 
 def test_convergence_of_a_utm_zone_is_positive_east_of_its_meridian():

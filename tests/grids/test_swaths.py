@@ -19,21 +19,13 @@ def swath(dtype=float):
     x, y = 705180.7 + 31.3 * sample - 4.1 * line, 4333833.3 - 33.7 * line - 3.9 * sample
     values = np.stack([1 + line + 40 * sample, 5 + line % 200]).astype(dtype) % 250
     dims = ("line", "sample")
-    return xr.DataArray(
-        values,
-        dims=("band", *dims),
-        coords={
-            "band": ["TM3", "TM4"],
-            "line": np.arange(30) - 7,
-            "x": (dims, x),
-            "y": (dims, y),
-            "vza": (dims, 30 + sample / 10, {"units": "degree"}),
-            "sza": 31.0,
-            "spatial_ref": grids.coordinates(GRID)["spatial_ref"],
-        },
-        name="dn",
-        attrs={"units": "1", "history": "sense_swath"},
-    )
+    coords = {"band": ["TM3", "TM4"], "line": np.arange(30) - 7, "x": (dims, x), "y": (dims, y), "sza": 31.0}
+    coords |= {
+        "vza": (dims, 30 + sample / 10, {"units": "degree"}),
+        "spatial_ref": grids.coordinates(GRID)["spatial_ref"],
+    }
+    attrs = {"units": "1", "history": "sense_swath"}
+    return xr.DataArray(values, dims=("band", *dims), coords=coords, name="dn", attrs=attrs)
 
 
 def test_each_cell_takes_the_nearest_pixel():

@@ -7,6 +7,7 @@ import rasterio
 import rioxarray
 import xarray as xr
 from affine import Affine
+from elevations import write
 from lazy import check_place, no_compute
 from odc.geo.geobox import GeoBox
 from scipy.interpolate import RegularGridInterpolator
@@ -17,15 +18,6 @@ from fifesim.grids import projection, warp
 
 FIFE = (-96.63, 38.98, -96.45, 39.13)
 GRID = fifesim.fife_site(10.0, window=((300, 400), (500, 620)))
-
-
-def write(path, values, affine, crs, nodata=-999.0, dtype="float64"):
-    with rasterio.open(
-        path, "w", driver="GTiff", height=values.shape[0], width=values.shape[1], count=1, dtype=dtype, crs=crs,
-        transform=affine, nodata=nodata,
-    ) as sink:  # fmt: skip
-        sink.write(np.where(np.isnan(values), nodata, values).astype(dtype), 1)
-    return path
 
 
 def hills(rows, columns):
@@ -131,7 +123,7 @@ def test_no_data_stays_no_data(tmp_path, dtype, nodata):
     values = np.full((400, 400), 3.0)
     values[150:170, 200:260] = np.nan
     affine = Affine(10, 0, GRID.affine.c - 1400, 0, -10, GRID.affine.f + 1200)
-    path = write(tmp_path / "lai.tif", values, affine, "EPSG:26914", nodata, dtype)
+    path = write(tmp_path / "lai.tif", values, affine, "EPSG:26914", nodata=nodata, dtype=dtype)
     expected = values[120:220, 140:260]
     np.testing.assert_array_equal(warp.file_onto_grid(path, GRID), expected)
     finer = warp.file_onto_grid(path, fifesim.fife_site(4.0, window=((750, 1000), (1250, 1550))))

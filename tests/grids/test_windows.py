@@ -166,19 +166,11 @@ def test_kernel_gets_the_location_of_its_block(monkeypatch, tile):
     assert (windows.located(kernel, array.chunk({"y": 5, "x": 8}), tile=tile) == 0).all()
 
 
-def raster(chunks):
-    return xr.DataArray(da.zeros((4, 6), chunks=chunks), dims=("y", "x"))
-
-
-def test_origin_is_kept_with_unchanged_values():
-    made = with_origin(raster(2), "leaves")
+def test_origin_is_kept_with_unchanged_values_and_released_with_its_raster():
+    made = with_origin(xr.DataArray(da.zeros((4, 6), chunks=2), dims=("y", "x")), "leaves")
     assert origin_of(made) == "leaves" and origin_of(made.compute()) is None
     assert origin_of(made.assign_coords(sza=30.0).rename("other")) == "leaves"
     assert origin_of(made + 1) is None and origin_of(made[1:]) is None and origin_of(made.persist()) is None
-
-
-def test_origin_is_released_with_its_raster():
-    made = with_origin(raster(2), "leaves")
     key = id(made.data.dask), made.data.name
     assert key in _ORIGINS
     del made

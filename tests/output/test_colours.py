@@ -45,11 +45,6 @@ def clumping(monkeypatch, lai):
     return cf.label(0.3 + lai / 10, "clumping", history="made")
 
 
-def colour_ramp(path):
-    root = ElementTree.parse(path).getroot()
-    return [(float(item.get("value")), item.get("color")) for item in root.iter("item")]
-
-
 def test_quantity_words_come_from_the_table(clumping, whole):
     assert clumping.name == "clumping" and clumping.attrs["long_name"] == "clumping index"
     assert (short_name(clumping), unit(clumping), long_name(clumping)) == ("clumping", "[m² m⁻²]", "Clumping index")
@@ -73,9 +68,11 @@ def test_quantity_colours_come_from_the_table(clumping, tmp_path):
     picture = clumping.fifesim.plot().images[0]
     assert picture.get_cmap().name == "magma" and picture.get_clim() == pytest.approx((low, high))
     assert value_map(clumping, "").bar.stops == layer_words(["clumping"])["clumping"]["stops"] == magma
-    shown = colour_ramp(fifesim.write_style(clumping.fifesim.to_geotiff(tmp_path / "clumping.tif")))
-    assert [colour for _, colour in shown] == magma
-    assert (shown[0][0], shown[-1][0]) == (0.25, pytest.approx(high, rel=1e-5))
+    style = fifesim.write_style(clumping.fifesim.to_geotiff(tmp_path / "clumping.tif"))
+    shown = list(ElementTree.parse(style).getroot().iter("item"))
+    assert [item.get("color") for item in shown] == magma
+    ends = [float(shown[end].get("value")) for end in (0, -1)]
+    assert ends == pytest.approx([0.25, high], rel=1e-5)
     row = contact_sheet(chips(clumping), ["train"]).axes[1].images[0]
     assert row.get_cmap().name == "magma" and row.get_clim() == pytest.approx((low, high))
 
@@ -84,9 +81,8 @@ def chips(raster):
     """A Dataset of one chip with a one-band image and the raster as truth."""
     reflectance = ("chip", "band", "y", "x"), raster.values[None, None]
     coordinates = {"band": ["TM4"], "wavelength": ("band", [0.83]), "split": ("chip", ["train"])}
-    return xr.Dataset(
-        {"toa_reflectance": reflectance, str(raster.name): (("chip", "y", "x"), raster.values[None])}, coordinates
-    )
+    truth = {str(raster.name): (("chip", "y", "x"), raster.values[None])}
+    return xr.Dataset({"toa_reflectance": reflectance} | truth, coordinates)
 
 
 def test_quantities_have_short_name_range_and_colour_map():
@@ -107,15 +103,9 @@ def test_quantities_have_short_name_range_and_colour_map():
 
 def test_rasters_of_a_run_lie_within_the_valid_range(whole, site):
     dem = fifesim.flint_hills(site, seed=1)
-    rasters = [
-        *whole.values(),
-        dem.fifesim.slope(),
-        dem.fifesim.aspect(),
-        dem.fifesim.sky_view(),
-        dem.fifesim.horizon(),
-    ]
+    relief = dem.fifesim.slope(), dem.fifesim.aspect(), dem.fifesim.sky_view(), dem.fifesim.horizon()
     checked = set()
-    for raster in rasters:
+    for raster in (*whole.values(), *relief):
         for array in (raster, *raster.coords.values()):
             quantity = cf.QUANTITIES.get(array.name)
             if quantity is not None and (quantity.lowest, quantity.highest) != (None, None):

@@ -22,19 +22,12 @@ def write(folder, text, names=NAMES, **options):
             (hidden / name).write_text(text)
 
 
-def test_only_files_of_the_same_name_are_replaced(tmp_path):
+def test_only_files_of_the_same_name_and_their_gdal_sidecars_are_replaced(tmp_path):
     write(tmp_path, "old")
-    (tmp_path / "notes.txt").write_text("mine")
+    for name in ("notes.txt", "one.txt.aux.xml", "other.tif.aux.xml"):
+        (tmp_path / name).write_text("mine")
     write(tmp_path, "new", overwrite=True)
-    assert contents(tmp_path) == {"one.txt": "new", "two.txt": "new", "notes.txt": "mine"}
-
-
-def test_gdal_sidecar_of_a_replaced_raster_is_removed(tmp_path):
-    for name in ("image.tif", "image.tif.aux.xml", "other.tif.aux.xml"):
-        (tmp_path / name).write_text("old")
-    with results(tmp_path, ["image.tif"], overwrite=True) as partial:
-        (partial / "image.tif").write_text("new")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["image.tif", "other.tif.aux.xml"]
+    assert contents(tmp_path) == {"one.txt": "new", "two.txt": "new", "notes.txt": "mine", "other.tif.aux.xml": "mine"}
 
 
 class Killed(BaseException):

@@ -69,20 +69,17 @@ def test_frame_marks_its_part_of_the_map(lai):
     assert maps.value_map(wide, "").scale == (pytest.approx(25), "1 km")
 
 
-def test_leaves_are_red_and_soil_is_not(dn):
+def test_leaves_are_red_and_no_data_is_grey(dn):
     """The composite shows near infrared as red, so the pixel with the highest NDVI has the largest share of red."""
     found = maps.image_map(dn, "", maps.stretch_of(dn)).pixels.astype(float)
     ndvi = dn.fifesim.ndvi().values
     red = found[..., 0] - found[..., 1:].mean(axis=-1)
     assert np.corrcoef(red.ravel(), ndvi.ravel())[0, 1] > 0.9
     assert maps.false_colour_names(dn) == ["TM4", "TM3", "TM2"]
-
-
-def test_no_data_is_grey_in_an_image(dn):
     holed = dn.copy()
     holed[1, 2, 3] = 0
     pixels = maps.image_map(holed, "", maps.stretch_of(dn)).pixels
-    assert (pixels[2, 3] == 217).all() and (pixels != 217).any()
+    assert (pixels[2, 3] == 217).all() and (pixels != 217).any(), "no data is grey"
 
 
 def test_relief_is_lit_from_the_north_west(lai):
@@ -129,24 +126,23 @@ def test_colours_are_stretched_between_percentiles():
     assert not {"sza", "band", "wavelength"} & set(found.coords)
 
 
-@pytest.mark.parametrize(
-    ("bands", "composite", "message"),
-    [
-        (("B4", "B8"), "natural colour", "natural colour needs a green and a blue band, the image has B4, B8"),
-        (("B3", "B4"), "false colour", "false colour needs a near infrared band"),
-        (("B3", "B4"), "colour", "composite must be 'false colour' or 'natural colour', or the names of three bands"),
-        (("B3", "B4"), ("B3", "B4", "B9"), "a composite is of three of the bands B3, B4"),
-        (("B3", "B4"), ("B3", "B4"), "a composite is of three of the bands B3, B4"),
-    ],
-)
-def test_missing_bands_are_named(bands, composite, message):
+MISTAKES = [
+    (("B4", "B8"), {"composite": "natural colour"}, "needs a green and a blue band, the image has B4, B8"),
+    (("B3", "B4"), {}, "false colour needs a near infrared band"),
+    (("B3", "B4"), {"composite": "colour"}, "composite must be 'false colour' or 'natural colour', or the names of"),
+    (("B3", "B4"), {"composite": ("B3", "B4", "B9")}, "a composite is of three of the bands B3, B4"),
+    (("B3", "B4"), {"composite": ("B3", "B4")}, "a composite is of three of the bands B3, B4"),
+    (("B3", "B4", "B8"), {"stretch": (98, 2)}, "stretch must be two percentiles"),
+]
+
+
+@pytest.mark.parametrize(("bands", "options", "message"), MISTAKES)
+def test_invalid_composites_are_rejected(bands, options, message):
     with pytest.raises(ValueError, match=message):
-        maps.rgb(make_image(bands), composite)
+        maps.rgb(make_image(bands), **options)
 
 
-def test_other_mistakes_are_named():
-    with pytest.raises(ValueError, match="stretch must be two percentiles"):
-        maps.rgb(make_image(), stretch=(98, 2))
+def test_image_needs_bands_and_wavelengths():
     with pytest.raises(ValueError, match="along a dimension band"):
         maps.rgb(make_image().isel(band=0))
     with pytest.raises(ValueError, match=r"has no wavelength .*composite=\('\w+', '\w+', '\w+'\)"):
@@ -204,12 +200,6 @@ def image(small_run):
     return fifesim.open_image(small_run / "image.tif")
 
 
-def limits(renderer, colour):
-    found = renderer.find(f"{colour}ContrastEnhancement" if colour else "contrastEnhancement")
-    assert found.find("algorithm").text == "StretchToMinimumMaximum"
-    return [float(found.find(name).text) for name in ("minValue", "maxValue")]
-
-
 @pytest.mark.parametrize(
     ("bands", "numbers"),
     [
@@ -231,28 +221,22 @@ def test_style_selects_bands_by_wavelength(lai, tmp_path, bands, numbers):
     assert " ".join(renderer.get(f"{colour}Band") for colour in ("red", "green", "blue")) == numbers
 
 
-def colour_ramp(renderer):
-    return [(float(item.get("value")), item.get("color")) for item in renderer.iter("item")]
-
-
-def test_leaf_area_and_ndvi_have_specific_colour_ramps(image, small_run, tmp_path):
+def test_style_ramps_and_stretches_span_the_data(image, small_run, tmp_path):
+    """NDVI has a fixed range; no data and images without contrast do not break a stretch."""
     truth = fifesim.open_image(small_run / "truth.tif")
-    shown = colour_ramp(read_style(truth, tmp_path / "truth.tif"))
-    assert shown[0] == (0.0, "#ffffe5")
-    assert shown[-1][0] == pytest.approx(float(np.percentile(truth.sel(band="lai"), 99)), rel=1e-5)
-    assert [value for value, _ in shown] == sorted(value for value, _ in shown)
-    ndvi = colour_ramp(read_style(image.fifesim.ndvi(), tmp_path / "ndvi.tif"))
-    assert (ndvi[0], ndvi[-1]) == ((0.0, "#440154"), (1.0, "#fde725"))
-
-
-def test_no_data_does_not_affect_the_stretch(image, tmp_path):
-    holed = image.sel(band=["TM4"]).copy()
-    holed[:, :, :15] = 0
-    renderer = read_style(holed, tmp_path / "holed.tif")
+    (first, *_, last) = read_style(truth, tmp_path / "truth.tif").iter("item")
+    assert (first.get("value"), first.get("color")) == ("0", "#ffffe5")
+    assert float(last.get("value")) == pytest.approx(float(np.percentile(truth.sel(band="lai"), 99)), rel=1e-5)
+    (first, *_, last) = read_style(image.fifesim.ndvi(), tmp_path / "ndvi.tif").iter("item")
+    assert [(each.get("value"), each.get("color")) for each in (first, last)] == [("0", "#440154"), ("1", "#fde725")]
+    near = image.sel(band=["TM4"]).copy()
+    near[:, :, :15] = 0
     expected = np.percentile(fifesim.to_radiance(image).sel(band="TM4")[:, 15:], (1, 99))
-    np.testing.assert_allclose(limits(renderer, ""), expected, rtol=1e-5)
-    low, high = limits(read_style(image.sel(band=["TM4"]).where(False, 7).astype("uint8"), tmp_path / "flat.tif"), "")
-    assert low < high
+    for name, raster in (("holed", near), ("flat", near.where(False, 7).astype("uint8"))):
+        found = read_style(raster, tmp_path / f"{name}.tif").find("contrastEnhancement")
+        assert found.find("algorithm").text == "StretchToMinimumMaximum"
+        low, high = (float(found.find(end).text) for end in ("minValue", "maxValue"))
+        assert low < high and (name == "flat" or [low, high] == pytest.approx(expected, rel=1e-5))
 
 
 def test_existing_style_is_kept_unless_overwritten(image, tmp_path):

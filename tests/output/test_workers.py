@@ -7,6 +7,7 @@ import sys
 import weakref
 from collections import namedtuple
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import dask.array as da
 import distributed
@@ -118,41 +119,21 @@ def test_workers_reject_clients_without_their_certificate():
         assert told.stdout.split() == ["refused"] * 3
 
 
-class Future:
-    def __init__(self, released):
-        self.release = lambda: released.append(self)
-
-
-class Stub:
-    """A cluster that returns one result and then raises an error."""
-
-    loop = None
-
-    def __init__(self, monkeypatch, error):
-        self.cancelled, self.released = [], []
-        self.futures = [Future(self.released) for _ in range(3)]
-
-        def as_completed(futures, **options):
-            yield futures[0], "first"
-            raise error
-
-        monkeypatch.setattr(distributed, "as_completed", as_completed)
-
-    def get(self, *arguments, **options):
-        return self.futures
-
-    def cancel(self, futures, force):
-        self.cancelled += futures
-
-
 def test_task_that_kills_workers_is_reported_and_other_tasks_cancelled(monkeypatch):
-    error = KilledWorker("task", SimpleNamespace(address="tcp://here"), 3)
-    stub, found = Stub(monkeypatch, error), []
+    client, futures, found = Mock(loop=None), [Mock() for _ in range(3)], []
+    client.get.return_value = futures
+
+    def as_completed(futures, **options):
+        yield futures[0], "first"
+        raise KilledWorker("task", SimpleNamespace(address="tcp://here"), 3)
+
+    monkeypatch.setattr(distributed, "as_completed", as_completed)
     tasks, outputs = workers.tasks_of({"ones": da.ones(3, chunks=1)}, [("ones", (n,)) for n in range(3)])
     with pytest.raises(RuntimeError, match="a worker may lack memory"):
-        workers.run_on_client(tasks, outputs, lambda *output: found.append(output), stub)
-    assert found == [("ones", (0,), "first")] and stub.released == stub.futures[:1]
-    assert stub.cancelled == stub.futures[1:]
+        workers.run_on_client(tasks, outputs, lambda *output: found.append(output), client)
+    assert found == [("ones", (0,), "first")]
+    assert [future.release.called for future in futures] == [True, False, False]
+    assert client.cancel.call_args.args[0] == futures[1:]
 
 
 FLAT = {"terrain": {"dem": "flat"}}
