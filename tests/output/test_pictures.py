@@ -120,8 +120,6 @@ def test_rasters_that_are_no_maps_are_rejected(whole):
         whole["image"].fifesim.plot(band="TM1")
     with pytest.raises(ValueError, match=r"a map has dimensions \(\[band\], y, x\)"):
         whole["image"].expand_dims("scene").fifesim.plot()
-    with pytest.raises(TypeError, match=r"must be an xarray\.DataArray"):
-        fifesim.plot(whole["image"].to_dataset())
 
 
 def test_fit_is_drawn_with_its_pixels(whole):
