@@ -75,26 +75,21 @@ def test_every_public_name_has_an_example():
 
 def test_code_of_pages_fits_their_width():
     code = re.compile(r"^```\S+(?: python\n:class: no-run)?\n(.*?)^```", re.S | re.M)
-    lines = ((page.name, line) for page in PAGES[1:] for block in code.findall(page.read_text("utf-8"))
-             for line in block.splitlines())  # fmt: skip
-    assert [(page, line) for page, line in lines if len(line) > 96] == []
+    blocks = {page.name: "".join(code.findall(page.read_text("utf-8"))) for page in PAGES[1:]}
+    assert [(page, line) for page, text in blocks.items() for line in text.splitlines() if len(line) > 96] == []
 
 
 def test_links_between_pages_resolve():
     pages = [*PAGES, ROOT / "data" / "README.md"]
-    links = [
-        (page, link) for page in pages for link in re.findall(r"\]\((?!https?:)([^)#:\s]+)", page.read_text("utf-8"))
-    ]
+    link_of = re.compile(r"\]\((?!https?:)([^)#:\s]+)")
+    links = [(page, link) for page in pages for link in link_of.findall(page.read_text("utf-8"))]
     # The build generates the gallery and its pictures, and the reference.
     scripts = (DOCS / "gallery_src").rglob("plot_*.py")
     drawn = {path.relative_to(DOCS / "gallery_src").with_suffix("").as_posix() for path in scripts}
     reference = ("api/functions", "api/functions.rst")
     made = ("tables/why_scatter.png", "tables/why_pixel.png")
     built = {"gallery/index", *reference, *made, *(f"gallery/{name}" for name in drawn)}
-    missing = [
-        (page.name, link)
-        for page, link in links
-        if not (page.parent / link).exists() and link.removeprefix("../") not in built
-    ]
+    absent = ((page, link) for page, link in links if not (page.parent / link).exists())
+    missing = [(page.name, link) for page, link in absent if link.removeprefix("../") not in built]
     pictures = [re.sub(r"^(?:\.\./)?gallery/(.*)images/sphx_glr_(\w+)_\d+\.png$", r"\1\2", link) for _, link in missing]
     assert [each for each, picture in zip(missing, pictures, strict=True) if picture not in drawn] == []

@@ -48,10 +48,9 @@ def test_each_page_includes_its_table(tables):
 def test_scenario_keys_have_unit_range_default_and_meaning(tables):
     found = sections(tables.scenario_keys())
     assert list(found) == [f"[{'classes.NAME' if name == 'classes' else name}]" for name in Scenario.model_fields]
-    for name in Scenario.model_fields:
+    for name, text in zip(Scenario.model_fields, found.values(), strict=True):
         is_class = name == "classes"
         section = Scenario.section((name, "grass") if is_class else (name,))
-        text = found["[classes.NAME]" if is_class else f"[{name}]"]
         by_key = rows(text)
         for key, known in section.model_fields.items():
             if is_class and key in StandKeys.model_fields:
@@ -133,10 +132,8 @@ def test_page_has_every_command_option_and_help_text(tables):
             assert " ".join(parameter.help.split()) in " ".join(found[name].split())
             names = parameter.opts if parameter.param_type_name == "option" else [parameter.name]
             assert all(option in found[name] for option in names)
-    assert (
-        "(default: fife)" in found["simulate"]
-        and "`--threads <int>` | Number of threads; by default one per core. (at least 1)" in found["simulate"]
-    )
+    threads = "`--threads <int>` | Number of threads; by default one per core. (at least 1)"
+    assert "(default: fife)" in found["simulate"] and threads in found["simulate"]
     assert "default: 0" not in found["simulate"]
     assert "fifesim rerun [OPTIONS] {file}" in found["rerun"]
 

@@ -99,20 +99,6 @@ def test_background_spectrum_from_file_dataset_or_mixture(tmp_path, lai):
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"soil_dri": 0.6, "dead_grass": 0.4}, "no spectrum 'soil_dri', did you mean 'soil_dry'. There are soil_dry, "),
-        ({"soil_dry": 0.6}, "must add up to 1, got 0.6: the part without reflection is 'shade'"),
-        ({"soil_dry": 1.5, "shade": -0.5}, r"fraction of 'soil_dry' must be in \[0, 1\], got 1.5"),
-        ({"no_such.csv": 1.0}, "cannot read the spectrum no_such.csv"),
-    ],
-)
-def test_impossible_mixtures_are_refused(given, message):
-    with pytest.raises(ValueError, match=message):
-        optics.band_background(TM, fifesim.Background(given))
-
-
-@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("nm,reflectance\n400,0.1\n2500,0.2\n", "mine.csv has no column wavelength"),
@@ -120,14 +106,17 @@ def test_impossible_mixtures_are_refused(given, message):
         ("wavelength,reflectance\n0.4,10\n2.5,20\n", "got 10 at 0.4 um: give a fraction"),
         ("wavelength,reflectance\n0.5,0.1\n0.4,0.2\n", "must increase"),
         ("wavelength,reflectance\n0.5,0.1\n1.0,0.2\n", "no leaf or background spectrum for band TM1.*by band"),
+        ("", "cannot read the spectrum .*mine.csv"),
     ],
 )
 def test_unusable_background_spectra_are_refused(tmp_path, text, message):
     with pytest.raises(ValueError, match=message):
-        optics.band_background(TM, written(tmp_path, text))
+        optics.band_background(TM, fifesim.Background({written(tmp_path, text): 1.0}))
 
 
-def test_spectra_need_responses():
+def test_spectra_need_responses_and_known_names():
+    with pytest.raises(ValueError, match=r"no spectrum 'soil_dri', did you mean 'soil_dry'\? There are soil_dry, "):
+        optics.band_background(TM, fifesim.Background({"soil_dri": 0.6, "dead_grass": 0.4}))
     with pytest.raises(TypeError, match="a Leaf is a spectrum, it needs the bands' responses"):
         optics.band_leaf_optics(["TM3"], fifesim.Leaf())
     with pytest.raises(TypeError, match="Background takes"):
@@ -164,34 +153,28 @@ LEAF = "Wavelength,Reflectance, Transmittance\n0.4,0.05,0.01\n0.7,0.1,0.05\n0.8,
 
 def leaf_dataset(wavelength=(0.4, 0.7, 0.8, 2.5), units=None, transmittance=(0.01, 0.05, 0.4, 0.1)):
     axis = xr.Variable("wavelength", np.array(wavelength), {} if units is None else {"units": units})
-    values = {
-        "reflectance": ("wavelength", [0.05, 0.1, 0.5, 0.2]),
-        "transmittance": ("wavelength", list(transmittance)),
-    }
-    return xr.Dataset(values, {"wavelength": axis})
+    values = {"reflectance": [0.05, 0.1, 0.5, 0.2], "transmittance": list(transmittance)}
+    return xr.Dataset({name: ("wavelength", each) for name, each in values.items()}, {"wavelength": axis})
 
 
 def test_leaf_spectra_from_file_or_dataset(tmp_path, lai):
     """Column names may be capitalised; a Dataset in nanometres is converted."""
     path = written(tmp_path, LEAF)
     given = path, tmp_path / "mine.csv", leaf_dataset(), leaf_dataset((400, 700, 800, 2500), "nm")
+
+    def scene(**canopy):
+        return fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"], canopy=fifesim.Canopy(**canopy))
+
     for name in ("leaf_optics", "brown_leaf"):
-        made = [
-            fifesim.surface_reflectance(
-                lai, "TM", bands=["TM3", "TM4"], canopy=fifesim.Canopy(**{name: each}, brown=0.5)
-            )
-            for each in given
-        ]
-        for other in made[1:]:
-            xr.testing.assert_allclose(made[0], other, rtol=1e-12)
+        first, *others = (scene(**{name: each}, brown=0.5) for each in given)
+        for other in others:
+            xr.testing.assert_allclose(first, other, rtol=1e-12)
     reflectance, transmittance = optics.band_leaf_optics(TM[2:4], path)
     # The spectra are straight lines within the red band, so their means are values inside the band.
     assert 0.05 + 0.05 * (0.63 - 0.4) / 0.3 < reflectance[0] < 0.05 + 0.05 * (0.69 - 0.4) / 0.3
     assert 0.01 + 0.04 * (0.63 - 0.4) / 0.3 < transmittance[0] < 0.01 + 0.04 * (0.69 - 0.4) / 0.3
     numbers = {"TM3": (reflectance[0], transmittance[0]), "TM4": (reflectance[1], transmittance[1])}
-    by_band = fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"], canopy=fifesim.Canopy(leaf_optics=numbers))
-    made = fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"], canopy=fifesim.Canopy(leaf_optics=path))
-    xr.testing.assert_allclose(made, by_band, rtol=1e-12)
+    xr.testing.assert_allclose(scene(leaf_optics=path), scene(leaf_optics=numbers), rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -228,10 +211,8 @@ def test_spectra_are_read_from_regular_files_only(tmp_path, lai, name, monkeypat
     for path, message in wrong.items():
         with pytest.raises(ValueError, match=message):
             fifesim.surface_reflectance(lai, "TM", canopy=fifesim.Canopy(**{name: path}))
-    if name == "background":
-        with pytest.raises(ValueError, match="it is an address"):
-            mixture = fifesim.Background({"http://127.0.0.1:9/x.csv": 1})
-            fifesim.surface_reflectance(lai, "TM", canopy=fifesim.Canopy(background=mixture))
+    with pytest.raises(ValueError, match="it is an address"):
+        optics.band_background(TM, fifesim.Background({"http://127.0.0.1:9/x.csv": 1}))
 
 
 @pytest.mark.parametrize(

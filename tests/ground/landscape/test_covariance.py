@@ -52,11 +52,6 @@ def test_cross_correlation_is_the_integral_of_both_spectra(one, other):
     assert cross_correlation(other, one) == cross_correlation(one, other)
 
 
-def test_level_ground_is_refused():
-    with pytest.raises(ValueError, match="elevation is the same everywhere"):
-        copula({"lai": 0.1}, {("lai", "elevation"): 0.3}, {"elevation": np.ones(50)})
-
-
 THREE_PAIRS = {("lai", "soil"): 0.9, ("lai", "moisture"): 0.9, ("soil", "moisture"): -0.9}
 REQUESTED = {
     ("lai", "elevation"): 0.3,
@@ -127,7 +122,7 @@ def test_impossible_correlations_with_the_ground_are_refused(places):
     assert 0.95 < parts.ground["lai"].share <= 1
 
 
-def test_places_with_missing_values_are_left_out(places):
+def test_places_with_missing_values_are_left_out_and_level_ground_is_refused(places):
     holes = {name: values.copy() for name, values in places.items()}
     holes["wetness"][::3] = np.nan
     parts = copula({"lai": 0.1}, {("lai", "elevation"): 0.5, ("lai", "wetness"): -0.2}, holes)
@@ -136,6 +131,8 @@ def test_places_with_missing_values_are_left_out(places):
     np.testing.assert_array_equal(parts.ground["lai"].weights, other.ground["lai"].weights)
     with pytest.raises(ValueError, match="nowhere are all known"):
         copula({"lai": 0.1}, {("lai", "elevation"): 0.5}, {"elevation": np.full(9, np.nan)})
+    with pytest.raises(ValueError, match="elevation is the same everywhere"):
+        copula({"lai": 0.1}, {("lai", "elevation"): 0.3}, {"elevation": np.ones(50)})
 
 
 def put_together(parts, names, noises):

@@ -107,9 +107,8 @@ def test_leaf_area_has_the_given_correlations_with_the_ground(ground, following)
 @pytest.mark.parametrize("options", [ONE_LATTICE, ONE_LATTICE | COARSER], ids=["one-lattice", "coarser"])
 def test_fields_on_ground_have_the_same_bits_in_windows_and_chunks(grid, ground, options):
     whole, window = landscape_fields(grid, covariates=ground, **options), (slice(201, 300), slice(50, 222))
-    part = landscape_fields(
-        grid[window], reference=ground, covariates={name: each[window] for name, each in ground.items()}, **options
-    )
+    cut = {name: each[window] for name, each in ground.items()}
+    part = landscape_fields(grid[window], reference=ground, covariates=cut, **options)
     chunked = {name: in_chunks(each, {"y": 250, "x": 333}) for name, each in ground.items()}
     with no_compute():
         lazy = landscape_fields(grid, covariates=chunked, **options)
@@ -158,9 +157,7 @@ def test_nan_in_a_covariate_is_nan_in_the_fields_that_follow_it(grid, ground):
     [
         ({"arps": {"lai": 0.3}}, ValueError, "arp must be in"),
         ({"arps": {"lai": "coarse"}}, TypeError, "arps must be a number for each field"),
-        ({"arps": {"lai": 0.1}, "correlations": {("lai", "soil"): 0.1}}, ValueError, "name 'soil'"),
         ({"arps": {"lai": 0.1, "soil": 0.1}, "correlations": {("lai", "soil"): 2}}, ValueError, r"\[-1, 1\], got 2"),
-        ({"arps": [0.1]}, TypeError, "arps must be a mapping"),
         ({"arps": {"lai": 0.15}, "coarser": {"sand": 4}}, ValueError, "coarser names sand, there are 'lai'"),
     ],
 )
@@ -179,9 +176,8 @@ def test_impossible_covariates_are_refused(grid, ground):
     requested = {"elevation": 0.95, "wetness": 0.95}
     with pytest.raises(ValueError, match="lai cannot follow all of elevation, wetness"):
         landscape_fields(grid, {"lai": 0.1}, requested, covariates=ground)
-    lazy = landscape_fields(
-        grid, {"lai": 0.1}, requested, covariates={name: in_chunks(each, {"y": 300}) for name, each in ground.items()}
-    )
+    chunked = {name: in_chunks(each, {"y": 300}) for name, each in ground.items()}
+    lazy = landscape_fields(grid, {"lai": 0.1}, requested, covariates=chunked)
     with pytest.raises(ValueError, match="nearest allowed in their proportion"):
         lazy["lai"].compute()
 

@@ -77,12 +77,10 @@ def test_slopes_agree_with_the_watershed(landscapes):
 
 def test_semivariogram_agrees_with_the_watershed(landscapes):
     """Beyond 500 m the watershed also has a trend, which a larger landscape does not have."""
-    lags = {20: 2.6, 30: 5.5, 50: 13.4, 100: 38.9, 200: 88, 300: 128, 500: 198}
-    found = [np.mean([semivariance(values, int(lag / CELL)) for values in landscapes]) for lag in lags]
-    np.testing.assert_allclose(found, list(lags.values()), rtol=0.15)
-    for lag, value in {800: 299, 1200: 399}.items():
+    lags = {20: 2.6, 30: 5.5, 50: 13.4, 100: 38.9, 200: 88, 300: 128, 500: 198, 800: 299, 1200: 399}
+    for lag, value in lags.items():
         found = np.mean([semivariance(values, int(lag / CELL)) for values in landscapes])
-        assert found == pytest.approx(value, rel=0.25)
+        assert found == pytest.approx(value, rel=0.15 if lag <= 500 else 0.25)
 
 
 @pytest.mark.parametrize(("shortest", "longest", "exponent"), [(200, 1000, 3.5), (25, 200, 5.1)])
@@ -298,12 +296,6 @@ def test_hills_do_not_depend_on_the_cell_size():
     fine = fifesim.flint_hills(fifesim.grid_at("EPSG:26914", 7.1e5, 4.33e6, 300, 300, 10 / 3), 2)
     coarse = fifesim.flint_hills(fifesim.grid_at("EPSG:26914", 7.1e5, 4.33e6, 300, 300, 10.0), 2)
     np.testing.assert_allclose(fine.values[1::3, 1::3], coarse, rtol=0, atol=1e-6)
-
-
-def test_invalid_seed_and_large_cells_are_refused():
-    grid = fifesim.fife_site(30, window=((0, 9), (0, 9)))
-    with pytest.raises(ValueError, match="seed must be a whole number"):
-        fifesim.flint_hills(grid, -1)
     with pytest.raises(ValueError, match="at most 100 m"):
         fifesim.flint_hills(fifesim.fife_site(500), 1)
 

@@ -11,9 +11,8 @@ from fifesim.ground.terrain.slope import Vector, slope_aspect
 
 def tangents_of(dem, cell_y, cell_x, azimuths, reach):
     m, n = horizons.horizon_margin(cell_y, cell_x, reach)
-    return horizons.horizon_tangent(
-        np.pad(dem, ((m, m), (n, n)), constant_values=np.nan), cell_y, cell_x, azimuths, reach
-    )
+    padded = np.pad(dem, ((m, m), (n, n)), constant_values=np.nan)
+    return horizons.horizon_tangent(padded, cell_y, cell_x, azimuths, reach)
 
 
 @pytest.mark.parametrize("cells", [(10.0, 10.0), (10.0, 25.0), (30.0, 12.0)])
@@ -150,11 +149,10 @@ def test_horizon_below_the_horizontal_or_unknown_hides_no_sky():
 
 def cells_of(dem, cell, reach, count=32):
     """Slope, aspect and sky factor on a raster surrounded by NaN."""
-    azimuths = horizons.azimuths(count)
     m, n = horizons.horizon_margin(cell, cell, reach)
     padded = np.pad(dem, ((m, m), (n, n)), constant_values=np.nan)
     slope, aspect = slope_aspect(np.pad(dem, 1, constant_values=np.nan), cell, cell)
-    horizon = horizons.horizon_zenith(padded, cell, cell, azimuths, reach)
+    horizon = horizons.horizon_zenith(padded, cell, cell, horizons.azimuths(count), reach)
     return slope, aspect, sky_of(slope, aspect, horizon)
 
 
