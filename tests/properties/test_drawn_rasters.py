@@ -110,15 +110,8 @@ def rasters(draw):
 
 def write(path, *, driver, dtype, shape, count, crs, transform, nodata, scaling, gcps, tag, unit, wavelength):
     """Write the file and return its path."""
-    profile = {
-        "driver": "GTiff",
-        "dtype": dtype,
-        "height": shape[0],
-        "width": shape[1],
-        "count": count,
-        "nodata": nodata,
-    }
-    with rasterio.open(path, "w", **profile) as sink:
+    profile = {"driver": "GTiff", "dtype": dtype, "height": shape[0], "width": shape[1], "count": count}
+    with rasterio.open(path, "w", **profile, nodata=nodata) as sink:
         sink.crs = crs
         if gcps:
             points = [GroundControlPoint(row, row, WEST + 30 * row, NORTH - 30 * row) for row in range(4)]

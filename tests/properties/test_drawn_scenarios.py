@@ -16,8 +16,8 @@ from typing import get_args, get_origin
 
 import numpy as np
 import pytest
-import rasterio
 from affine import Affine
+from elevations import write
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
@@ -169,18 +169,8 @@ def folder(tmp_path_factory):
     tm = files.path("instruments/tm.toml").read_text(encoding="utf-8")
     (folder / "mine.toml").write_text(tm, encoding="utf-8")
     (folder / "samples.csv").write_text("lai\n1\n1.5\n2\n2.5\n3\n")
-    with rasterio.open(
-        folder / "lai.tif",
-        "w",
-        driver="GTiff",
-        height=20,
-        width=20,
-        count=1,
-        dtype="float32",
-        crs="EPSG:26914",
-        transform=Affine(10, 0, 704970, 0, -10, 4334220),
-    ) as sink:
-        sink.write(np.linspace(0.5, 3, 400, dtype="float32").reshape(1, 20, 20))
+    lai = np.linspace(0.5, 3, 400, dtype="float32").reshape(20, 20)
+    write(folder / "lai.tif", lai, Affine(10, 0, 704970, 0, -10, 4334220))
     for name in ("pipe.tif", "pipe.toml", "pipe.csv"):
         os.mkfifo(folder / name)
     (folder / "loop.toml").symlink_to("loop.toml")
@@ -237,23 +227,23 @@ def test_drawn_scenario_runs_or_is_rejected_in_a_few_lines(folder, drawn):
         return
     check_same(path, whole)
     event("accepted")
-    if few(scenario):
-        try:
-            run = simulate(scenario)
-        except ValueError as error:
-            check_refusal(error)
-            event("refused as it is simulated")
-            return
-        try:
-            check_image(scenario, run)
-        except ValueError as error:
-            # Crowns that cannot hold their leaves are detected in advance unless LAI or crown cover varies.
-            assert scenario.ground.lai_file or scenario.landscape.deviations.get("crown_cover"), error
-            check_refusal(error)
-            assert "leaf area index within the crowns" in str(error)
-            event("refused as it is computed")
-            return
+    if not few(scenario):
+        return
+    try:
+        run = simulate(scenario)
+    except ValueError as error:
+        check_refusal(error)
+        event("refused as it is simulated")
+        return
+    try:
+        check_image(scenario, run)
         event("computed")
+    except ValueError as error:
+        # Crowns that cannot hold their leaves are detected in advance unless LAI or crown cover varies.
+        assert scenario.ground.lai_file or scenario.landscape.deviations.get("crown_cover"), error
+        check_refusal(error)
+        assert "leaf area index within the crowns" in str(error)
+        event("refused as it is computed")
 
 
 def check_same(path, scenario):

@@ -38,16 +38,12 @@ def test_impossible_case_is_refused_before_computing(stage, options, said):
 def test_another_sensor_or_corner_makes_other_scenes():
     """A coarse sensor gets a larger scene; the corner lies a third of 10 km inside the corner of the site."""
     case = case_of(sensor="MODIS")
-    assert (case.bands, case.pixel, case.cells) == (("MODIS1", "MODIS2"), 250, 900) and case_of(
-        sensor="OLI"
-    ).cells == 333
-    for options, corner in (
-        ({}, (704970 + 10000 / 3, 4334220 - 10000 / 3)),
-        ({"west": 706000.0, "north": 4333000.0}, (706000.0, 4333000.0)),
-    ):
+    assert (case.bands, case.pixel, case.cells) == (("MODIS1", "MODIS2"), 250, 900)
+    assert case_of(sensor="OLI").cells == 333 and Case(cells=90).light() is None
+    corner, own = {"west": 704970 + 10000 / 3, "north": 4334220 - 10000 / 3}, {"west": 706000.0, "north": 4333000.0}
+    for options, expected in (({}, corner), (own, own)):
         box = case_of(**options).grid.boundingbox
-        assert (box.left, box.top) == pytest.approx(corner)
-    assert Case(cells=90).light() is None
+        assert (box.left, box.top) == pytest.approx(tuple(expected.values()))
 
 
 BANDS = ("TM3", "TM4")
@@ -62,18 +58,17 @@ def test_densities_from_a_folder_keep_both_modes(folders):
 
 
 def test_missing_density_is_named(folders, tmp_path):
-    (tmp_path / "burned-grazed.csv").write_text((folders["densities"] / "burned-grazed.csv").read_text())
-    (tmp_path / "unburned-ungrazed.csv").write_text((folders["densities"] / "burned-grazed.csv").read_text())
-    with pytest.raises(
-        ValueError, match=r"lacks a file of burned-ungrazed: Table 2 needs burned-grazed\.csv, burned-un"
-    ):
-        case.densities_of(tmp_path)
-    with pytest.raises(ValueError, match="lacks an entry of burned-ungrazed and unburned-ungrazed"):
-        case.densities_of({"burned-grazed": "burned-grazed"})
-    with pytest.raises(ValueError, match="unknown treatment 'grazed'"):
-        case.densities_of(case.densities_of(None) | {"grazed": "burned-grazed"})
-    with pytest.raises(ValueError, match=r"is no folder: it holds burned-grazed\.csv"):
-        case.densities_of(tmp_path / "nowhere")
+    for name in ("burned-grazed.csv", "unburned-ungrazed.csv"):
+        (tmp_path / name).write_text((folders["densities"] / name).read_text())
+    refused = {
+        r"lacks a file of burned-ungrazed: Table 2 needs burned-grazed\.csv, burned-un": tmp_path,
+        "lacks an entry of burned-ungrazed and unburned-ungrazed": {"burned-grazed": "burned-grazed"},
+        "unknown treatment 'grazed'": case.densities_of(None) | {"grazed": "burned-grazed"},
+        r"is no folder: it holds burned-grazed\.csv": tmp_path / "nowhere",
+    }
+    for message, given in refused.items():
+        with pytest.raises(ValueError, match=message):
+            case.densities_of(given)
 
 
 def test_optics_and_background_are_read_from_files(folders):
@@ -85,18 +80,18 @@ def test_optics_and_background_are_read_from_files(folders):
     assert case.background_of(None, BANDS) is None
 
 
-@pytest.mark.parametrize(("stage", "text", "said"), mistakes("optics", name="experiment_mistakes"), ids=str)
-def test_invalid_optics_give_a_message_of_one_line(tmp_path, stage, text, said):
-    (tmp_path / "mine.csv").write_text(text)
+INVALID = mistakes("optics", "background", name="experiment_mistakes")
+
+
+@pytest.mark.parametrize(("stage", "given", "said"), INVALID, ids=str)
+def test_invalid_optics_and_background_give_a_message_of_one_line(tmp_path, stage, given, said):
     with pytest.raises(ValueError, match=said) as told:
-        case.optics_by_band(tmp_path / "mine.csv", BANDS, case.OPTICS, "optics")
+        if stage == "optics":
+            (tmp_path / "mine.csv").write_text(given)
+            case.optics_by_band(tmp_path / "mine.csv", BANDS, case.OPTICS, "optics")
+        else:
+            case.background_of(given, BANDS)
     assert "\n" not in str(told.value) and len(str(told.value)) < 500
-
-
-@pytest.mark.parametrize(("stage", "given", "said"), mistakes("background", name="experiment_mistakes"), ids=str)
-def test_invalid_background_is_named(stage, given, said):
-    with pytest.raises(ValueError, match=said):
-        case.background_of(given, BANDS)
 
 
 def test_sensor_without_a_near_infrared_band_is_refused(tmp_path):

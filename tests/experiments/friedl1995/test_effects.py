@@ -69,16 +69,13 @@ def by_name(case):
     return {row.name: row for row in effects.number_sources(case)}
 
 
-def test_fitted_numbers_are_counted():
+def test_fitted_numbers_are_counted_without_user_inputs(folders):
     """Three means and deviations, four of leaves, two of background, the scene size and the reading."""
     assert effects.fitted_count(case_of()) == 3 + 3 + 4 + 2 + 1 + 1
     rows = by_name(case_of())
     assert rows["elevation"].origin == rows["hour and view"].origin == "assumed"
     assert rows["bounds of LAI"].origin == rows["form of the random field"].origin == "fitted to the text"
     assert rows["mean LAI"].text.startswith("0.74, 1.41, 1.18 (burned-grazed, burned-ungrazed, unburned-ungrazed)")
-
-
-def test_user_inputs_are_not_called_fitted(folders, tmp_path):
     case = case_of(reading="aligned", cells=90, **folders)
     rows = by_name(case)
     assert effects.fitted_count(case) == 0

@@ -8,15 +8,7 @@ import fifesim
 from fifesim.analysis import scaling
 from fifesim.cli import app
 from fifesim.experiments.verification import areas, canopy, deviations
-from fifesim.experiments.verification.deviations import (
-    HEADING,
-    Deviation,
-    by_stage,
-    deviation_line,
-    deviation_summary,
-    largest,
-    rms_percent,
-)
+from fifesim.experiments.verification.deviations import Deviation, by_stage, deviation_line, largest, rms_percent
 from fifesim.ground.terrain import spline
 
 
@@ -84,15 +76,13 @@ WITHIN = Deviation("terrain", "slope of planes", 1e-12, 1e-9, "degree", "plane")
 BEYOND = Deviation("canopy", "reciprocity", 0.2, 0.1, "1", "theory")
 
 
-def test_columns_are_aligned_with_the_heading():
+def test_columns_are_aligned_and_the_summary_names_exceeded_bounds():
     for word, text in (("compared", "slope of planes"), ("with", "plane")):
-        assert deviation_line(WITHIN).rindex(text) == HEADING.index(word)
+        assert deviation_line(WITHIN).rindex(text) == deviations.HEADING.index(word)
     assert "EXCEEDED" in deviation_line(BEYOND) and "EXCEEDED" not in deviation_line(WITHIN)
-
-
-def test_summary_names_exceeded_bounds():
-    assert deviation_summary([WITHIN, WITHIN]) == "2 checks, all within their bounds"
-    assert deviation_summary([WITHIN, BEYOND]) == "2 checks, 1 beyond their bounds: canopy: reciprocity"
+    assert deviations.deviation_summary([WITHIN, WITHIN]) == "2 checks, all within their bounds"
+    said = "2 checks, 1 beyond their bounds: canopy: reciprocity"
+    assert deviations.deviation_summary([WITHIN, BEYOND]) == said
 
 
 def test_every_stage_has_one_heading():
@@ -102,12 +92,9 @@ def test_every_stage_has_one_heading():
     assert lines[1:3] == [deviation_line(BEYOND), deviation_line(WITHIN)] and lines[4:] == [deviation_line(sensor)]
 
 
-def test_nan_exceeds_every_bound():
+def test_largest_and_rms_deviation_and_nan_exceeds_every_bound():
     assert np.isnan(largest([1.0, np.nan], 1.0))
     assert not Deviation("canopy", "anything", np.nan, 1.0, "1", "theory").within
     assert Deviation("canopy", "anything", 1.0, 1.0, "1", "theory").within
-
-
-def test_largest_and_rms_deviation():
     assert largest([1.0, 4.0], [2.0, 2.0]) == 2.0 and largest([1.0, 4.0], [2.0, 4.0], relative=True) == 0.5
     assert rms_percent([1.03, 0.96], 1.0) == pytest.approx(np.sqrt((9 + 16) / 2), rel=1e-12)

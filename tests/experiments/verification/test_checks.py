@@ -10,12 +10,7 @@ import pytest
 from broken import exceeded, notices
 
 from fifesim.atmosphere import adjacency, column
-from fifesim.experiments.verification import (
-    areas,
-    atmosphere,
-    canopy,
-    scattering,
-)
+from fifesim.experiments.verification import areas, atmosphere, canopy, scattering
 
 TABLE = Path(__file__).parents[2] / "data" / "broken_kernels.csv"
 BROKEN = pd.read_csv(TABLE, comment="#", keep_default_na=False, dtype=str)
