@@ -46,12 +46,19 @@ CHECKED = [
 
 # Accepted values that look wrong, by function and argument. In addition, the first argument of a function may be a
 # raster elsewhere ("crs").
-LIST, ARRAYS = {"list"}, {"numpy", "list", "empty", "1-d", "crs"}
+ARRAYS = {"numpy", "list", "empty", "1-d", "crs"}
+# Pairs such as (down, across), (bottom, top) and limits, names of three bands, and numbers by band.
+LISTS = {
+    "grid_at": ["cell"], "read_aerosol": ["layer"], "sense": ["interval", "offset", "gain_drift"], "rgb": ["stretch"],
+    "plot": ["composite", "limits", "stretch"], "plot_comparison": ["limits"], "topographic_correction": ["c"],
+    "cloud_field": ["thickness", "height", "drift"], "overpasses": ["place"], "train": ["levels"], "score": ["by"],
+    "retrieve": ["intervals"],
+}  # fmt: skip
 ACCEPTED = {
+    **{(function, name): {"list"} for function, names in LISTS.items() for name in names},
     # Any text is a valid label; None and other types are rejected.
-    ("Band", "name"): {"str"}, ("CoverClass", "name"): {"str"},
-    ("to_geotiff", "path"): {"str"}, ("dataset", "folder"): {"str"},
-    ("write_style", "path"): {"str"},
+    ("Band", "name"): {"str"}, ("CoverClass", "name"): {"str"}, ("to_geotiff", "path"): {"str"},
+    ("dataset", "folder"): {"str"}, ("write_style", "path"): {"str"}, ("train", "path"): {"str"},
     # Descriptions without a grid check rasters and spectra when they are used; see the test of canopy fields.
     **{("Canopy", name): {"list", "str", "dataset", "numpy", "1-d", "crs"} for name in PROPERTIES},
     # Setup is a description without a raster; names of bands, instruments and noise are checked by the steps.
@@ -59,37 +66,21 @@ ACCEPTED = {
     ("Setup", "clouds"): {"dataset"}, ("Setup", "surroundings"): ARRAYS - {"empty"},
     **{("Setup", name): {"list", "str"} for name in ("bands", "noise", "interval", "offset")},
     **{("Weather", each.name): {"crs"} for each in fields(fifesim.Weather)},
-    **{("RPV", name): ARRAYS for name in ("rho0", "k", "theta", "rhoc")},
-    **{("RossLi", name): ARRAYS for name in ("iso", "vol", "geo")},
-    **{("Leaf", name): {"numpy", "1-d", "crs", "empty"} for name in ("structure", "chlorophyll", "carotenoids",
-                                                            "anthocyanins", "brown", "water", "dry_matter")},
+    **{("RPV", each.name): ARRAYS for each in fields(fifesim.RPV)},
+    **{("RossLi", each.name): ARRAYS for each in fields(fifesim.RossLi)},
+    **{("Leaf", each.name): ARRAYS - {"list"} for each in fields(fifesim.Leaf)},
     # A Dataset is processed raster by raster, and a Dataset with sun coordinates is a geometry.
     ("aggregate", "array"): {"dataset", "crs"}, ("to_geotiff", "raster"): {"dataset", "crs"},
-    **{(name, "geometry"): {"dataset"} for name in ("fpar", "illumination", "kt", "sense", "shadow",
-                                                    "surface_reflectance", "to_surface", "to_toa",
-                                                    "as_seen_by", "landscape", "sense_swath",
-                                                    "calibrate", "canopy_spectra", "Setup", "light", "gpp",
-                                                    "evapotranspiration", "albedo", "brdf_normalise", "cast_clouds",
-                                                    "topographic_correction")},
-    ("brdf_normalise", "to"): {"dataset"}, ("topographic_correction", "c"): LIST,
+    ("brdf_normalise", "to"): {"dataset"},
+    **{(name, "geometry"): {"dataset"} for name in CHECKED if name != "Scenario"},
     # Numbers of any shape.
-    ("mtf", "frequency"): {"list", "1-d"}, ("snr", "radiance"): ARRAYS,
-    ("noise_equivalent_radiance", "radiance"): ARRAYS,
+    ("mtf", "frequency"): {"list", "1-d"}, ("cloud_field", "time"): {"list", "1-d"},
+    ("snr", "radiance"): ARRAYS, ("noise_equivalent_radiance", "radiance"): ARRAYS,
     **{("sun_position", name): {"list", "1-d"} for name in ("latitude", "longitude", "altitude")},
-    # Pairs: (down, across) or (bottom, top).
-    ("grid_at", "cell"): LIST, ("read_aerosol", "layer"): LIST, ("sense", "interval"): LIST, ("sense", "offset"): LIST,
-    ("sense", "gain_drift"): LIST,
-    # Statistics need no coordinates; chunks of a raster elsewhere are valid chunks.
+    # Statistics need no coordinates; chunks of a raster elsewhere are valid chunks; None where it has a meaning.
     ("density", "array"): {"1-d", "crs"}, ("share_kept", "pixels"): {"1-d", "crs"}, ("share_kept", "cells"): {"crs"},
     ("horizon", "beside"): {"crs"}, ("scale_bias", "array"): {"crs"}, ("landscape", "dem"): {"crs"},
-    # Names of three bands, ignored for a raster without bands; pairs of limits; None where it has a meaning.
-    ("plot", "composite"): LIST, ("plot", "limits"): LIST, ("plot_comparison", "limits"): LIST,
-    ("plot", "stretch"): LIST,
-    **{("cloud_field", name): LIST for name in ("thickness", "height", "drift")},
-    ("cloud_field", "time"): {"list", "1-d"}, ("overpasses", "place"): LIST,
-    ("train", "levels"): LIST, ("retrieve", "intervals"): LIST, ("train", "path"): {"str"},
-    ("score", "by"): LIST, ("score", "truth"): {"crs"}, ("rgb", "stretch"): LIST,
-    ("calibrate", "saturated"): {"none"}, ("simulate", "chunks"): {"none"},
+    ("score", "truth"): {"crs"}, ("calibrate", "saturated"): {"none"}, ("simulate", "chunks"): {"none"},
 }  # fmt: skip
 
 
