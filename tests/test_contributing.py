@@ -111,13 +111,8 @@ def failed(tmp_path_factory):
     text = mine.read_text(encoding="utf-8").replace('name = "TM"', 'name = "MINE"')
     mine.write_text(re.sub(r"^aliases = .*$", "", text, flags=re.MULTILINE), encoding="utf-8")
     (copy / "checks.json").write_text(json.dumps({name: recipe["check"] for name, recipe in RECIPES.items()}))
-    done = subprocess.run(
-        [sys.executable, "-c", _RUN],
-        cwd=copy,
-        env={"PYTHONPATH": str(copy), "HOME": str(copy)},
-        capture_output=True,
-        text=True,
-    )
+    env = {"PYTHONPATH": str(copy), "HOME": str(copy)}
+    done = subprocess.run([sys.executable, "-c", _RUN], cwd=copy, env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout.splitlines()[-1])
     assert Path(found["package"]).is_relative_to(copy)
