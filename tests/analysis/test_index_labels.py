@@ -96,8 +96,15 @@ def stack(lai_values):
 
 
 def test_composite_is_the_maximum_ndvi_with_its_date_and_sun(stack):
-    found = fifesim.composite(stack)
+    """Composites are lazy, and sun angles are by date or by cell."""
+    before, found = stack.copy(deep=True), fifesim.composite(stack)
     check_place(found, grids.geobox(stack).crs)
+    for chunks in (ODD_CHUNKS, ODD_CHUNKS | {"time": 1}):
+        with no_compute():
+            lazy = fifesim.composite(in_chunks(stack, chunks))
+        assert lazy.chunks is not None and lazy["date"].chunks is not None
+        xr.testing.assert_identical(lazy.compute(), found)
+    xr.testing.assert_identical(stack, before)
     np.testing.assert_array_equal(found, stack.max("time"))
     assert np.isnan(found[2, 3]) and np.isnat(found["date"][2, 3]) and np.isnan(found["sza"][2, 3])
     chosen = stack.fillna(-9).argmax("time").values
@@ -107,16 +114,9 @@ def test_composite_is_the_maximum_ndvi_with_its_date_and_sun(stack):
     assert found.attrs["composite"] == "maximum-value" and "composite" in found.attrs["history"]
     assert found["date"].attrs == {"long_name": "date of the selected image"}
     assert found["sza"].attrs["standard_name"] == "solar_zenith_angle" and "history" not in found["sza"].attrs
-
-
-@pytest.mark.parametrize("chunks", [ODD_CHUNKS, ODD_CHUNKS | {"time": 1}])
-def test_composite_is_lazy_and_the_same_in_chunks(stack, chunks):
-    before = stack.copy(deep=True)
-    with no_compute():
-        lazy = fifesim.composite(in_chunks(stack, chunks))
-    assert lazy.chunks is not None and lazy["date"].chunks is not None
-    xr.testing.assert_identical(lazy.compute(), fifesim.composite(stack))
-    xr.testing.assert_identical(stack, before)
+    sza = np.random.default_rng(3).uniform(20, 60, stack.shape)
+    by_cell = fifesim.composite(stack.assign_coords(sza=(stack.dims, sza)))["sza"].values
+    np.testing.assert_array_equal(by_cell[kept], np.take_along_axis(sza, chosen[None], axis=0)[0][kept])
 
 
 def test_images_are_composited_by_their_ndvi_or_a_given_index(stack):
@@ -162,28 +162,17 @@ def test_invalid_composites_are_rejected(stack, call, message):
     np.testing.assert_array_equal(fifesim.composite(stack, by=plain), fifesim.composite(stack))
 
 
-def test_angles_by_cell_come_from_the_selected_date(stack):
-    """Products opened with angles by pixel have such coordinates."""
-    sza = stack.copy(data=np.random.default_rng(3).uniform(20, 60, stack.shape)).drop_vars("date", errors="ignore")
-    found = fifesim.composite(stack.assign_coords(sza=(stack.dims, sza.values)))
-    for number, date in enumerate(stack["time"].values):
-        there = (found["date"] == date).values
-        np.testing.assert_array_equal(found["sza"].values[there], sza.values[number][there])
-
-
-@pytest.mark.parametrize("kind", ["netcdf", "zarr"])
 @pytest.mark.parametrize("chunks", [None, ODD_CHUNKS], ids=["eager", "lazy"])
-def test_composite_is_restored_from_netcdf_and_zarr(stack, tmp_path, kind, chunks):
+def test_composite_is_restored_from_netcdf_and_zarr(stack, tmp_path, chunks):
     found = fifesim.composite(stack if chunks is None else in_chunks(stack, chunks))
-    path = tmp_path / "composite"
-    if kind == "netcdf":
-        found.to_netcdf(path)
-        again = xr.open_dataset(path, decode_coords="all")
-    else:
-        found.to_dataset().to_zarr(path, consolidated=False)
-        again = xr.open_zarr(path, decode_coords="all", consolidated=False)
-    with again:
-        xr.testing.assert_identical(again["ndvi"].load(), found.compute())
+    found.to_netcdf(tmp_path / "netcdf")
+    found.to_dataset().to_zarr(tmp_path / "zarr", consolidated=False)
+    with (
+        xr.open_dataset(tmp_path / "netcdf", decode_coords="all") as netcdf,
+        xr.open_zarr(tmp_path / "zarr", decode_coords="all", consolidated=False) as zarr,
+    ):
+        for again in (netcdf, zarr):
+            xr.testing.assert_identical(again["ndvi"].load(), found.compute())
 
 
 @pytest.mark.parametrize("lazy", [False, True])
@@ -204,17 +193,18 @@ def test_composites_select_by_median_view_or_clear_dates(lai, lazy):
     ndvi = stack(values).rename("ndvi").assign_coords(vza=("time", vza))
     clear = stack(cloudless)
     seen = np.where(cloudless, values, np.nan)
-    some = np.isfinite(seen).any(axis=0)
-    with np.errstate(all="ignore"):
-        ordered = np.sort(seen, axis=0)
-    middle = np.maximum(np.isfinite(seen).sum(axis=0) - 1, 0) // 2
+    count = np.isfinite(seen).sum(axis=0)
+    some, last = count > 0, np.maximum(count - 1, 0)
+    ordered, slant = np.sort(seen, axis=0), np.where(np.isnan(seen), 99, vza[:, None, None])
+
+    def by_date(array, date):
+        return np.take_along_axis(array, date[None], axis=0)[0]
+
     expected = {
-        "median": np.take_along_axis(ordered, middle[None], axis=0)[0],
-        "nadir-most": np.take_along_axis(
-            seen, np.argmin(np.where(np.isnan(seen), 99, vza[:, None, None]), axis=0)[None], 0
-        )[0],
-        "mean-of-clear": np.where(some, np.nansum(seen, axis=0) / np.maximum(np.isfinite(seen).sum(axis=0), 1), np.nan),
-        "maximum-value": ordered[np.maximum(np.isfinite(seen).sum(axis=0) - 1, 0), *np.indices(grid.shape)],
+        "median": by_date(ordered, last // 2),
+        "nadir-most": by_date(seen, slant.argmin(axis=0)),
+        "mean-of-clear": np.where(some, np.nansum(seen, axis=0) / np.maximum(count, 1), np.nan),
+        "maximum-value": by_date(ordered, last),
     }
     for method, each in expected.items():
         found = ndvi.fifesim.composite(method, clear=clear)
@@ -222,11 +212,9 @@ def test_composites_select_by_median_view_or_clear_dates(lai, lazy):
         np.testing.assert_allclose(found.values, each, rtol=1e-12)
         assert found.attrs["composite"] == method
     nearest = ndvi.fifesim.composite("nadir-most", clear=clear)
-    np.testing.assert_array_equal(
-        nearest.vza.values[some], np.where(np.isnan(seen), 99, vza[:, None, None]).min(axis=0)[some]
-    )
+    np.testing.assert_array_equal(nearest.vza.values[some], slant.min(axis=0)[some])
     # Views from the other side of the track are equally far from nadir.
     signed = ndvi.assign_coords(vza=-ndvi.vza)
     np.testing.assert_array_equal(signed.fifesim.composite("nadir-most", clear=clear).values, nearest.values)
     mean = ndvi.fifesim.composite("mean-of-clear", clear=clear)
-    np.testing.assert_array_equal(mean.dates.values, np.isfinite(seen).sum(axis=0))
+    np.testing.assert_array_equal(mean.dates.values, count)

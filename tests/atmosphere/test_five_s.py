@@ -106,30 +106,20 @@ def test_aerosol_terms_agree_with_6s():
 
 SPECTRUM = np.array([0.45, 0.65, 0.85, 1.65])
 SZA, VZA, RAA = 50.0, np.array([0.0, 35.0]), np.array([0.0, 90.0, 180.0])
-COS_S, COS_V = np.cos(np.radians(SZA)), np.cos(np.radians(VZA))[:, None, None]
+COS_V = np.cos(np.radians(VZA))[:, None, None]
 HAZE = Atmosphere(visibility=8.0)
 
 
-def scattering(atmosphere):
-    return five_s_scattering(atmosphere, SPECTRUM, SZA, VZA, RAA)
-
-
-def test_without_aerosol_only_molecules_scatter():
-    light = scattering(Atmosphere(aerosol="none"))
-    np.testing.assert_array_equal(light.reflectance, light.molecules_reflectance)
-    np.testing.assert_allclose(light.diffuse_up_aerosol, 0, atol=1e-15)
-    np.testing.assert_allclose(
-        light.diffuse_up_molecules, light.transmittance_up - light.direct_transmittance_up, rtol=1e-12
-    )
-
-
 def test_molecules_and_aerosol_are_added_without_a_cross_term():
-    both, air = scattering(HAZE), scattering(Atmosphere(aerosol="none"))
+    both, air = (five_s_scattering(each, SPECTRUM, SZA, VZA, RAA) for each in (HAZE, Atmosphere(aerosol="none")))
+    np.testing.assert_array_equal(air.reflectance, air.molecules_reflectance)
+    np.testing.assert_allclose(air.diffuse_up_aerosol, 0, atol=1e-15)
+    np.testing.assert_allclose(air.diffuse_up_molecules, air.transmittance_up - air.direct_transmittance_up, rtol=1e-12)
     assert np.all(both.reflectance > air.reflectance) and np.all(both.spherical_albedo > air.spherical_albedo)
     np.testing.assert_array_equal(both.molecules_reflectance, air.molecules_reflectance)
-    ratio = both.transmittance_up / air.transmittance_up
-    tau = HAZE.aerosol_optical_depth(SPECTRUM)
-    np.testing.assert_allclose(both.diffuse_up_aerosol, ratio - np.exp(-tau / COS_V), rtol=1e-9)
+    direct = np.exp(-HAZE.aerosol_optical_depth(SPECTRUM) / COS_V)
+    expected = both.transmittance_up / air.transmittance_up - direct
+    np.testing.assert_allclose(both.diffuse_up_aerosol, expected, rtol=1e-9)
 
 
 def test_sun_and_view_are_reciprocal():

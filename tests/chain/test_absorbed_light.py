@@ -132,9 +132,6 @@ def test_absorption_increases_with_lai_and_diffuse_light_as_published():
 def test_invalid_arguments_are_rejected(lai, options, message):
     with pytest.raises((ValueError, TypeError), match=message):
         lai.fifesim.fpar(**{"method": "energy"} | options)
-
-
-def test_leaves_that_vary_by_cell_are_refused(lai):
-    leaf = fifesim.Leaf(chlorophyll=(20 + 10 * lai).drop_attrs())
     with pytest.raises(ValueError, match=r"leaf optics vary by cell.*method='beer'"):
+        leaf = fifesim.Leaf(chlorophyll=(20 + 10 * lai).drop_attrs())
         lai.fifesim.fpar(method="energy", canopy=fifesim.Canopy(leaf_optics=leaf))
