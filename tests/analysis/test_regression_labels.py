@@ -86,7 +86,8 @@ def test_inversion_interval_has_its_coverage_and_the_error_is_the_residual(scatt
     assert int(error["n"]) == lai.size
     lazy = fifesim.invert(in_chunks(ndvi, {"y": 50, "x": 77}), fit)
     assert lazy.fifesim.inversion_error(in_chunks(lai, {"x": 60})).identical(error)
-    alone = fifesim.inversion_error(lai + 0.25, lai)
+    with pytest.warns(FutureWarning, match="use fifesim.score"):
+        alone = fifesim.inversion_error(lai + 0.25, lai)
     assert (float(alone["bias"]), float(alone["rmse"])) == pytest.approx((0.25, 0.25), rel=1e-12)
     assert "coverage" not in alone
 
