@@ -224,7 +224,8 @@ def test_style_selects_bands_by_wavelength(lai, tmp_path, bands, numbers):
 def test_style_ramps_and_stretches_span_the_data(image, small_run, tmp_path):
     """NDVI has a fixed range; no data and images without contrast do not break a stretch."""
     truth = fifesim.open_image(small_run / "truth.tif")
-    (first, *_, last) = read_style(truth, tmp_path / "truth.tif").iter("item")
+    (first, *_, last) = items = list(read_style(truth, tmp_path / "truth.tif").iter("item"))
+    assert items == sorted(items, key=lambda item: float(item.get("value")))
     assert (first.get("value"), first.get("color")) == ("0", "#ffffe5")
     assert float(last.get("value")) == pytest.approx(float(np.percentile(truth.sel(band="lai"), 99)), rel=1e-5)
     (first, *_, last) = read_style(image.fifesim.ndvi(), tmp_path / "ndvi.tif").iter("item")

@@ -41,6 +41,9 @@ def test_view_angles_are_computed_for_each_cell():
     for name in ("vza", "vaa"):
         check_place(view[name], SITE.crs)
         assert cf.attributes(name).items() <= view[name].attrs.items()
+    with no_compute():
+        lazy = fifesim.scan_geometry(TM, SITE, nadir_offset=3e3, heading=193.0, chunks={"y": 130, "x": 77})
+    xr.testing.assert_identical(lazy.compute(), view)
 
 
 def test_track_may_cross_the_scene():
@@ -57,11 +60,15 @@ def test_track_may_cross_the_scene():
 
 def test_cells_outside_a_wide_swath_are_missing():
     grid = fifesim.grid_at("EPSG:5070", -1.6e6, 2.2e6, 3.2e6, 4e5, 10e3)
-    view = fifesim.scan_geometry(WIDE, grid, fifesim.Track(39.5, -96.0, 190.0))
+    track = fifesim.Track(39.5, -96.0, 190.0)
+    view = fifesim.scan_geometry(WIDE, grid, track)
     seen = np.isfinite(view["vza"].values)
     assert 0.5 < seen.mean() < 0.95
     np.testing.assert_array_equal(seen, np.isfinite(view["vaa"].values))
     assert float(view["vza"].max()) == pytest.approx(68.55, abs=0.3)
+    rows, columns = np.meshgrid(*(np.arange(size) + 0.5 for size in grid.shape), indexing="ij")
+    sine = np.hypot(*view_components(track, *latitude_longitude(grid, rows, columns), 833e3))
+    np.testing.assert_allclose(np.sin(np.radians(view["vza"].values))[seen], sine[seen], rtol=0, atol=1e-5)
 
 
 # ------------------------------------------------------------------------------------------ view direction of the light

@@ -302,6 +302,8 @@ def test_scene_has_the_labels_of_a_fifesim_image(folders):
     assert cf.attributes("toa_reflectance").items() <= scene.attrs.items() and TM_PRODUCT in scene.attrs["history"]
     bands = fifesim.instrument("TM").bands
     np.testing.assert_array_equal(scene["wavelength"], [band.wavelength for band in bands])
+    # Band 3 of Landsat 5 by hand: pi 0.9936974^2 (264 + 1.17) / (0.549637 + 0.002436).
+    assert float(scene["solar_irradiance"][2]) == pytest.approx(1490.0, abs=0.1)
     np.testing.assert_array_equal(scene["quality"], files["quality"])
 
 
