@@ -87,8 +87,9 @@ def test_geometry_is_frozen_and_hashable():
         fifesim.fife_geometry().sza = 10.0
     assert hash(Geometry(30.0, 0.0)) == hash(Geometry(30.0, 0.0))
     assert Geometry(60.0, 0.0, 0.0).mu_s == pytest.approx(0.5, abs=1e-15)
-    with pytest.raises(ValueError, match="sza"):
-        Geometry(np.nan, 0.0)
+    for wrong in ({"sza": np.nan}, {"earth_sun_distance": 149.6e6}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            Geometry(**{"sza": 30.0, "saa": 0.0} | wrong)
 
 
 SUMMER = pd.Timestamp("1987-06-06T16:35Z")

@@ -224,16 +224,19 @@ def test_every_number_is_a_scenario_key_of_ground_and_classes(name):
         limits = {kind: value for each in field.metadata for kind, value in vars_of(each).items()}
         assert (field.default, field.description, section.unit(name)) == (known.default, known.meaning, known.unit)
         assert (limits["ge"], limits["le"]) == (known.lowest, known.highest)
-    classes = {"wood": {name: 0.5}, "open": {}}
+    # A class that gives the default value keeps it.
+    classes = {"wood": {name: known.default}, "open": {}}
     case = parse_scenario({"ground": {name: 0.7}, "classes": classes, "landscape": {"cover": "voronoi"}})
     canopies = [each.canopy.over(canopy_of(case)) for each in case.class_table().values()]
-    assert [getattr(canopy, name) for canopy in canopies] == [0.5, 0.7]
+    assert [getattr(canopy, name) for canopy in canopies] == [known.default, 0.7]
     text = write_scenario(case)
     assert f"\n{name} = 0.7 # {known.unit}; {known.meaning}\n" in text.split("[landscape]")[0]
-    assert f"\n{name} = 0.5 # {known.unit}; {known.meaning}\n" in text.split("[classes.wood]")[1]
+    assert f"\n{name} = {known.default} # {known.unit}; {known.meaning}\n" in text.split("[classes.wood]")[1]
     assert find_key(name).name == f"ground.{name}"
     assert find_key(name).attributes == {"long_name": known.meaning, "units": known.unit}
     assert find_key(f"classes.wood.{name}").name == f"classes.wood.{name}"
+    small = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}})
+    assert fifesim.sweep(small, {name: [0.5, 1.0]})[name].values.tolist() == [0.5, 1.0]
 
 
 def vars_of(limit):
@@ -265,7 +268,7 @@ ONE_MORE = {
 
 
 def test_adding_a_property_takes_two_lines(tmp_path):
-    """The tests of this file for each property pass for a new one, in classes and scenarios without other edits."""
+    """The tests of this file pass for a new property, in classes, scenarios and sweeps without other edits."""
     for folder in ("fifesim", "data"):
         copytree(ROOT / folder, tmp_path / folder)
     for name, (place, line) in ONE_MORE.items():

@@ -19,7 +19,9 @@ from fifesim.ground.landscape.distribution import lai_distribution, quantile_map
 
 def test_scene_is_the_field_mapped_to_the_distribution_with_labels_and_georeferencing(site, lai):
     field = streaming_field(7, 0.15, *grids.lattice_position(site), tuple(site.shape))
-    np.testing.assert_array_equal(lai, quantile_map(field, quantile_table(lai_distribution("burned-grazed"))))
+    for name in ("burned-grazed", "unburned-ungrazed"):
+        scene = fifesim.lai_scene(site, name, arp=0.15, seed=7)
+        np.testing.assert_array_equal(scene, quantile_map(field, quantile_table(lai_distribution(name))))
     check_place(lai, site.crs)
     assert lai.name == "lai" and cf.attributes("lai").items() <= lai.attrs.items()
     assert lai.attrs["arp"] == 0.15 and lai.attrs["rng_seed"] == "7"

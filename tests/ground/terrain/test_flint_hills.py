@@ -298,6 +298,8 @@ def test_hills_do_not_depend_on_the_cell_size():
     np.testing.assert_allclose(fine.values[1::3, 1::3], coarse, rtol=0, atol=1e-6)
     with pytest.raises(ValueError, match="at most 100 m"):
         fifesim.flint_hills(fifesim.fife_site(500), 1)
+    with pytest.raises(ValueError, match="seed must be a whole number"):
+        fifesim.flint_hills(fifesim.fife_site(30, window=((0, 9), (0, 9))), -1)
 
 
 SUN = Geometry(60.0, 110.0, 25.0, 280.0)
