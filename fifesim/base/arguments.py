@@ -393,6 +393,9 @@ Offset: TypeAlias = Annotated[
 Chunks: TypeAlias = Annotated[Mapping[str, int] | int | str, CHUNKS]
 # How the pixels of two rasters pair.
 Pairing: TypeAlias = Literal["coordinates", "index"]
+# Exchange of light between ground and atmosphere. Defined once: a union with a `Literal` in another order of the same
+# values would be the union that was made first.
+Coupling: TypeAlias = Literal["lambert", "four-stream", "directional"]
 # The name of an aerosol, or the share of each of its components.
 AerosolMixture: TypeAlias = Annotated[str | Mapping[str, float], PLAIN]
 LaiDistribution: TypeAlias = Annotated[

@@ -10,7 +10,16 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.clouds.labels import cast_clouds
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.arguments import Interval, Names, NoiseKinds, Offset, Surroundings, WholeNumber, check_fields
+from fifesim.base.arguments import (
+    Coupling,
+    Interval,
+    Names,
+    NoiseKinds,
+    Offset,
+    Surroundings,
+    WholeNumber,
+    check_fields,
+)
 from fifesim.base.files import in_a_line
 from fifesim.base.lattice import check_seed
 from fifesim.chain import coupled_ground, steps
@@ -75,7 +84,7 @@ class Setup:
     horizon: Horizon | None = None
     upwelling: bool = True
     slopes: Literal["kt", "upright"] = "kt"
-    coupling: Literal["lambert", "four-stream", "directional"] = "lambert"
+    coupling: Coupling = "lambert"
     adjacency: bool = False
     surroundings: Surroundings | None = None
     clouds: xr.Dataset | None = None

@@ -13,7 +13,7 @@ from fifesim.atmosphere import engines
 from fifesim.atmosphere import labels as atmosphere_labels
 from fifesim.atmosphere.clouds.labels import with_clouds
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.arguments import Kind, Names, Surroundings, Time, described
+from fifesim.base.arguments import Coupling, Kind, Names, Surroundings, Time, described
 from fifesim.base.bands import Band
 from fifesim.base.caches import cached
 from fifesim.base.messages import warn
@@ -465,7 +465,7 @@ def to_toa(
     adjacency: bool = False,
     surroundings: Surroundings | None = None,
     clouds: xr.Dataset | None = None,
-    coupling: Literal["directional", "four-stream", "lambert"] | None = None,
+    coupling: Coupling | None = None,
 ) -> xr.DataArray:
     """
     Apparent reflectance at the top of the atmosphere.
@@ -497,7 +497,7 @@ def to_toa(
     clouds : xarray.Dataset, dims (y, x), optional
         Clouds from `cast_clouds`, or from `cloud_field`, which are then cast onto the level ground or ``elevation``.
         They need one direction of sun and sensor.
-    coupling : {"directional", "four-stream", "lambert"}, optional
+    coupling : {"lambert", "four-stream", "directional"}, optional
         Light between ground and atmosphere: with the directions of the sky ("directional"), with an isotropic sky,
         which is often worse than one reflectance factor ("four-stream"), or with one reflectance factor ("lambert").
         The default is "lambert" for a reflectance, and "directional" for streams of this coupling, RossLi and RPV.

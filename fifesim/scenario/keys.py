@@ -9,6 +9,7 @@ from typing import Annotated, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
 
 from fifesim.atmosphere import ENGINES
+from fifesim.base.arguments import Coupling
 from fifesim.base.files import check_regular, shown
 from fifesim.base.messages import nearest
 from fifesim.base.times import SITE_CORNERS, SITE_SIZE, utc
@@ -348,7 +349,7 @@ class AirKeys(Section):
     h2o: float | None = number(None, "g cm-2", "column water vapour; by default from the profile", ge=0, le=10)
     o3: float | None = number(None, "cm-atm", "column ozone; by default from the profile", ge=0, le=1)
     engine: str = text("5S", f"radiative transfer model: {', '.join(ENGINES)}")
-    coupling: Literal["lambert", "four-stream", "directional"] = text(
+    coupling: Coupling = text(
         "lambert",
         "reflectance of the ground toward the sky: lambert (one factor), four-stream (isotropic sky) or directional",
     )
