@@ -16,11 +16,15 @@ from fifesim.atmosphere.successive_orders import (
     path_reflectance,
     stokes_reflectance,
 )
+from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
 
 SIXS = pd.read_csv(Path(__file__).parents[1] / "data" / "sixs_scattering.csv", comment="#")
 NODES, WEIGHTS = leggauss(500)
 ORDERS = 2 * np.arange(64) + 1
+
+# Rayleigh scattering without depolarization, given as an aerosol.
+PURE_RAYLEIGH = np.array([[1, 0, 0, 0], [0, 0, 0, 0], [0.1, 0.6, 0, np.sqrt(6) / 10]])
 
 
 def degrees(mu):
@@ -29,6 +33,27 @@ def degrees(mu):
 
 def cosine(sza, vza, raa):
     return scattering_angle_cosine(sza, np.asarray(vza, float)[:, None], np.asarray(raa, float))
+
+
+def test_polarized_molecules_agree_with_natraj_tables():
+    """
+    Natraj, Li & Yung (2009), a correction of Coulson, Dave & Sekera (1960): depth 0.5, flux pi.
+
+    Over black ground 2e-5: truncation of the orders, and 400 layers for a view at 89 degrees. Ground of reflectance 0.8
+    minus black ground 1.2e-4: 200 layers, and the last digit of the table.
+    """
+    table = files.table("verification/polarized_molecules.csv")
+    mu_s, mu_v, raa = 0.2, np.array([0.02, 0.4, 1.0]), [180.0, 120.0]
+    black, bright = (table.loc[table["ground"] == ground, "intensity"].to_numpy() for ground in (0.0, 0.8))
+    views = degrees(mu_s), degrees(mu_v), raa
+    phase = 0.75 * (1 + cosine(*views) ** 2)
+    found = mu_s * path_reflectance(0.0, 0.5, 1.0, PURE_RAYLEIGH, phase, *views, layers=400)
+    # Azimuth does not matter at nadir.
+    np.testing.assert_allclose(found.ravel(), [*black, black[-1]], rtol=2e-5)
+    zenith = degrees(np.array([mu_s, *mu_v]))
+    transmittance, albedo = flux_transmittance(0.0, 0.5, 1.0, PURE_RAYLEIGH, zenith, layers=200)
+    found = mu_s * 0.8 * transmittance[0] * transmittance[1:] / (1 - 0.8 * albedo)
+    np.testing.assert_allclose(found, bright - black[::2], rtol=1.2e-4)
 
 
 def test_polarizing_aerosol_agrees_with_siewert():
@@ -208,6 +233,24 @@ def test_sky_flux_is_total_minus_direct_transmittance(ground):
     (through,), albedo = flux_transmittance(0.1, 0.3, 0.97, MOMENTS, [SZA])
     beam = np.exp(-0.4 / np.cos(np.radians(SZA)))
     assert (weights * mu * sky.mean(axis=1)).sum() == pytest.approx(through / (1 - ground * albedo) - beam, abs=1e-4)
+
+
+@pytest.mark.parametrize("at_ground", [False, True])
+def test_zenith_view_does_not_depend_on_azimuth(at_ground):
+    """At the zenith and nadir, polarization rotates with the azimuth of the meridian; its degree is constant."""
+    intensity, along, aslant = spheres(0.1, 0.3, [0.0], RAA, at_ground)[:, 0]
+    np.testing.assert_allclose(intensity, intensity[0], rtol=1e-12)
+    np.testing.assert_allclose(np.hypot(along, aslant), np.hypot(along, aslant)[0], rtol=1e-6)
+    np.testing.assert_allclose(along, along[2] * np.cos(2 * np.radians(RAA)), atol=1e-6)
+
+
+def test_depolarization_is_recovered_at_90_degrees():
+    """Ratio of the intensities polarized parallel and perpendicular to the scattering plane."""
+    air = 1e-5, 0.0, 0.0, [1.0], np.zeros((1, 2)), np.zeros((1, 2))
+    found = stokes_reflectance(*air, 60.0, [30.0], [0.0, 180.0], at_ground=True, depolarization=0.06)[:, 0]
+    near, turned = found.T
+    assert (turned[0] + turned[1]) / (turned[0] - turned[1]) == pytest.approx(0.06, rel=2e-3)
+    assert near[0] > turned[0]
 
 
 @pytest.mark.parametrize("at_ground", [False, True])

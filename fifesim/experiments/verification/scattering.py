@@ -125,7 +125,7 @@ def _once():
         reached, _ = quad(_both_ways, above, above + depth, args=(mu_s, mu_v))
         phase = aerosol_phase(air.aerosol, scattering_angle_cosine(*angles), at)
         worst = np.maximum(worst, largest(found, albedo * phase / (4 * mu_s * mu_v) * reached, relative=True))
-    yield _deviation("light that the aerosol scatters once", 100 * worst, 0.1, "%", "quadrature over its depth")
+    yield _deviation("light that the aerosol scatters once", 100 * worst, 0.01, "%", "quadrature over its depth")
 
 
 def _both_ways(depth, mu_s, mu_v):
