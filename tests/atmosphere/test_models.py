@@ -90,6 +90,7 @@ def rows(atmosphere):
 def test_summary_rows_are_consistent(aerosol):
     """Four digits are printed, and the band mean of a product is not the product of band means."""
     found = rows(fifesim.Atmosphere(aerosol=aerosol))
+    assert "  1.55-1.75  2.08-2.35" in atmosphere_in_words(fifesim.Atmosphere(aerosol=aerosol))
     depth = found["optical depth, molecules"] + found["optical depth, aerosol"]
     np.testing.assert_allclose(found["transmittance, direct"], np.exp(-depth), atol=2e-3)
     assert np.all(found["transmittance, with skylight"] > found["transmittance, direct"])

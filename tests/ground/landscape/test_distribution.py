@@ -80,6 +80,8 @@ def test_samples_are_read_from_csv_files(tmp_path):
     gaps = write(tmp_path / "gaps.csv", several.read_text() + "60,\n61,NA\n")
     for path in (several, str(several), one, gaps):
         assert lai_distribution(path).pdf(0.7) == pytest.approx(kernel_density(SAMPLES).pdf(0.7), rel=1e-9)
+    bare = write(tmp_path / "bare.csv", several.read_text() + "60,0.0\n")
+    assert lai_distribution(bare).pdf(0.7) == pytest.approx(kernel_density([*SAMPLES, 0.0]).pdf(0.7), rel=1e-9)
 
 
 @pytest.mark.parametrize(
