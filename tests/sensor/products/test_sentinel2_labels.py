@@ -104,9 +104,11 @@ def test_invalid_product_metadata_raises_a_one_line_message(tmp_path, text, said
 # ------------------------------------------------------------------------------------------- tile
 
 
-def test_tile_without_any_sun_raises(tmp_path):
-    zenith, _ = products.sun_grid()
+def test_missing_mean_sun_is_computed_from_the_grid(tmp_path):
+    zenith, azimuth = products.sun_grid()
     text = TILE.replace("57.820574357679", "NaN").replace("172.840206897213", "NaN")
+    found = sentinel2_tile(tile(tmp_path, text))
+    np.testing.assert_allclose([found.sza, found.saa], [zenith.mean(), azimuth.mean()], rtol=0, atol=0.01)
     with pytest.raises(ValueError, match="Mean_Sun_Angle and Sun_Angles_Grid are NaN"):
         sentinel2_tile(tile(tmp_path, text.replace(products.grids_xml(zenith), products.grids_xml(zenith * np.nan))))
 
@@ -158,7 +160,7 @@ def test_scene_has_the_labels_of_a_fifesim_image(folders):
     bands = fifesim.instrument("MSI").select(["MSI2", "MSI3", "MSI4", "MSI8"])
     assert scene["band"].values.tolist() == [band.name for band in bands]
     np.testing.assert_array_equal(scene["wavelength"], [band.wavelength for band in bands])
-    assert (scene.attrs["instrument"], scene.dtype) == ("MSI", np.float32)
+    assert (scene.name, scene.dtype, scene.attrs["instrument"]) == ("toa_reflectance", np.float32, "MSI")
     assert "S2A_MSIL1C" in scene.attrs["history"] and "baseline 04.00" in scene.attrs["history"]
 
 
@@ -171,7 +173,7 @@ def test_level_2a_opens_at_each_size(folders, chunks):
         scene = fifesim.open_sentinel2(path, size, bands=names, quality=True, chunks=chunks)
         np.testing.assert_allclose(scene, by_hand(files, names, size), rtol=0, atol=5e-8)
         np.testing.assert_array_equal(scene["quality"], files["SCL", own].repeat(times, axis=0).repeat(times, axis=1))
-        assert "vegetation" in scene["quality"].attrs["comment"]
+        assert scene.name == "surface_reflectance" and "vegetation" in scene["quality"].attrs["comment"]
     land = scene.where(scene["quality"].isin([4, 5]))
     assert 0 < int(np.isfinite(land[0]).sum()) < 144
 
