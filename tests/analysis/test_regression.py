@@ -33,6 +33,15 @@ def test_line_errors_and_intervals_agree_with_statsmodels(shift):
             np.testing.assert_allclose(high, frame[f"{name}_upper"], rtol=1e-10)
 
 
+def test_missing_and_infinite_values_are_left_out():
+    """One infinite value of an index, such as 1 / 0, must not turn the whole line into NaN."""
+    y, x = Y.copy(), X.copy()
+    y[3, :], x[:, 4], x[0, 0], y[5, 6], y[7, 8] = np.nan, np.nan, np.inf, -np.inf, np.inf
+    keep = np.isfinite(y) & np.isfinite(x)
+    ours, theirs = line(y, x), line(y[keep][None], x[keep][None])
+    assert ours.n == theirs.n == keep.sum() and ours.slope == pytest.approx(theirs.slope, rel=1e-12)
+
+
 def test_constant_and_exact_lines():
     flat, exact = line(np.full_like(X, 2.0), X), line(1 + 2 * X, X)
     assert (flat.slope, flat.intercept, flat.r2) == (0.0, 2.0, 0.0)

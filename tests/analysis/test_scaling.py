@@ -43,7 +43,8 @@ def test_reflected_density_has_all_its_mass_above_zero():
     bandwidth = scaling.silverman_bandwidth(samples.std(ddof=1), stats.iqr(samples), 400)
     mine = scaling.gaussian_density(samples, at, bandwidth, reflect=True)
     np.testing.assert_allclose(scaling.sample_density(samples, at, reflect=True), mine, rtol=1e-12)
-    # The standard deviation replaces an interquartile range of 0.
+    # The smaller of the two spreads is used; the standard deviation replaces an interquartile range of 0.
+    assert scaling.silverman_bandwidth(1.0, 1.34 * 0.5, 32.0) == pytest.approx(0.9 * 0.5 / 2, rel=1e-12)
     assert scaling.silverman_bandwidth(1.0, 0.0, 1.0) == pytest.approx(0.9, rel=1e-12)
 
 
@@ -98,6 +99,11 @@ def test_sobol_indices_agree_with_salib():
     found = sobol_indices(values)
     np.testing.assert_allclose(found.first, expected["S1"], rtol=1e-9)
     np.testing.assert_allclose(found.total, expected["ST"], rtol=1e-9)
+
+
+def test_correlation_above_the_threshold_has_no_range():
+    assert np.isnan(scaling.crossing(np.arange(3.0), np.array([1.0, 0.9, 0.8])))
+    assert scaling.crossing(2 * np.arange(3.0), np.array([1.0, 0.55, -0.45])) == pytest.approx(3.0)
 
 
 @pytest.mark.parametrize(

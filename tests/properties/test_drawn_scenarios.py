@@ -169,8 +169,8 @@ def folder(tmp_path_factory):
     tm = files.path("instruments/tm.toml").read_text(encoding="utf-8")
     (folder / "mine.toml").write_text(tm, encoding="utf-8")
     (folder / "samples.csv").write_text("lai\n1\n1.5\n2\n2.5\n3\n")
-    lai = np.linspace(0.5, 3, 400, dtype="float32").reshape(20, 20)
-    write(folder / "lai.tif", lai, Affine(10, 0, 704970, 0, -10, 4334220))
+    lai = np.linspace(0.5, 3, 400).reshape(20, 20)
+    write(folder / "lai.tif", lai, Affine(10, 0, 704970, 0, -10, 4334220), dtype="float32")
     for name in ("pipe.tif", "pipe.toml", "pipe.csv"):
         os.mkfifo(folder / name)
     (folder / "loop.toml").symlink_to("loop.toml")
