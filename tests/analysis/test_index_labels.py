@@ -142,6 +142,7 @@ def swapped(ndvi):
     ("call", "message"),
     [
         (lambda ndvi: fifesim.composite(ndvi.fillna(0).astype(np.uint8)), r"sun of .*\.fifesim\.to_reflect"),
+        (lambda ndvi: fifesim.composite(ndvi.isel(time=0)), "images along time, got dimensions"),
         (lambda ndvi: fifesim.composite(ndvi, "mode"), "'median', 'nadir-most' or 'mean-of-clear', got 'mode'"),
         (lambda ndvi: fifesim.composite(ndvi, "nadir-most"), "nadir-most needs the view of each date"),
         (lambda ndvi: fifesim.composite(ndvi, "mean-of-clear"), "needs to know where the images are clear"),

@@ -231,6 +231,7 @@ def test_constant_rasters_have_zero_covariance(lai):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
+        (lambda lai: fifesim.aggregate(lai, 500.0), "no pixel of 500 x 500 m fits"),
         (lambda lai: fifesim.fpar_bias(lai, 0.57, 94), r"fpar_inf must be in \(0, 1\]"),
         (lambda lai: fifesim.autocovariance(lai, 100.0), r"at most half of the raster \(75 m\), got 100 m"),
         (lambda lai: fifesim.autocovariance(lai * np.nan, 30.0), "no valid cells"),

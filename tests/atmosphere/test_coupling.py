@@ -13,6 +13,7 @@ from fifesim.atmosphere.coupling import (
     apparent_reflectance_of_cell,
     corrected_reflectance,
     corrected_reflectance_of_cell,
+    inhomogeneous_reflectance,
     on_wavelengths,
     spectral_nodes,
 )
@@ -60,6 +61,14 @@ def test_single_precision_becomes_double_and_scalars_stay_scalars(function):
     np.testing.assert_array_equal(found, function(values.astype(float), *UNIFORM))
     assert isinstance(function(0.3, *UNIFORM), np.float64)
     assert function(np.zeros((2, 0)), *UNIFORM).shape == (2, 0)
+
+
+def test_uniform_ground_uses_the_total_transmittance():
+    path, down, direct, diffuse, albedo, gas = TERMS
+    uniform = gas * (path + down * (direct + diffuse) * 0.3 / (1 - 0.3 * albedo))
+    assert inhomogeneous_reflectance(0.3, 0.3, TERMS) == pytest.approx(uniform, rel=1e-14)
+    with pytest.raises(ValueError, match=r"must be below 1, got 5\.7: reflectance is a fraction"):
+        inhomogeneous_reflectance(30.0, 30.0, TERMS)
 
 
 def test_opaque_gas_gives_non_finite_surface_reflectance():

@@ -25,6 +25,13 @@ def narrow_terms(atmosphere):
     return engines.band_terms(atmosphere, tuple(bands), fifesim.fife_geometry().sza, 0.0, 0.0)
 
 
+def test_different_atmosphere_raises(whole):
+    for function, name in ((fifesim.to_toa, "rho"), (fifesim.to_surface, "toa")):
+        with pytest.raises(ValueError, match=r"made for another atmosphere.*surface_reflectance\(atmosphere=\.\.\.\)"):
+            function(whole[name], fifesim.Atmosphere(visibility=23.0))
+        xr.testing.assert_identical(function(whole[name], AIR), function(whole[name]))
+
+
 def user_raster(site, wavelengths):
     values = np.random.default_rng(1).uniform(0.05, 0.4, (len(wavelengths), *site.shape))
     array = xr.DataArray(values, dims=("band", "y", "x"), coords={"wavelength": ("band", wavelengths)}, name="mine")

@@ -103,6 +103,8 @@ def test_impossible_ground_is_refused(lai):
     with pytest.raises(ValueError, match="a horizon needs an elevation"):
         horizon = xr.DataArray(np.zeros((16, 2, 2)), dims=("direction", "y", "x"))
         fifesim.surface_reflectance(lai, bands=TM34, horizon=horizon)
+    with pytest.raises(ValueError, match=r"sza.*89"):
+        fifesim.surface_reflectance(lai, geometry=fifesim.Geometry(89.0, 100.0))
     with pytest.raises(ValueError, match="background"):
         fifesim.surface_reflectance(lai, bands=TM34, canopy=fifesim.Canopy(background=-0.1))
     for dem, slopes in ((None, "uprigt"), (fifesim.flint_hills(grids.geobox(lai), seed=7), "Upright")):
@@ -118,6 +120,12 @@ def test_indices_are_from_planetary_reflectance(whole):
         np.testing.assert_array_equal(image.fifesim.ndvi(), whole["ndvi"])
     np.testing.assert_array_equal(whole["image"].fifesim.index("EVI2"), 2.5 * (nir - red) / (nir + 2.4 * red + 1))
     np.testing.assert_array_equal(whole["image"].fifesim.index("NDVI"), whole["ndvi"])
+
+
+def test_regression_refuses_digital_numbers(whole):
+    """Digital number 0 is no data and would count as dark ground."""
+    with pytest.raises(ValueError, match="digital numbers, whose 0 is no data"):
+        whole["image"][0].fifesim.regress(whole["image"][1])
 
 
 def test_band_names_that_contradict_wavelengths_are_rejected():

@@ -75,7 +75,7 @@ def test_lookup_converges_to_the_normal_posterior():
         mean, sd, quantiles, _ = table_posterior(measured, states @ slope.T, states, np.array([0.1, 0.5, 0.9]))
         found.append([mean[0, 0], sd[0, 0], *quantiles[0, 0]])
     expected = [posterior.mean(), posterior.std(), *posterior.ppf([0.1, 0.5, 0.9])]
-    np.testing.assert_allclose(np.mean(found, axis=0), expected, rtol=0, atol=0.015)
+    np.testing.assert_allclose(np.mean(found, axis=0), expected, rtol=0, atol=0.006)
 
 
 def test_lookup_agrees_with_brute_force():
