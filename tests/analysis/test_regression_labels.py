@@ -39,6 +39,8 @@ def test_pixels_can_be_paired_by_row_and_column(pair):
     moved = grids.place(x, fifesim.fife_site(CELL, window=((91, 136), (180, 234))))
     assert fifesim.regress(y, moved, pair="index") == fifesim.regress(y, x)
     assert fifesim.regress(y, moved).r2 < 0.5
+    common = fifesim.regress(y[5:20, 11:30], x[5:20, 11:30])
+    assert fifesim.regress(y[5:40, :30], x[:20, 11:]) == common
     cropped = fifesim.regress(y[5:25, :30], x[:20, 11:41], pair="index")
     assert fifesim.regress(y[5:40, :30], x[:20, 11:], pair="index") == cropped
     assert fifesim.regress(y, moved).n == 44 * 54
