@@ -57,6 +57,14 @@ def light(image):
     return image["image"]["dn"].fifesim.to_reflectance().compute()
 
 
+def test_each_half_of_an_interval_is_compared_with_the_errors_on_its_side():
+    """Errors of -2 and 0.8 are 2 and 0.2 times the halves of 1 and 4."""
+    truth, none = np.array([[-2.0], [0.8]]), np.zeros((2, 1))
+    estimates = methods.Estimates(none, none, np.tile([-1.0, 4.0], (2, 1, 1)))
+    for level, factor in ((0.4, 0.2), (0.9, 2.0)):
+        assert methods.stretch_factors(estimates, truth, np.arange(2), [level]) == pytest.approx(factor)
+
+
 def test_intervals_have_their_coverage_on_unseen_landscapes(retrieval):
     """The test part has 6 landscapes, so that coverage has a standard error of a few percent."""
     score = retrieval.score

@@ -237,6 +237,12 @@ def test_source_dem_ends_at_the_edge_of_its_data_with_the_same_bits_in_chunks(tm
     assert dem.odc.geobox.affine == Affine(30, 0, WEST - 150, 0, -30, NORTH + 600)
     assert dem.shape == (70, 55)
     assert int(dem.isnull().sum()) == 1
+    # A hole in the eighth column east of a tall grid, beside its lower rows.
+    values, affine = model()
+    values[45, 37] = np.nan
+    tall = fifesim.grid_at(CRS, WEST, NORTH, 300.0, 900.0, 30 / 9)
+    _, reach = fifesim.source_dem(write(tmp_path / "hole.tif", values, affine), tall, 600.0)
+    assert reach == {"north": 600, "east": 210, "south": 600, "west": 600}
     with pytest.raises(ValueError, match="does not reach the grid"):
         fifesim.source_dem(tmp_path / "cut.tif", grid(west=WEST + 90000), 100.0)
     with pytest.raises(ValueError, match="margin must be 0 m or more"):
