@@ -105,6 +105,10 @@ def test_groups_are_scored_separately(estimate, truth):
     assert found.cover.values.tolist() == [3, 7]
     west = estimate.isel(x=slice(10)).fifesim.score(truth.isel(x=slice(10)))
     xr.testing.assert_allclose(found.isel(cover=0, drop=True), west, rtol=1e-12)
+    # Pixels of no class are left out.
+    some = estimate.fifesim.score(truth, xr.where(truth["x"] < 300, 3.0, np.nan).rename("cover"))
+    xr.testing.assert_allclose(some.isel(cover=0, drop=True), west, rtol=1e-12)
+    assert some.cover.values.tolist() == [3.0]
     bins = estimate.fifesim.score(truth, [0, 1, 2, 5])
     assert bins.lai_bin.values.tolist() == [0.5, 1.5, 3.5]
     assert estimate.fifesim.score(truth, [-9, 9]).lai_bin.values.tolist() == [0.0]

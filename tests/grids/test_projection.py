@@ -72,6 +72,7 @@ NO_METRES = [
     ("EPSG:3413", 0.0, -3.5e6, "scale of EPSG:3413 is 1.047 .* such as EPSG:32623"),
     ("EPSG:3857", -10.75e6, 4.7e6, "scale of EPSG:3857 is 1.284 .* such as EPSG:32614"),
     ("EPSG:3857", 17e6, -4.7e6, "such as EPSG:32756"),
+    ("EPSG:3857", 0.0, 19.4e6, "such as EPSG:5041"),  # 84.5 degrees north
     ("EPSG:6933", -9.26e6, 4.6e6, "scale of EPSG:6933 is 1.1"),
     ("EPSG:3857", 1e8, 0.0, r"west = 100000000, north = 0: the grid is outside .* -20037508 to 20037508 E"),
     ("EPSG:26914", float("nan"), 4e6, "outside the area of EPSG:26914"),

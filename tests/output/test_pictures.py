@@ -183,6 +183,7 @@ def test_scores_are_drawn_by_group_with_error_bars():
     lengths = [bar[1, 1] - bar[0, 1] for bar in bars]
     assert lengths == pytest.approx(4 * scores.coverage_se.isel(cover=0).values)
     assert [patch.get_data().values.tolist() for patch in pit.patches] == scores.pit.values.tolist()
+    assert list(pit.lines[0].get_ydata()) == [1, 1]
     assert [text.get_text() for text in coverage.get_legend().get_texts()] == ["cover 0", "cover 1"]
     # The coverage of intervals that are too narrow lies below the nominal level.
     assert (scores.coverage < scores.level).all()
