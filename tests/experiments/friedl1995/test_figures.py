@@ -131,7 +131,7 @@ def test_surface_relation_is_tight_and_scaling_has_the_published_sign(found):
         assert np.corrcoef(values["boa_ndvi"], values["fpar"])[0, 1] ** 2 > 0.99
         assert np.corrcoef(values["boa_ndvi"], values["lai"])[0, 1] ** 2 > 0.95
         assert -0.01 < float((scene["pixel_ndvi_of_mean"] - scene["pixel_boa_ndvi"]).mean()) < 0
-        # The pixels are those of Table 2.
+        # Table 2 has the same pixels.
         for reading in ("native", "aligned"):
             pixels = found.sel(reading=reading, arp=arp)
             lai, ndvi = (pixels[name].dropna("pixel").values for name in ("pixel_lai", "pixel_ndvi"))

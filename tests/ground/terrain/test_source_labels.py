@@ -237,7 +237,7 @@ def test_source_dem_ends_at_the_edge_of_its_data_with_the_same_bits_in_chunks(tm
     assert dem.odc.geobox.affine == Affine(30, 0, WEST - 150, 0, -30, NORTH + 600)
     assert dem.shape == (70, 55)
     assert int(dem.isnull().sum()) == 1
-    # A hole in the eighth column east of a tall grid, beside its lower rows.
+    # A hole east of a tall grid, in the eighth column and in the lower rows of the grid.
     values, affine = model()
     values[45, 37] = np.nan
     tall = fifesim.grid_at(CRS, WEST, NORTH, 300.0, 900.0, 30 / 9)
