@@ -60,7 +60,8 @@ def compiled_with(path):
     found, ahead = {path}, [path]
     while ahead:
         for each in importers().get(ahead.pop(), ()):
-            if each not in found and "numba" in (ROOT / each).read_text():
+            words = (ROOT / each).read_text()
+            if each not in found and ("compiled" in words or "jitable" in words):
                 found.add(each)
                 ahead.append(each)
     return found

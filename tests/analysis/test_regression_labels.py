@@ -141,6 +141,13 @@ def test_values_outside_the_physical_range_are_clipped_and_flagged(scattered):
         (lambda y, x: fifesim.invert(x, fifesim.regress(y, x), "ndvi"), "quantity must be 'lai' or 'fpar'"),
         (lambda y, x: fifesim.inversion_error(y * np.nan, y), "no pixel has both"),
         *(
+            (
+                lambda y, x, fill=fill: fifesim.regress(y.where(y > y.min(), fill), x),
+                f"a value of {fill:g} marks missing",
+            )
+            for fill in (-999.0, -9999.0, -99999.0, -32768.0, 65535.0)
+        ),
+        *(
             (lambda y, x, names=names: fifesim.inversion_error(xr.Dataset(dict.fromkeys(names, y)), y), "one variable")
             for names in (["lai"], ["low", "high"], ["lai", "low", "high", "other"])
         ),

@@ -208,6 +208,10 @@ WRONG = {
     "phase 5 % off": ({"phase": changed(FORWARD, (slice(None), 2), 1.05 * FORWARD[:, 0])}, "got 1.05 at 0.87 um"),
     "nanometres": ({"wavelength": 1000 * TABULATED}, "from 0.1 to 50 um, got 1020: divide nanometres by 1000"),
     "decreasing": ({"wavelength": TABULATED[::-1]}, "wavelength must be increasing, got 0.87 um after 1.02"),
+    "repeated": (
+        {"wavelength": changed(TABULATED, 2, 0.675)},
+        "must be increasing, got 0.675 um after 0.675",
+    ),
     "missing wavelength": ({"wavelength": changed(TABULATED, 1, np.nan)}, "wavelength must be increasing, got nan"),
     "red alone": ({"wavelength": TABULATED + 0.2}, "both sides of 0.55 um.*got 0.64 to 1.22 um"),
     "radians": ({"angle": np.radians(ANGLE)}, "angle must be from 0 to 180 degrees, got 0 to 3.14159"),

@@ -170,6 +170,7 @@ def made(without="", **changes):
         (lambda: dataclasses.replace(LOW, limits=(0.69, 0.63)), "limits: the first must be below the second"),
         (lambda: Noise(**POINT, high_radiance=150.0), "belong together"),
         (lambda: Noise(**POINT, high_radiance=20.0, high_snr=300.0), "must be above radiance = 22, got 20"),
+        (lambda: Noise(**POINT, high_radiance=22.0, high_snr=300.0), "must be above radiance = 22, got 22"),
         (lambda: Noise(**POINT, high_radiance=150.0, high_snr=950.0, shot=0.5), "shot_share belongs to one"),
         (lambda: Noise(**POINT, high_radiance=150.0, high_snr=2000.0), "negative variance of shot"),
         (lambda: made(altitude=-1.0), "^Instrument: altitude = -1.0: must be above 0"),
