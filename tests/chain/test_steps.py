@@ -37,6 +37,11 @@ def test_every_step_is_on_the_right_grid(site, whole):
     assert (whole["truth"] + whole["ndvi"]).shape == tuple(pixels.shape)
 
 
+def test_one_selected_band_gives_the_same_values(whole):
+    one = whole["rho"].isel(band=0).fifesim.to_toa()
+    np.testing.assert_array_equal(one.squeeze(), whole["toa"][0])
+
+
 def test_history_lists_every_stage(whole):
     verbs = [line.split(":")[0] for line in whole["ndvi"].attrs["history"].splitlines()]
     assert verbs == ["lai_scene", "surface_reflectance", "to_toa", "sense", "to_radiance", "to_reflectance", "ndvi"]
