@@ -393,8 +393,8 @@ Offset: TypeAlias = Annotated[
 Chunks: TypeAlias = Annotated[Mapping[str, int] | int | str, CHUNKS]
 # How the pixels of two rasters pair.
 Pairing: TypeAlias = Literal["coordinates", "index"]
-# Exchange of light between ground and atmosphere. Defined once: a union with a `Literal` in another order of the same
-# values would be the union that was made first.
+# Exchange of light between ground and atmosphere. Python treats literals with the same values in another order as equal
+# and reuses the first union with them, so that a second definition would make the order in messages vary.
 Coupling: TypeAlias = Literal["lambert", "four-stream", "directional"]
 # The name of an aerosol, or the share of each of its components.
 AerosolMixture: TypeAlias = Annotated[str | Mapping[str, float], PLAIN]

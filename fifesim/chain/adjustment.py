@@ -329,7 +329,7 @@ def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands
         For each target band: ``source_band``, the source band with the nearest mean wavelength; ``slope`` and
         ``offset`` by least squares over the library of spectra; ``error``, the standard deviation about the line;
         ``difference``, the root mean square difference of the bands without adjustment; and ``published_slope``,
-        ``published_offset`` and ``reference`` from ``data/spectral_adjustment.csv``, NaN or empty if none is known. [1]
+        ``published_offset`` and ``reference``, a published line and its source, NaN or empty if none is known. [1]
 
     Raises
     ------

@@ -475,7 +475,7 @@ def to_toa(
     reflectance : xarray.DataArray, dims (band, y, x), xarray.Dataset of bands, RossLi or RPV
         Surface reflectance factor, with band names of an instrument or a coordinate ``wavelength`` [um] along band.
         Integers need an attribute ``scale_factor``. Streams of `surface_reflectance` have a dimension ``stream``. A
-        RossLi or RPV needs ``instrument`` and, unless it has rasters with their own, ``geometry``. [1]
+        RossLi or RPV needs ``instrument`` and, unless its rasters carry angles, ``geometry``. [1]
     atmosphere : Atmosphere, optional
         By default from the array. If it has none: midlatitude summer, continental aerosol, 45 km visibility and 0.4 km
         altitude, with a warning for rasters from other sources.

@@ -11,9 +11,9 @@ import xarray as xr
 
 from fifesim.base.arguments import Kind
 from fifesim.base.files import shown
-from fifesim.base.geometry import relative_azimuth
 from fifesim.grids import cf, chunks, swaths
 from fifesim.retrieval.description import ANGLE_MARGIN, OUTSIDE, Retrieval
+from fifesim.retrieval.methods import angles_of
 from fifesim.retrieval.networks import SL2P_BANDS, sl2p
 
 _ANGLES = ("sza", "saa", "vza", "vaa")
@@ -188,19 +188,14 @@ def _check_angles(angles, retrieval):
     """Raise ValueError if sun or view of the whole image is outside of the training."""
     if any(each.ndim for each in angles):
         return
-    sza, saa, vza, vaa = (float(each) for each in angles)
     first, last = retrieval.tables["angle_range"]
-    own = sza, vza, float(relative_azimuth(saa, vaa)) if vza >= _NADIR else 0.0
+    own = angles_of(*(float(each) for each in angles))
     for name, value, low, high in zip(("sza", "vza", "relative azimuth"), own, first, last, strict=True):
         if not low - ANGLE_MARGIN <= value <= high + ANGLE_MARGIN:
             raise ValueError(
                 f"{name} of the image is {value:.1f} degrees, the training had {low:.1f} to {high:.1f}: train with a "
                 f"study whose geometry includes it, such as draw.geometry.sza"
             )
-
-
-# Below this zenith angle, the azimuth of the view has no effect. [degree]
-_NADIR = 0.5
 
 
 # Pixels that are estimated at once, so that hidden layers and likelihoods stay small.
@@ -215,9 +210,8 @@ def _in_batches(function, layers, light, *angles):
     for start in range(0, len(spectra), _BATCH):
         part = slice(start, start + _BATCH)
         own = spectra[part].astype(float)
-        sza, saa, vza, vaa = (np.broadcast_to(each if np.ndim(each) == 0 else each[part], len(own)) for each in flat)
-        azimuth = np.where(vza < _NADIR, 0.0, relative_azimuth(saa, vaa))
-        out[:, part] = function(own, np.stack([sza, vza, azimuth], axis=1))
+        seen = (np.broadcast_to(each if np.ndim(each) == 0 else each[part], len(own)) for each in flat)
+        out[:, part] = function(own, angles_of(*seen))
     return out.reshape(layers, *shape)
 
 

@@ -7,6 +7,7 @@ from scipy import stats
 
 from fifesim.analysis import regression
 from fifesim.analysis.indices import normalized_difference
+from fifesim.base.geometry import relative_azimuth
 from fifesim.retrieval.inversion import (
     DRAWN_STATES,
     TABLE_ANGLES,
@@ -319,3 +320,12 @@ def is_outside(tables, reflectance):
     """Whether spectra are outside of the training spectra."""
     distance = (((reflectance - tables["domain_mean"]) @ tables["domain_scale"]) ** 2).sum(1)
     return np.sqrt(distance) > tables["domain_radius"]
+
+
+# Below this zenith angle of the view, its azimuth has no effect. [degree]
+_NADIR = 0.5
+
+
+def angles_of(sza, saa, vza, vaa):
+    """Zenith angles of sun and view and relative azimuth, which is 0 near nadir, shape (..., 3). [degree]"""
+    return np.stack([sza, vza, np.where(np.asarray(vza) < _NADIR, 0.0, relative_azimuth(saa, vaa))], axis=-1)

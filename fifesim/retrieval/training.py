@@ -14,7 +14,6 @@ from fifesim.analysis.score_labels import score
 from fifesim.atmosphere.aerosols import aerosol_optical_thickness
 from fifesim.base.arguments import FilePath, Kind, Names, described
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
-from fifesim.base.geometry import relative_azimuth
 from fifesim.chain.driver import Driver
 from fifesim.output.chips.store import chip_arrays, layout_of
 from fifesim.retrieval import methods
@@ -343,11 +342,7 @@ def pixels_of(dataset, variable, bands, names, part, seed):
     light = np.asarray(own[variable].transpose("chip", "y", "x", "band").values, float)
     chips, rows, columns, width = light.shape
     truth = np.stack([np.asarray(own[name].transpose("chip", "y", "x").values, float) for name in names], axis=-1)
-    angles = np.stack(
-        [own["sza"].values, own["vza"].values, relative_azimuth(own["saa"].values, own["vaa"].values)], axis=1
-    )
-    # A view at nadir has no azimuth.
-    angles[:, 2] = np.where(angles[:, 1] < 0.5, 0.0, angles[:, 2])
+    angles = methods.angles_of(*(own[name].values for name in ("sza", "saa", "vza", "vaa")))
     chip = np.repeat(np.arange(chips), rows * columns)
     spectra, true = light.reshape(-1, width), truth.reshape(-1, len(names))
     valid = np.flatnonzero(np.isfinite(spectra).all(1) & np.isfinite(true).all(1))

@@ -141,6 +141,10 @@ def test_spectra_outside_the_training_are_flagged(retrieval, light):
     assert ((1e4 * light).assign_attrs(light.attrs).fifesim.retrieve(retrieval).flag != 0).all()
 
 
+def test_ends_of_intervals_are_ordered_around_the_median():
+    np.testing.assert_allclose(methods.probabilities_of((0.5, 0.8)), [0.1, 0.25, 0.5, 0.75, 0.9])
+
+
 def test_quantiles_of_a_network_are_sorted_and_give_the_standard_deviation():
     """A normal distribution of standard deviation 3 has the interval whose level is nearest to 68 %."""
     levels, normal = (0.5, 0.8, 0.95), stats.norm.ppf([0.025, 0.1, 0.25, 0.5, 0.75, 0.9, 0.975])
