@@ -88,6 +88,14 @@ def test_scores_agree_with_plain_numpy(estimate, truth):
     assert found.pit[0] > 1.2 and found.pit[9] > 1.05, "too confident: both ends are too full"
 
 
+def test_intervals_contain_their_ends():
+    """Bare soil has a leaf area of exactly zero, where intervals are clipped."""
+    level = {"level": [0.9]}
+    low, high = (xr.DataArray([end], level | {"x": range(4)}, ("level", "x")) for end in ([0, 0, 1, 1], [2, 2, 3, 3]))
+    truth = xr.DataArray([0.0, 2.0, 3.5, 0.5], {"x": range(4)}, "x", "lai", {"units": "1"})
+    assert xr.Dataset({"lai": truth, "low": low, "high": high}).fifesim.score(truth).coverage.item() == 0.5
+
+
 def test_scores_are_identical_in_any_chunks(estimate, truth):
     pieces = {"landscape": 7, "y": 17, "x": 11}
     lazy = estimate.map(lambda each: each.chunk({dim: pieces.get(dim, -1) for dim in each.dims}))
