@@ -120,10 +120,9 @@ def _short_sides(model, unknown, height, width):
 
 def _covered(grid, unknown, rows, columns):
     """Text of the part of a grid that a model covers."""
-    edges = unknown[0].any(), unknown[-1].any(), unknown[:, 0].any(), unknown[:, -1].any()
     first, last, start, stop = 0, rows.size, 0, columns.size
     # Edge by edge, the one that lacks the larger share goes first, until the rest is known.
-    while any(edges) and last - first > 2 and stop - start > 2:
+    while last - first > 2 and stop - start > 2:
         part = unknown[first:last, start:stop]
         shares = [part[0].mean(), part[-1].mean(), part[:, 0].mean(), part[:, -1].mean()]
         worst = int(np.argmax(shares))
