@@ -218,6 +218,14 @@ def test_intensity_at_the_top_equals_the_path_reflectance():
     np.testing.assert_allclose(spheres(0.1, 0.3)[0], expected, rtol=1e-12)
 
 
+def test_intensity_above_aerosol_that_does_not_polarize_equals_the_path_reflectance():
+    """Henyey and Greenstein's phase function: only the molecules polarize, in three Fourier modes."""
+    phase = 0.64 / (1.36 - 1.2 * scattering_angle_cosine(SZA, VZA[:, None], RAA)) ** 1.5
+    air = 0.1, 0.3, 0.97, 0.6 ** np.arange(64), phase
+    found = stokes_reflectance(*air, 0 * phase, SZA, VZA, RAA)
+    np.testing.assert_allclose(found[0], path_reflectance(*air, SZA, VZA, RAA), rtol=1e-12)
+
+
 def test_light_added_by_ground_agrees_with_fluxes():
     transmittance, albedo = flux_transmittance(0.1, 0.3, 0.97, MOMENTS, [SZA, *VZA])
     added = spheres(0.1, 0.3, ground=0.4)[0] - spheres(0.1, 0.3)[0]

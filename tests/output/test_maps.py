@@ -147,6 +147,8 @@ def test_image_needs_bands_and_wavelengths():
         maps.rgb(make_image().isel(band=0))
     with pytest.raises(ValueError, match=r"has no wavelength .*composite=\('\w+', '\w+', '\w+'\)"):
         maps.rgb(make_image().drop_vars("wavelength"))
+    with pytest.raises(ValueError, match=r"composite=\('B5', 'B4', 'B3'\)"):
+        maps.rgb(make_image(("B4", "B8")).drop_vars("wavelength"))
 
 
 def test_composite_bands_may_be_numbers_or_have_no_contrast():

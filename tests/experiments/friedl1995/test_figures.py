@@ -20,6 +20,12 @@ def test_figure_is_drawn_for_every_reading(number, small):
         assert isinstance(figure, Figure) and all(axis.has_data() for axis in figure.axes)
 
 
+def test_curves_of_figure_3_drop_to_zero_at_their_ends(found):
+    for line in figures.plot_reproduction(3, found).axes[0].get_lines():
+        at, density = line.get_data()
+        assert at[-1] == at[-2] == at.max() and density[-1] == 0 < density[-2]
+
+
 def test_densities_of_figure_6_are_reflected_at_zero(found):
     """The curve of the cells begins at 0.853, as the distribution; without reflection it begins at 0.447."""
     axis = figures.plot_reproduction(6, found).axes[0]

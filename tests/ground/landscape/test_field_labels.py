@@ -63,6 +63,15 @@ def test_fields_have_the_given_correlations(fields):
         assert r == pytest.approx(requested, abs=4 * standard_error(ARPS[one], ARPS[other], 600**2)), (one, other)
 
 
+def test_fields_on_coarser_lattices_have_the_given_correlations(grid):
+    """Soil and moisture have 150 x 150 and 200 x 200 lattice cells, so four standard errors are below 0.04."""
+    requested = {("lai", "soil"): -0.7, ("lai", "moisture"): 0.5, ("soil", "moisture"): -0.3}
+    found = correlated_fields(grid, correlations=requested, seed=7, **COARSER)
+    for (one, other), r in requested.items():
+        assert np.corrcoef(found[one].values.ravel(), found[other].values.ravel())[0, 1] == pytest.approx(r, abs=0.04)
+    assert [float(each.std()) for each in found.values()] == pytest.approx([1, 1, 1], abs=0.03)
+
+
 def test_field_of_a_name_does_not_depend_on_other_fields(grid):
     """Nor on the lattice of other fields."""
     first = correlated_fields(grid, {"sand": 0.1, "moisture": 0.05}, seed=7)
