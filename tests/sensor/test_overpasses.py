@@ -31,6 +31,7 @@ def test_landsat_has_the_local_time_and_track_spacing_of_its_orbit():
     assert abs(hour - 9.75).max() < 0.1
     orbit = Orbit(233 / 16, 9.75, False, 98.2, 705e3)
     _, nodes = ground_track(orbit, np.arange(233) * DAY * 16 / 233)
+    assert np.abs(nodes).max() <= 180
     spacing = np.diff(np.sort(nodes % 360))
     np.testing.assert_allclose(spacing, 360 / 233, rtol=1e-6)
 
