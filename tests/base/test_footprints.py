@@ -152,6 +152,16 @@ def test_any_window_gives_the_same_bits(pixel, origin, width, dtype):
             np.testing.assert_array_equal(part, whole[:, i0:i1, j0:j1])
 
 
+@pytest.mark.parametrize("view", [np.s_[::2, ::2], np.s_[:30, ::-1], np.s_[::-1, :30], np.s_[5:35, 7:37]], ids=str)
+@pytest.mark.parametrize("dtype", ["<f8", ">f8", "<f4", "i2"])
+def test_view_of_an_array_gives_the_same_bits_as_its_copy(view, dtype):
+    cells = np.random.default_rng(5).integers(0, 99, (60, 60)).astype(dtype)
+    for each in (cells[view], cells.T[view]):
+        rows, columns = (operator(n, 3, 30.0, 0.0, 30.0) for n in each.shape)
+        copy = np.array(each, np.float32 if dtype == "<f4" else float, order="C")
+        np.testing.assert_array_equal(regularize(each, rows, columns), regularize(copy, rows, columns))
+
+
 def test_window_holds_only_the_required_cells():
     rows = operator(4500, 500, width=30.0)
     assert rows.window == slice(0, 4500)

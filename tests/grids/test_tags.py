@@ -60,6 +60,13 @@ def test_bands_without_names_are_restored_from_their_wavelengths(image, tmp_path
     xr.testing.assert_identical(fifesim.open_image(nameless.fifesim.to_geotiff(tmp_path / "plain.tif")), nameless)
 
 
+def test_bands_of_a_file_have_a_name_only_if_it_is_theirs(truth, tmp_path):
+    lai = truth["lai"]
+    for raster, names in ((lai, ("lai",)), (lai.rename(None), (None,)), (xr.concat([lai, lai], "band"), (None, None))):
+        with rasterio.open(raster.fifesim.to_geotiff(tmp_path / "a.tif", overwrite=True)) as file:
+            assert file.descriptions == names
+
+
 def test_only_several_variables_need_names(truth, tmp_path, open_changed):
     several, one = (
         Copy(truth[name].fifesim.to_geotiff(tmp_path / "a.tif", overwrite=True)) for name in (["lai", "fpar"], "lai")

@@ -184,6 +184,8 @@ def test_clouds_of_two_heights_equal_the_sum_of_both(site, reflectance):
         # 900 m are divided into layers of 30 m / tan(50) = 25 m, so the upper height is accurate to half a layer.
         assert (found[name] == lower[name] + upper[name]).mean() > (0.99 if name == "overhead_thickness" else 0.6)
         assert float(found[name].sum()) == pytest.approx(float((lower[name] + upper[name]).sum()), rel=0.05)
+    flat = level.fifesim.cast_clouds(both.assign(top=1700.0), **options)
+    xr.testing.assert_identical(flat, level.fifesim.cast_clouds(both.assign(top=0 * both.top + 1700), **options))
     unknown = both.assign(top=both.top.where(both.optical_thickness == 0))
     cells = level.fifesim.cast_clouds(unknown, **options)
     assert int(cells.overhead_thickness.isnull().sum()) == int((thickness > 0).sum())
