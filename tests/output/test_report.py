@@ -161,7 +161,11 @@ def test_figures_show_the_regression_and_each_pixel():
     assert counts.sum() == pytest.approx(ndvi.size) and (low, high) == pytest.approx((ndvi.min(), ndvi.max()))
     centres, step = np.linspace(low, high, 2 * counts.shape[1] + 1)[1::2], (high - low) / counts.shape[1]
     assert (counts.filled(0).sum(axis=0) @ centres) / ndvi.size == pytest.approx(float(ndvi.mean()), abs=step / 2)
-    axis = report.histogram_figures(image, truth, detail)[2].axes[0]
+    axes = [figure.axes[0] for figure in report.histogram_figures(image, truth, detail)]
+    assert [(axis.get_title(), axis.get_xlabel()) for axis in axes[:2]] == [
+        ("Leaf area index", "LAI [m² m⁻²]"), ("True FPAR of the pixels", "FPAR")
+    ]  # fmt: skip
+    axis = axes[2]
     shares = {line.get_label(): line.get_ydata().sum() for line in axis.lines}
     assert shares == pytest.approx(dict.fromkeys(map(str, image["band"].values), 1.0))
     assert [text.get_text() for text in axis.get_legend().get_texts()] == list(shares)
