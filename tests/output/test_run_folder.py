@@ -212,7 +212,9 @@ def test_finished_run_with_a_newer_input_is_not_resumed(tmp_path, run_without_pi
         run_without_pictures(scenario, tmp_path / "out", resume=True)
 
 
-def test_changed_chunk_is_recomputed_on_resume(tmp_path, monkeypatch, run_without_pictures):
+def test_unfinished_run_refuses_another_scenario_and_recomputes_a_changed_chunk(
+    tmp_path, monkeypatch, run_without_pictures
+):
     run_without_pictures(parse_scenario(SMALL), tmp_path / "whole", scene=True)
 
     def full(*given):
@@ -221,6 +223,10 @@ def test_changed_chunk_is_recomputed_on_resume(tmp_path, monkeypatch, run_withou
     with monkeypatch.context() as broken, pytest.raises(OSError, match=r"disk full.*--resume"):
         broken.setattr(run_folder, "_write_files", full)
         run_without_pictures(parse_scenario(SMALL), tmp_path / "out", scene=True)
+    with pytest.raises(ValueError, match=r"the unfinished run has another scenario, with arp = 0\.24, seed = 3"):
+        run_without_pictures(
+            parse_scenario({**SMALL, "ground": {"seed": 4}}), tmp_path / "out", scene=True, resume=True
+        )
     zarr.open_array(str(tmp_path / "out" / UNFINISHED / "scene.zarr"), path="lai")[3, 4] = 9.0
     run_without_pictures(parse_scenario(SMALL), tmp_path / "out", scene=True, resume=True)
     found, whole = (xr.open_zarr(tmp_path / name / "scene.zarr")["lai"].values for name in ("out", "whole"))
