@@ -23,7 +23,7 @@ _HIGHEST = 50.0  # of scale height and layer [km]
 _ANGLES = np.concatenate([np.arange(200) * 0.05, np.linspace(10, 180, 681)])
 
 # User-defined aerosols of this session by their text, which is stored with the data instead of the tables.
-_KNOWN = {}
+_KNOWN: dict[str, "Aerosol"] = {}
 
 
 @dataclass(frozen=True, eq=False)

@@ -224,7 +224,7 @@ def _joined(plan, parts):
     return window
 
 
-_ORIGINS = {}
+_ORIGINS: dict[tuple[int, str], object] = {}
 """Origins by graph and name of dask arrays, as long as the graphs live."""
 
 
