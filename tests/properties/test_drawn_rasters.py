@@ -171,7 +171,7 @@ def outcome(door, path):
             assert 0 < len(str(error)) <= 500 and str(error).isprintable(), str(error)
             return type(error).__name__
         finally:
-            # Python shows a warning once at each line, also if several blocks give it.
+            # Several blocks can give the same warning; by default, Python shows it once.
             assert len({str(each.message) for each in caught}) <= 2, [str(each.message) for each in caught]
     assert {"y", "x"} <= set(found.dims) and found.size and found.dtype.kind in "iuf"
     if "image" not in door:
