@@ -41,6 +41,8 @@ class Kind(NamedTuple):
     numbers: str | None = "iuf"
     # The only values, if they can be listed.
     allowed: tuple = ()
+    # Whether rasters are taken as they are stored, without their scale.
+    stored: bool = False
 
 
 _class_name = attrgetter("__name__")
@@ -255,24 +257,27 @@ def check(name, value, kind):
         raise ValueError(f"{name} has no cells, its sizes are {sizes}: does the window that was cut out overlap it?")
 
 
-def checked(function):
-    """Wrap a public function to check its arguments against its annotations; a default value is always allowed."""
+def checked(function, opened=lambda value: value):
+    """Wrap a public function to check its arguments against its annotations, and to open rasters in them."""
     signature = inspect.signature(function)
 
     @wraps(function)
     def checking(*args, **options):
         try:
-            given = signature.bind(*args, **options).arguments
+            bound = signature.bind(*args, **options)
         except TypeError as error:
             wrong = unknown_argument(function.__name__, signature, options)
             raise TypeError(wrong or f"{function.__name__}: {error}") from None
-        expected = _kinds_of(function)
+        expected, given = _kinds_of(function), bound.arguments
+        # A default value is always allowed.
         for name, value in given.items():
             if value is not signature.parameters[name].default:
                 check(name, value, expected[name])
         for name, value in given.items():
-            _check_numbers(name, value, expected[name].numbers)
-        return function(*args, **options)
+            if rasters := _rasters(value):
+                _check_numbers(name, rasters, expected[name].numbers)
+                given[name] = value if expected[name].stored else opened(value)
+        return function(*bound.args, **bound.kwargs)
 
     return checking
 
@@ -286,9 +291,9 @@ def check_fields(description, *names):
             check(name, value, expected[name])
 
 
-def _check_numbers(name, value, allowed):
+def _check_numbers(name, rasters, allowed):
     """Raise TypeError if cells or wavelengths of the rasters in an argument do not have an allowed dtype."""
-    for raster in _rasters(value) if allowed else ():
+    for raster in rasters if allowed else ():
         arrays = {name: raster}
         if "wavelength" in raster.coords:
             arrays[f"wavelength of {name}"] = raster.coords["wavelength"]

@@ -23,7 +23,7 @@ from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.classes import NO_CLASS
 from fifesim.grids.grid import north_up
-from fifesim.grids.inputs import MASKS_TOO, Raster, unpacked
+from fifesim.grids.inputs import MASKS_TOO, Raster
 from fifesim.grids.windows import origin_of
 from fifesim.ground.canopy import optics_labels
 from fifesim.ground.canopy.interpolation import RUN, table_places, value_at
@@ -130,7 +130,7 @@ def _seen(lai, table, terms, out):
 
 def upright_plants(level, land, canopies, light, sun):
     """Reflectance of upright plants on the slopes of a Sunlight, dims (band, y, x), with the cells of each class."""
-    data, cells = None, unpacked(land.lai).transpose("y", "x")
+    data, cells = None, land.lai.transpose("y", "x")
     for code, stand in canopies.items():
         even = even_canopy(land.lai, stand, light, False)
         if even is None or even.scene.model != "sail":

@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Annotated
 
 import dask.array as da
 import numpy as np
@@ -29,7 +30,7 @@ from fifesim.base.messages import warn
 from fifesim.grids import cf
 from fifesim.grids import grid as grids
 from fifesim.grids.chunks import found_client
-from fifesim.grids.inputs import RasterOrDataset, no_data_of
+from fifesim.grids.inputs import RASTER_OR_DATASET, STORAGE, no_data_of, opened, scale_and_offset, storage, unpacked
 from fifesim.grids.opening import ErrorsOfGdal, check_memory, check_raster, horizontal_crs, raster_file, stored_cells
 from fifesim.grids.tags import (
     DAYS,
@@ -147,7 +148,11 @@ _COG |= {"copy_src_mdd": "yes"}
 
 
 def to_geotiff(
-    raster: RasterOrDataset, path: FilePath, *, overwrite: bool = False, tags: Mapping[str, str] | None = None
+    raster: Annotated[xr.DataArray | xr.Dataset, RASTER_OR_DATASET._replace(stored=True)],
+    path: FilePath,
+    *,
+    overwrite: bool = False,
+    tags: Mapping[str, str] | None = None,
 ) -> Path:
     """
     Write a raster as a cloud-optimised GeoTIFF.
@@ -209,7 +214,11 @@ def to_geotiff(
         raster = raster.expand_dims("band")
         own = [name for name in _OF_A_BAND if name in raster.coords]
         raster = raster.assign_coords({name: raster.coords[name].expand_dims("band") for name in own})
-    array = _stacked(raster) if isinstance(raster, xr.Dataset) else raster
+    array = _stacked(opened(raster)) if isinstance(raster, xr.Dataset) else raster
+    if "gain" not in array.coords:
+        # A scale of fractions raises an error; a scale from the encoding is kept in the tag.
+        unpacked(array)
+        array = array.assign_attrs({key: value for key, value in storage(array).items() if key in STORAGE})
     if "line" in array.dims:
         raise ValueError("a GeoTIFF needs a map, got dimensions line and sample: map the scan with .grid_swath(grid)")
     if not set(array.dims) <= {"band", "y", "x"}:
@@ -407,7 +416,5 @@ def _describe(sink, array, kept):
         if "wavelength" in tags:
             sink.update_tags(number, ns="IMAGERY", CENTRAL_WAVELENGTH_UM=tags["wavelength"])
     sink.units = band_units(names, array.coords, array.attrs) + [DAYS] * len(further)
-    # GIS software does not support square-root scales.
-    if "gain" in array.coords and "compression" not in array.coords:
-        one, none = [1.0] * len(further), [0.0] * len(further)
-        sink.scales, sink.offsets = array["gain"].values.tolist() + one, array["offset"].values.tolist() + none
+    scales, offsets = (np.broadcast_to(each, count).tolist() for each in scale_and_offset(array))
+    sink.scales, sink.offsets = scales + [1.0] * len(further), offsets + [0.0] * len(further)

@@ -1,6 +1,8 @@
 """Rasters given by the user: their types, packing, band order, orientation and units."""
 
 import re
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
 from typing import Annotated, Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -42,57 +44,127 @@ Image: TypeAlias = xr.DataArray | Any
 NO_DATA_ATTRIBUTES = ("_FillValue", "missing_value", "nodata")
 """Attributes with the value for no data."""
 
-STORAGE = ("scale_factor", "add_offset", *NO_DATA_ATTRIBUTES)
+# rioxarray has scales and offsets where they differ among bands.
+_SCALES = {"scale_factor": "scales", "add_offset": "offsets"}
+
+STORAGE = (*_SCALES, *_SCALES.values(), *NO_DATA_ATTRIBUTES, "valid_range", "valid_min", "valid_max")
 """Attributes of the storage of values."""
+
+# Attributes of codes, which are no numbers in a unit.
+_CODES = {"flag_values", "flag_masks", "flag_meanings"}
+
+# Key of the encoding: dtype in which values were stored, and whether they had a scale and a value for no data.
+_STORED = "stored"
+
+
+def opened(value):
+    """Argument of a public function whose rasters have values in their unit, and NaN for no data."""
+    # Packing is applied here alone, for all public functions. Images and codes stay whole numbers.
+    if isinstance(value, xr.DataArray):
+        return value if "gain" in value.coords or _CODES & value.attrs.keys() else unpacked(value)
+    if isinstance(value, xr.Dataset):
+        # The attributes of a variable have precedence over those of the Dataset.
+        shared = {key: value.attrs[key] for key in STORAGE if key in value.attrs}
+        own = {key: each for key, each in value.data_vars.items() if each.ndim >= 2}
+        own = {key: each.assign_attrs(shared | each.attrs) if shared else each for key, each in own.items()}
+        changed = {key: found for key, each in own.items() if (found := opened(each)) is not each}
+        return value.assign(changed).drop_attrs(deep=False).assign_attrs(value.attrs) if changed else value
+    if isinstance(value, Mapping) and not isinstance(value, xr.DataTree):
+        return {key: opened(each) for key, each in value.items()}
+    if isinstance(value, list | tuple) and len(value) == 2:
+        return type(value)(map(opened, value))
+    if is_dataclass(value):
+        own = {each.name: getattr(value, each.name) for each in fields(value) if each.init}
+        rasters = {name: each for name, each in own.items() if isinstance(each, xr.DataArray)}
+        changed = {name: found for name, each in rasters.items() if (found := opened(each)) is not each}
+        return replace(value, **changed) if changed else value
+    return value
+
+
+def unpacked(raster):
+    """Values of a raster in their unit, NaN for no data, without the attributes of packing."""
+    stored = storage(raster)
+    if not stored.keys() & set(STORAGE):
+        return raster
+    scale, offset = scale_and_offset(raster)
+    scaled = bool(np.any(scale != 1.0) or np.any(offset != 0.0))
+    if scaled and raster.dtype.kind == "f":
+        given = ", ".join(f"{key} {stored[key]}" for key in (*_SCALES, *_SCALES.values()) if key in stored)
+        raise ValueError(
+            f"{raster.name or 'the raster'} has fractions but also {given}: "
+            "if they were applied, remove them from .attrs; otherwise open the file with mask_and_scale=True"
+        )
+    marks = [mark for mark in sorted(set(map(float, _marks(stored)))) if not np.isnan(mark)]
+    lowest, highest = _valid_range(stored) if raster.dtype.kind in "iu" else (-np.inf, np.inf)
+    bounded = np.isfinite([lowest, highest]).any()
+    if not (scaled or marks or bounded):
+        return raster
+    cells = raster if raster.dtype.kind == "f" else raster.astype(float)
+    for mark in marks:
+        cells = cells.where(raster != mark)
+    cells = cells.where((raster >= lowest) & (raster <= highest)) if bounded else cells
+    cells = cells * scale + offset if scaled else cells
+    kept = {name: value for name, value in raster.attrs.items() if name not in STORAGE}
+    cells = cells.drop_attrs(deep=False).assign_attrs(kept).rename(raster.name)
+    whole = raster.dtype.kind in "iu"
+    cells.encoding = {_STORED: (raster.dtype, scaled, bool(marks or bounded))} if whole else {}
+    return cells
+
+
+def storage_of(raster):
+    """Dtype in which the values of a raster were stored, and whether they had a scale and a value for no data."""
+    return raster.encoding.get(_STORED, (raster.dtype, raster.dtype.kind == "f", raster.dtype.kind == "f"))
 
 
 def scale_and_offset(raster):
-    """Scale and offset from stored values to their unit, 1 and 0 by default."""
-    stored = _storage(raster)
-    return float(stored.get("scale_factor", 1.0)), float(stored.get("add_offset", 0.0))
+    """Scale and offset from stored values to their unit, 1 and 0 by default; along band where they differ."""
+    if "gain" in raster.coords:
+        # A GIS has no square-root scale.
+        return (1.0, 0.0) if "compression" in raster.coords else (raster.coords["gain"], raster.coords["offset"])
+    stored = storage(raster)
+    named = zip(_SCALES.items(), (1.0, 0.0), strict=True)
+    return tuple(_numbers(raster, one, stored.get(one, stored.get(several, by))) for (one, several), by in named)
 
 
-def has_no_data(raster):
-    """Whether a raster has a value for no data."""
-    return any(name in _storage(raster) for name in NO_DATA_ATTRIBUTES)
+def _numbers(raster, name, given):
+    """A number, or the numbers of the bands of a raster."""
+    values, band = np.ravel(given), raster.coords.get("band")
+    if values.dtype.kind in "iuf" and np.isfinite(values).all() and (name != "scale_factor" or values.all()):
+        if values.size == 1:
+            return float(values[0])
+        if band is not None and band.dtype.kind in "iu" and band.min() > 0 and band.max() <= values.size:
+            return xr.DataArray(values[band.values - 1], dims=band.dims)
+    raise ValueError(
+        f"{raster.name or 'the raster'} has {name} {given}: it must be a finite number, or one for each numbered band; "
+        f"correct .attrs[{name!r}]"
+    )
+
+
+def _marks(stored):
+    """Values for no data."""
+    given = [each for name in NO_DATA_ATTRIBUTES for each in np.ravel(stored.get(name, []))]
+    marks = [each for each in given if each is not None]
+    if wrong := [each for each in marks if np.asarray(each).dtype.kind not in "iuf"]:
+        raise ValueError(f"a raster has {wrong[0]!r} for no data: it must be a number; correct .attrs['_FillValue']")
+    return marks
+
+
+def _valid_range(stored):
+    """Smallest and largest valid number that is stored; CF takes others as no data."""
+    low, high = stored.get("valid_range", (-np.inf, np.inf))
+    return float(stored.get("valid_min", low)), float(stored.get("valid_max", high))
 
 
 def no_data_of(raster):
     """Value for no data in a file: from the attributes, else 0 for digital numbers, NaN for fractions, or None."""
-    stored = _storage(raster)
-    marks = [np.ravel(stored[name])[0].item() for name in NO_DATA_ATTRIBUTES if name in stored]
+    marks = [np.asarray(mark).item() for mark in _marks(storage(raster))]
     if raster.dtype.kind in "iu":
         limits = np.iinfo(raster.dtype)
         marks = [mark for mark in marks if limits.min <= mark <= limits.max]
     return marks[0] if marks else 0 if "gain" in raster.coords else None if raster.dtype.kind != "f" else np.nan
 
 
-def unpacked(raster):
-    """Values of a raster in their unit, NaN for no data, without the attributes of packing."""
-    stored, (scale, offset) = _storage(raster), scale_and_offset(raster)
-    scaled = (scale, offset) != (1.0, 0.0)
-    if scaled and raster.dtype.kind == "f":
-        raise ValueError(
-            f"{raster.name or 'the raster'} has fractions but also scale_factor {scale:g}, add_offset {offset:g}: "
-            "if they were applied, remove them from .attrs; otherwise open the file with mask_and_scale=True"
-        )
-    if not scaled and not stored.keys() & NO_DATA_ATTRIBUTES:
-        return raster
-    marks = {float(mark) for name in NO_DATA_ATTRIBUTES if name in stored for mark in np.ravel(stored[name])}
-    marks = sorted(mark for mark in marks if not np.isnan(mark))
-    if not scaled and not marks:
-        return raster
-    cells = raster if raster.dtype.kind == "f" else raster.astype(float)
-    for mark in marks:
-        cells = cells.where(raster != mark)
-    cells = cells * scale + offset if scaled else cells
-    kept = {name: value for name, value in raster.attrs.items() if name not in STORAGE}
-    cells = cells.drop_attrs(deep=False).assign_attrs(kept).rename(raster.name)
-    cells.encoding = {}
-    return cells
-
-
-def _storage(raster):
+def storage(raster):
     """Attributes, and for stored numbers also the encoding from the file."""
     return {**raster.attrs, **raster.encoding} if raster.dtype.kind in "iu" else raster.attrs
 
@@ -115,6 +187,7 @@ def incoming(raster, name):
     array = _bands_as_one(raster, name)
     if "gain" in array.coords:
         return array
+    _check_stored(array, name)
     array = in_micrometres(_named(north_up(array)))
     if "atmosphere" in array.attrs and array.dtype.kind == "f":
         if array.chunks is None and array.dims[-2:] in (("y", "x"), ("line", "sample")):
@@ -122,7 +195,9 @@ def incoming(raster, name):
             return array
         # A lazy raster with an origin is unchanged since fifesim made it.
         return array if origin_of(array) is not None else chunks.pointwise(check_scale, array, dtype=array.dtype)
-    return _physical(array, name)
+    out = chunks.pointwise(check_reflectance, array, dtype=np.float32 if array.dtype == np.float32 else float)
+    out.attrs = dict(array.attrs)
+    return out
 
 
 def in_micrometres(array):
@@ -183,13 +258,9 @@ def _bands_as_one(raster, name):
         raise ValueError(f"the Dataset has no variables over (y, x): {', '.join(map(str, raster.data_vars)) or 'none'}")
     for key in bands:
         check_axes(raster[key])
-    # The attributes of a band have precedence over those of the Dataset.
-    shared = {key: raster.attrs[key] for key in STORAGE if key in raster.attrs}
-    own = [raster[key].assign_attrs(shared | raster[key].attrs) for key in bands]
-    kinds = {repr([each.attrs.get(key) for key in STORAGE]) for each in own}
-    parts = own if len(kinds) == 1 else [_physical(each, name) for each in own]
+    own = [_check_stored(raster[key], name) for key in bands]
     index = xr.DataArray([_called(each) for each in own], dims="band", name="band")
-    joined = xr.concat(parts, dim=index, combine_attrs="drop_conflicts", coords="minimal", compat="override")
+    joined = xr.concat(own, dim=index, combine_attrs="drop_conflicts", coords="minimal", compat="override")
     return joined.transpose(..., "band", "y", "x").rename(name)
 
 
@@ -213,28 +284,26 @@ def _named(array):
     return array.assign_coords(band=(array["band"].dims, called)).drop_attrs(deep=False).assign_attrs(attrs)
 
 
-def _physical(array, name):
-    """Values in their unit, NaN for no data, checked when they are computed."""
-    if array.dtype.kind in "iub" and scale_and_offset(array) == (1.0, 0.0):
-        if "FIFESIM" in array.attrs:
-            raise ValueError(
-                f"{array.name or 'the raster'} is an image that fifesim wrote, without its calibration: open its file "
-                "with fifesim.open_image, which brings it back"
-            )
-        nodata = "" if has_no_data(array) else ", _FillValue=0"
-        scaled = f"for scaled reflectance type .assign_attrs(scale_factor=0.0001{nodata}), as its product says"
-        counts = "calibrate digital numbers with fifesim.calibrate"
-        cures = f"{counts}; {scaled}" if array.dtype.itemsize < 2 else f"{scaled}; {counts}"
+def _check_stored(array, name):
+    """Raise ValueError for whole numbers without a scale, and warn of numbers without a value for no data."""
+    dtype, scaled, filled = storage_of(array)
+    if "FIFESIM" in array.attrs and dtype.kind != "f":
         raise ValueError(
-            f"{array.name or 'the raster'} holds whole numbers ({array.dtype}) without a scale, where "
+            f"{array.name or 'the raster'} is an image that fifesim wrote, without its calibration: open its file "
+            "with fifesim.open_image, which brings it back"
+        )
+    if not scaled:
+        nodata = "" if filled else ", _FillValue=0"
+        scale = f"for scaled reflectance type .assign_attrs(scale_factor=0.0001{nodata}), as its product says"
+        counts = "calibrate digital numbers with fifesim.calibrate"
+        cures = f"{counts}; {scale}" if dtype.itemsize < 2 else f"{scale}; {counts}"
+        raise ValueError(
+            f"{array.name or 'the raster'} holds whole numbers ({dtype}) without a scale, where "
             f"{cf.QUANTITIES[name].long_name} is needed: {cures}"
         )
-    if array.dtype.kind in "iu" and not has_no_data(array):
+    if not filled:
         warn(
             f"{array.name or 'the raster'} has no value for no data: if there is one, such as 0, add "
             ".assign_attrs(_FillValue=0), otherwise it is used as reflectance"
         )
-    plain = unpacked(array)
-    out = chunks.pointwise(check_reflectance, plain, dtype=np.float32 if plain.dtype == np.float32 else float)
-    out.attrs = dict(plain.attrs)
-    return out
+    return array

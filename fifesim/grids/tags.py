@@ -13,7 +13,7 @@ from rasterio.windows import Window
 from fifesim.base.bands import counts
 from fifesim.base.files import in_a_line
 from fifesim.grids import cf
-from fifesim.grids.inputs import no_data_of
+from fifesim.grids.inputs import no_data_of, scale_and_offset
 
 # Largest number of rows, and of columns, whose cells are kept.
 _LINES = 8
@@ -278,7 +278,7 @@ def read_tag(source, name):
     coords = {key: value.isel(band=selected) if value.dims else value for key, value in coords.items()}
     cells = None if kept.cells is None else fingerprint_cells(kept.cells, order, source)
     units = band_units(names, coords, kept.attrs) + [DAYS] * len(kept.layers)
-    _check_scales(source, name, coords, bands)
+    _check_scales(source, name, xr.DataArray(np.zeros(len(bands), native), coords, "band", attrs=kept.attrs), bands)
     _check_type(source, name, native)
     _check_certain(source, name, cells, named, [units[at] for at in order])
     counted = "gain" in coords and native.kind == "u"
@@ -362,12 +362,11 @@ def _order(names, descriptions, file):
     )
 
 
-def _check_scales(source, name, coords, bands):
-    """Raise ValueError if the scales of the file are not the calibration of the tag."""
+def _check_scales(source, name, raster, bands):
+    """Raise ValueError if the scales of the file are not the scales of the tag."""
     expected = np.ones(source.count), np.zeros(source.count)
-    if "gain" in coords and "offset" in coords and "compression" not in coords:
-        for values, key in zip(expected, ("gain", "offset"), strict=True):
-            values[bands] = coords[key].values
+    for values, scale in zip(expected, scale_and_offset(raster), strict=True):
+        values[bands] = scale
     for found, wanted, what in zip((source.scales, source.offsets), expected, ("scales", "offsets"), strict=True):
         if not np.allclose(found, wanted, rtol=_SCALE_TOLERANCE, atol=_SCALE_TOLERANCE):
             texts = [in_a_line(", ".join(f"{value:g}" for value in values), 80) for values in (found, wanted)]

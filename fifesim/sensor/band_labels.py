@@ -10,7 +10,7 @@ import xarray as xr
 from fifesim.base.arguments import Names
 from fifesim.base.bands import LONGEST
 from fifesim.grids import cf
-from fifesim.grids.inputs import PER_MICROMETRE, AnyDimensions, check_reflectance, unpacked
+from fifesim.grids.inputs import PER_MICROMETRE, AnyDimensions, check_reflectance, storage_of
 from fifesim.grids.reductions import combined
 from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
@@ -145,10 +145,10 @@ def to_bands(
     array([0.3, 0.3])
     """
     cf.check_quantity(spectra, "surface_reflectance", "toa_reflectance", "toa_radiance")
-    spectra = unpacked(spectra)
-    if spectra.dtype.kind != "f":
+    dtype, scaled, _ = storage_of(spectra)
+    if not scaled:
         raise ValueError(
-            f"spectra must be reflectance or radiance, got whole numbers ({spectra.dtype}) without a scale: type "
+            f"spectra must be reflectance or radiance, got whole numbers ({dtype}) without a scale: type "
             ".assign_attrs(scale_factor=0.0001) with the scale of the data"
         )
     if not 0 < min_coverage <= 1:

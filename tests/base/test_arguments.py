@@ -534,3 +534,46 @@ def test_class_error_names_the_function_that_returns_its_objects(lai):
 def test_kinds_accept_and_reject_values(kind, fits, others):
     assert all(kind.fits(value) for value in fits)
     assert not any(kind.fits(value) for value in others)
+
+
+def _packed(raster):
+    """Raster as a file stores it: whole numbers with a scale, an offset, and a value for no data in one cell."""
+    whole = np.round((raster.drop_attrs(deep=False) - 0.5) * 1000).astype("int32")
+    whole[{dim: size // 2 for dim, size in whole.sizes.items()}] = -99
+    # Values are metres, reflectances or shares: -99 does not occur.
+    return whole.assign_attrs(raster.attrs, scale_factor=0.001, add_offset=0.5, _FillValue=-99)
+
+
+def _outcome(name, arguments):
+    try:
+        return getattr(fifesim, name)(**arguments)
+    except (ValueError, TypeError) as error:
+        return str(error)
+
+
+def _same(one, other):
+    if isinstance(one, xr.DataArray | xr.Dataset | xr.DataTree):
+        return type(one) is type(other) and one.equals(other)
+    if isinstance(one, tuple | list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    return repr(one) == repr(other)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_every_public_function_applies_scale_offset_and_fill_value(valid_calls):
+    """A packed raster gives the result of its values in every function, or the same error."""
+    tried, wrong = 0, []
+    # Figures, files and counts have tests of their own.
+    for name in sorted(set(CHECKED) - {"plot", "plot_fit", "to_geotiff", "calibrate", "Setup", "Canopy"}):
+        for key, value in valid_calls[name].items():
+            if not isinstance(value, xr.DataArray) or value.dtype.kind != "f" or "gain" in value.coords:
+                continue
+            packed = _packed(value)
+            values = packed.drop_attrs(deep=False).astype(float).where(packed != -99) * 0.001 + 0.5
+            values = values.assign_attrs(value.attrs)
+            found, expected = (_outcome(name, valid_calls[name] | {key: each}) for each in (packed, values))
+            tried += 1
+            if not _same(found, expected):
+                wrong.append(f"{name}({key}): {str(found)[:150]!r} instead of {str(expected)[:150]!r}")
+    assert tried > 60
+    assert not wrong, "\n".join(wrong)

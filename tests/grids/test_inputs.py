@@ -12,7 +12,7 @@ from lazy import in_chunks, no_compute
 
 import fifesim
 from fifesim.grids import grid as grids
-from fifesim.grids.inputs import check_reflectance, in_micrometres, incoming, unpacked
+from fifesim.grids.inputs import check_reflectance, in_micrometres, incoming, opened, unpacked
 
 AIR, TIME = fifesim.Atmosphere(), "2022-06-03T17:10Z"
 
@@ -45,7 +45,7 @@ def with_hole(fractions):
 @pytest.mark.parametrize("no_data", ["_FillValue", "nodata", "missing_value"])
 def test_integers_are_scaled_to_reflectance(fractions, no_data, array_type):
     mine = array_type(as_stored(fractions, scale_factor=1e-4, add_offset=0.0, **{no_data: -9999}))
-    np.testing.assert_allclose(incoming(mine, "surface_reflectance"), with_hole(fractions), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(incoming(opened(mine), "surface_reflectance"), with_hole(fractions), rtol=0, atol=1e-12)
     surface = mine.fifesim.to_toa(AIR, time=TIME, instrument="Sentinel-2")
     known = with_hole(fractions).fifesim.to_toa(AIR, time=TIME, instrument="Sentinel-2")
     np.testing.assert_allclose(surface, known, rtol=0, atol=1e-12)
@@ -56,9 +56,9 @@ def test_offset_is_added_and_undeclared_nodata_gives_a_warning(site, fractions):
     """Landsat Collection 2 surface reflectance: 7273 is 0 and 43636 is 1, so 0 would be read as -0.2."""
     whole = xr.DataArray(np.full((1, *site.shape), 10909, "uint16"), dims=("band", "y", "x"))
     mine = grids.place(whole, site).assign_attrs(scale_factor=2.75e-5, add_offset=-0.2)
-    np.testing.assert_allclose(incoming(mine, "surface_reflectance"), 0.0999975, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(incoming(opened(mine), "surface_reflectance"), 0.0999975, rtol=0, atol=1e-9)
     with pytest.warns(UserWarning, match=r"no value for no data.*_FillValue=0"):
-        incoming(as_stored(fractions.fillna(0), scale_factor=2.75e-5, add_offset=-0.2), "surface_reflectance")
+        incoming(opened(as_stored(fractions.fillna(0), scale_factor=2.75e-5, add_offset=-0.2)), "surface_reflectance")
 
 
 def test_raw_digital_numbers_are_rejected(fractions):
@@ -96,18 +96,18 @@ def test_dark_scene_in_percent_gives_a_warning():
 def test_remedy_suggests_nodata_only_if_it_is_missing(fractions):
     whole = (fractions * 10000).astype("int16")
     with pytest.raises(ValueError, match=r"scale_factor=0\.0001\), as.*; calibrate"):
-        incoming(whole.assign_attrs(_FillValue=-9999), "surface_reflectance")
+        incoming(opened(whole.assign_attrs(_FillValue=-9999)), "surface_reflectance")
     with pytest.raises(ValueError, match=r"scale_factor=0\.0001, _FillValue=0\), as"):
-        incoming(whole, "surface_reflectance")
+        incoming(opened(whole), "surface_reflectance")
     with pytest.raises(ValueError, match=r"open its file with fifesim\.open_image"):
-        incoming(whole.assign_attrs(FIFESIM="{}"), "surface_reflectance")
+        incoming(opened(whole.assign_attrs(FIFESIM="{}")), "surface_reflectance")
 
 
 def test_fractions_with_a_scale_attribute_are_rejected(fractions):
     """Arithmetic keeps attributes, so a raster that was already scaled still carries its scale."""
     with pytest.raises(ValueError, match=r"also scale_factor 0\.0001.*remove them from \.attrs.*mask_and_scale=True"):
-        incoming(fractions.assign_attrs(scale_factor=1e-4), "surface_reflectance")
-    incoming(fractions.assign_attrs(scale_factor=1.0, add_offset=0.0), "surface_reflectance")
+        incoming(opened(fractions.assign_attrs(scale_factor=1e-4)), "surface_reflectance")
+    incoming(opened(fractions.assign_attrs(scale_factor=1.0, add_offset=0.0)), "surface_reflectance")
 
 
 def test_dataset_with_a_variable_per_band(fractions):
@@ -115,9 +115,9 @@ def test_dataset_with_a_variable_per_band(fractions):
     known = fractions.fifesim.to_toa(AIR, time=TIME, instrument="MSI")
     np.testing.assert_array_equal(dataset.fifesim.to_toa(AIR, time=TIME, instrument="MSI"), known)
     whole = by_variable(as_stored(fractions)).assign_attrs(scale_factor=1e-4, nodata=-9999)
-    np.testing.assert_allclose(incoming(whole, "surface_reflectance"), with_hole(fractions), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(incoming(opened(whole), "surface_reflectance"), with_hole(fractions), rtol=0, atol=1e-12)
     mixed = by_variable(as_stored(fractions, scale_factor=1e-4, nodata=-9999)).assign(nir=dataset["nir"])
-    np.testing.assert_allclose(incoming(mixed, "surface_reflectance")[1], fractions[1])
+    np.testing.assert_allclose(incoming(opened(mixed), "surface_reflectance")[1], fractions[1])
     with pytest.raises(ValueError, match=r"no variables over \(y, x\): sza"):
         incoming(xr.Dataset({"sza": 3.0}), "surface_reflectance")
 
@@ -174,7 +174,7 @@ def test_band_names_follow_the_band_numbers(fractions, tmp_path):
             assert taken["band"].values.tolist() == [names[number] for number in chosen]
         assert incoming(mine.sel(band=3), "surface_reflectance")["band"].item() == "B04"
     with rioxarray.open_rasterio(path, band_as_variable=True) as mine:
-        assert incoming(mine, "surface_reflectance")["band"].values.tolist() == list(names)
+        assert incoming(opened(mine), "surface_reflectance")["band"].values.tolist() == list(names)
 
 
 def test_numbered_bands_give_a_warning(fractions):

@@ -14,7 +14,6 @@ from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.classes import by_class
 from fifesim.grids.grid import north_up, with_crs_of
-from fifesim.grids.inputs import unpacked
 from fifesim.grids.windows import with_origin
 from fifesim.ground.canopy import layers
 from fifesim.ground.canopy.crowns import SHAPE, check_crowns, crown_shares, lai_in_crowns
@@ -122,7 +121,7 @@ def shares_of(canopy, names, lai):
             numbers[name] = float(given)
             continue
         cf.check_units(given, name)
-        raster = unpacked(with_crs_of(north_up(given), lai)).rename(name)
+        raster = with_crs_of(north_up(given), lai).rename(name)
         varying[name] = raster.drop_vars(set(raster.coords) - {"y", "x", "spatial_ref"})
     return varying, numbers
 
@@ -313,7 +312,6 @@ def checked_scene(lai):
         raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
     grids.geobox(lai)
     cf.check_words(str(lai.name or "the raster"), (lai.name, lai.attrs.get("long_name")), "lai")
-    lai = unpacked(lai)
     if lai.chunks is None and lai.size:
         if not np.isfinite(lai.values).any():
             raise ValueError(

@@ -21,7 +21,6 @@ from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.dates import by_date
 from fifesim.grids.grid import north_up
-from fifesim.grids.inputs import unpacked
 from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.landscape import downscaling
 from fifesim.ground.landscape.autoregression import check_streaming_arp, window_field
@@ -232,7 +231,7 @@ def downscale(
     """
     grid, seed = grids.check_grid(grid), check_seed(seed)
     check_streaming_arp(arp)
-    pixels = one_layer(unpacked(north_up(lai)))
+    pixels = one_layer(north_up(lai))
     cf.check_quantity(pixels, "lai")
     lattice = pixel_lattice(pixels, grid)
     model = _model(float(arp), distribution, cv, lattice.ratio)

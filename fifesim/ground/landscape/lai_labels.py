@@ -19,7 +19,7 @@ from fifesim.base.times import utc
 from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
-from fifesim.grids.inputs import FileOrRaster, scale_and_offset, unpacked
+from fifesim.grids.inputs import FileOrRaster, storage_of
 from fifesim.grids.opening import raster_file, sound_raster
 from fifesim.grids.sites import made_on_site, one_or_several
 from fifesim.grids.warp import file_onto_grid, raster_onto_grid
@@ -257,7 +257,7 @@ def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
     if isinstance(path_or_raster, xr.DataArray):
         name = in_a_line(str(path_or_raster.name or "raster"), 150)
         _check_array(path_or_raster)
-        found = raster_onto_grid(one_layer(unpacked(path_or_raster)), grid, chunks, check=check_source)
+        found = raster_onto_grid(one_layer(path_or_raster), grid, chunks, check=check_source)
     else:
         name = in_a_line(Path(path_or_raster).name, 150)
         _check_band(path_or_raster, name, allow_remote)
@@ -268,9 +268,9 @@ def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
 
 def _check_array(raster):
     """Raise ValueError if an array is another quantity by name, and warn if it has integers without a scale."""
-    name, whole = str(raster.name or "the raster"), raster.dtype.kind in "iu"
+    name, (_, scaled, _) = str(raster.name or "the raster"), storage_of(raster)
     words = [raster.name, *(raster.attrs.get(key) for key in ("long_name", "standard_name"))]
-    _check_metadata(name, words, raster.attrs.get("units"), whole and scale_and_offset(raster) == (1.0, 0.0))
+    _check_metadata(name, words, raster.attrs.get("units"), not scaled)
 
 
 def _check_band(path, name, allow_remote):

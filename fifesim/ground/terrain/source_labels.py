@@ -61,7 +61,6 @@ class Source:
     affine: Affine
     crs: pyproj.CRS
     metres: float
-    nodata: float | None = None
     origin: tuple[int, int] = (0, 0)
 
     def read(self, top, left, rows, columns):
@@ -86,10 +85,7 @@ class Source:
 
     def _array_window(self, cells, rows, columns):
         top, left = self.origin
-        values = np.asarray(
-            cells[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left], float
-        )
-        return values if self.nodata is None else np.where(values == self.nodata, np.nan, values)
+        return np.asarray(cells[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left], float)
 
 
 def open_source(raster, vertical_units=None, allow_remote=False):
@@ -116,16 +112,9 @@ def _array_source(raster, vertical_units):
     found = regular_geobox(raster)
     if found is None:
         raise ValueError(f"the x and y of {name} are not the centres of a regular grid")
-    scale, offset = raster.attrs.get("scale_factor", 1.0), raster.attrs.get("add_offset", 0.0)
-    if (scale, offset) != (1.0, 0.0):
-        raise ValueError(
-            f"{name} holds packed values, scale {scale:g}, offset {offset:g}: open it with mask_and_scale=True"
-        )
     raster = raster.transpose(*raster.odc.spatial_dims)
     cells = ByWindow(raster) if raster.chunks is None else raster.data
-    nodata = raster.rio.nodata
-    nodata = None if nodata is None or np.isnan(nodata) else float(nodata)
-    source = Source(name, cells, cells.shape, found.affine, None, 1.0, nodata)
+    source = Source(name, cells, cells.shape, found.affine, None, 1.0)
     return _in_metres(source, crs.to_wkt() if crs else None, raster.attrs.get("units"), vertical_units)
 
 
@@ -251,17 +240,11 @@ def elevation_grid(dem):
         raise TypeError(
             f"a dem is an xarray.DataArray, got {type(dem).__name__}: bring it onto the grid with fifesim.fine_dem"
         )
-    cf.check_units(dem, "dem")
+    cf.check_quantity(dem, "dem")
+    cf.check_words("the dem", (dem.name, dem.attrs.get("long_name")), "dem")
     if dem.chunks is None:
         check_heights("the dem", dem.values)
-    grid = grids.geobox(dem)
-    nodata = dem.rio.nodata
-    if nodata is not None and np.isfinite(nodata):
-        raise ValueError(
-            f"the dem marks missing cells as {nodata:g}, which would be taken for an elevation: "
-            "open it with masked=True, or bring it onto the grid with fifesim.fine_dem"
-        )
-    return grid
+    return grids.geobox(dem)
 
 
 def beside_altitude(dem, altitude):

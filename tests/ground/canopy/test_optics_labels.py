@@ -108,7 +108,7 @@ def test_leaves_by_cell_with_angles_by_cell_and_terrain(lai, by_cell):
         geometry=fifesim.Geometry(float(angles["sza"][cell]), 120.0), exact=True,
     )  # fmt: skip
     np.testing.assert_allclose(found[(slice(None), *cell)], alone[(slice(None), *cell)], rtol=0, atol=2e-6)
-    level = lai.drop_attrs(deep=False) * 0 + 300.0
+    level = (lai.drop_attrs(deep=False) * 0 + 300.0).rename("dem")
     xr.testing.assert_allclose(reflectance(lai, leaf, dem=level), reflectance(lai, leaf), rtol=1e-12)
 
 
