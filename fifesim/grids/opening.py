@@ -104,8 +104,9 @@ def _named(element, path):
 
 
 # Formats of one raster that hold its cells themselves. GDAL has others that describe servers or name other files.
+# ENVI and EHdr come last, because they read any file with a .hdr next to it as raw bytes.
 FORMATS = (
-    "GTiff", "HFA", "ENVI", "EHdr", "AAIGrid", "SRTMHGT", "DTED", "USGSDEM", "JP2OpenJPEG", "PNG", "JPEG",
+    "GTiff", "HFA", "AAIGrid", "SRTMHGT", "DTED", "USGSDEM", "JP2OpenJPEG", "PNG", "JPEG", "ENVI", "EHdr",
 )  # fmt: skip
 
 # File systems of GDAL that stay on this machine.
