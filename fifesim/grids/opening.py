@@ -373,11 +373,13 @@ def covering_grid(path, cell, pixel, crs=None):
         x, y = projection.transform_points(source.transform, columns, rows)
         lies = lies_in_words(source.transform, source.shape, own)
     to_degrees = pyproj.Transformer.from_crs(own, 4326, always_xy=True)
-    area = to_degrees.transform_bounds(x.min(), y.min(), x.max(), y.max()) if crs or own.is_geographic else None
+    area = to_degrees.transform_bounds(x.min(), y.min(), x.max(), y.max())
+    # A map on a sphere, such as MODIS tiles, is sheared, so that its metres are no distances on the ground.
+    elsewhere = own.is_geographic or own.ellipsoid.inverse_flattening == 0
     if crs is not None:
         crs = pyproj.CRS.from_user_input(projection.horizontal(crs))
     else:
-        crs = _utm(own, x, y) if own.is_geographic else own
+        crs = _utm(own, *to_degrees.transform(x.mean(), y.mean())) if elsewhere else own
     if crs != own:
         pipeline, _ = projection.operation(own, crs, area)
         x, y = projection.carry(pipeline, own, crs, x, y)
@@ -391,7 +393,7 @@ def covering_grid(path, cell, pixel, crs=None):
 
 
 def _utm(crs, longitude, latitude):
-    """UTM zone of the middle of some places, in NAD83 if this is their datum, else in WGS 84."""
+    """UTM zone of a place, in NAD83 if this is the datum of a CRS, else in WGS 84."""
     datum = "NAD83" if crs.datum is not None and crs.datum.name == "North American Datum 1983" else "WGS 84"
-    middle = AreaOfInterest(*(float(np.mean(values)) for values in (longitude, latitude) * 2))
-    return pyproj.CRS.from_epsg(query_utm_crs_info(datum_name=datum, area_of_interest=middle)[0].code)
+    place = AreaOfInterest(longitude, latitude, longitude, latitude)
+    return pyproj.CRS.from_epsg(query_utm_crs_info(datum_name=datum, area_of_interest=place)[0].code)

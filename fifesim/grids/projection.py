@@ -41,26 +41,60 @@ _SCALE_WARNED = 0.01
 _RETURNS = 1.0
 
 
+# Datums whose latitude and longitude are used as if on WGS 84, by name, and the error of this use. [m]
+_LIKE_WGS84 = {
+    r"(d )?(world geodetic system (of )?|wgs ?)(19)?84( ensemble)?": 0.0,
+    r"(d )?(european terrestrial reference system (of )?|etrs ?)(19)?89( ensemble)?": 1.0,
+    r"(d )?(north american (datum )?(of )?|nad ?)(19)?83": 4.0,
+}
+# Radii of spheres for the Earth, and the accuracy of a shift to WGS 84 that a CRS states. [m]
+_EARTH, _STATED = (6.35e6, 6.38e6), 5.0
+
+
 def operation(source, target, area=None):
     """PROJ pipeline between two CRSs, None if they are the same, and its accuracy [m]."""
     # Without a direct operation the route through WGS 84 is taken if both of its steps are known. A change of datum by
-    # identity of latitude and longitude (PROJ's "ballpark") is not used: between NAD27 and NAD83 it is 30 m off in
-    # Kansas.
+    # identity of latitude and longitude (PROJ's "ballpark") is used for datums that agree with WGS 84 and for spheres
+    # only: between NAD27 and NAD83 it is 30 m off in Kansas.
     source, target = pyproj.CRS.from_user_input(source), pyproj.CRS.from_user_input(target)
     if source.equals(target, ignore_axis_order=True):
         return None, 0.0
-    direct = _best(source, target, area)
-    if direct:
+    if stated := [crs for crs in (source, target) if '"semi_major"' in crs.to_wkt()]:
+        raise ValueError(
+            f"{name_of(stated[0])} states a radius (semi_major) that PROJ does not use, so that places are 20 km off: "
+            "state the sphere with gdal_edit.py -a_srs '+proj=sinu +R=6371007.181 +units=m' FILE, or .rio.write_crs"
+        )
+    if direct := _best(source, target, area):
         return _pipeline(direct), float(direct.accuracy)
-    wgs84 = pyproj.CRS.from_epsg(4326)
-    steps = _best(source, wgs84, area), _best(wgs84, target, area)
+    steps = _by_wgs84(source, area), _by_wgs84(target, area, back=True)
     if all(steps):
-        return _pipeline(*steps), float(sum(step.accuracy for step in steps))
+        (first, one), (second, other) = steps
+        return _pipeline(first, second), float(one + other)
     raise ValueError(
         f"no operation of known accuracy leads from {name_of(source)} to {name_of(target)}: PROJ would only assume "
-        "that both datums agree ('ballpark'), which can be off by 100 m. Name the datum of the data in its CRS, or "
-        "install PROJ's grid files (projsync), or reproject the data yourself"
+        "that both datums agree ('ballpark'), which can be off by 100 m. Name the datum of the data in its CRS "
+        "(gdal_edit.py -a_srs EPSG:26914 FILE, or .rio.write_crs), or install PROJ's grid files (projsync), or "
+        "reproject the data yourself"
     )
+
+
+def _by_wgs84(crs, area, *, back=False):
+    """Step from a CRS to WGS 84, or back, and its accuracy [m], None if its datum is unknown."""
+    wgs84 = pyproj.CRS.from_epsg(4326)
+    ends = (wgs84, crs) if back else (crs, wgs84)
+    if known := _best(*ends, area):
+        return known, known.accuracy
+    base = crs.source_crs if crs.is_bound else crs
+    # Maps on a sphere are made with geodetic latitude (MODIS, VIIRS, EASE-Grid), which a geocentric shift would change.
+    sphere = base.ellipsoid.inverse_flattening == 0
+    if crs.is_bound and crs.coordinate_operation.towgs84:
+        accuracy = None if sphere else _STATED
+    elif sphere:
+        accuracy = 0.0 if _EARTH[0] < base.ellipsoid.semi_major_metre < _EARTH[1] else None
+    else:
+        name = base.datum.name.replace("_", " ").lower()
+        accuracy = next((error for words, error in _LIKE_WGS84.items() if re.fullmatch(words, name)), None)
+    return None if accuracy is None else (_transformers(*ends, area, ballpark=True)[0], accuracy)
 
 
 def carry(pipeline, source, target, x, y):
@@ -72,13 +106,16 @@ def carry(pipeline, source, target, x, y):
 
 
 def _best(source, target, area):
+    known = [found for found in _transformers(source, target, area) if found.accuracy >= 0]
+    return min(known, key=lambda found: found.accuracy, default=None)
+
+
+def _transformers(source, target, area, ballpark=False):
     with warnings.catch_warnings():
         # PROJ names a better operation whose grid file is not installed; the accuracy of the one taken is known.
         warnings.filterwarnings("ignore", "Best transformation is not available")
         around = AreaOfInterest(*area) if area else None
-        group = TransformerGroup(source, target, area_of_interest=around, allow_ballpark=False)
-    known = [found for found in group.transformers if found.accuracy >= 0]
-    return min(known, key=lambda found: found.accuracy, default=None)
+        return TransformerGroup(source, target, area_of_interest=around, allow_ballpark=ballpark).transformers
 
 
 def _pipeline(*steps):
@@ -188,8 +225,10 @@ def _undistorted(longitude, latitude):
 
 @cached(128, "names of CRSs")
 def name_of(crs):
-    """Name of a CRS in messages."""
-    return f"EPSG:{crs.to_epsg()}" if crs.to_epsg() else in_a_line(crs.name, 60)
+    """Name of a CRS in messages, its code only if the CRS is the one of the code, not just similar."""
+    if code := crs.to_epsg(min_confidence=100):
+        return f"EPSG:{code}"
+    return in_a_line(f"{crs.name} (datum: {crs.datum.name})" if crs.datum else crs.name, 90)
 
 
 def degrees(grid):

@@ -55,6 +55,96 @@ def test_unknown_datum_is_rejected(tmp_path):
     with pytest.raises(ValueError, match="no operation of known accuracy"):
         fifesim.open_lai(path, GRID)
 
+# Radius of the sphere of MODIS and VIIRS land products. [m]
+RADIUS = 6371007.181
+
+# Landsat ARD of collection 1 states an ellipsoid that is not the ellipsoid of its datum.
+ARD = (
+    'PROJCS["Albers",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378140,298.2569999999957,'
+    'AUTHORITY["EPSG","7030"]],AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433],'
+    'AUTHORITY["EPSG","4326"]],PROJECTION["Albers_Conic_Equal_Area"],PARAMETER["standard_parallel_1",29.5],'
+    'PARAMETER["standard_parallel_2",45.5],PARAMETER["latitude_of_center",23],PARAMETER["longitude_of_center",-96],'
+    'PARAMETER["false_easting",0],PARAMETER["false_northing",0],UNIT["metre",1,AUTHORITY["EPSG","9001"]]]'
+)
+# UTM zone 14 in the spelling of ESRI, with a name of the datum that PROJ does not know.
+ESRI = (
+    'PROJCS["UTM_14",GEOGCS["GCS",DATUM["North_American_1983",SPHEROID["GRS_1980",6378137.0,298.257222101]],'
+    'PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],'
+    'PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",-99.0],'
+    'PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]'
+)
+LONDON = fifesim.grid_at("EPSG:32630", 699000, 5710000, 3000, 3000, 30)
+BERN = fifesim.grid_at("EPSG:32632", 383000, 5201000, 3000, 3000, 30)
+ALASKA = fifesim.grid_at("EPSG:32606", 466000, 7190000, 3000, 3000, 30)
+KANSAS = fifesim.fife_site(30, window=((100, 200), (100, 200)))
+
+# CRS of a file, an equivalent one for pyproj or the radius of a sphere, and a grid.
+FOREIGN = {
+    "MODIS": (f"+proj=sinu +R={RADIUS} +units=m +no_defs", RADIUS, KANSAS),
+    "MODIS of GDAL 2": (f"+proj=sinu +a={RADIUS} +b={RADIUS} +units=m +nadgrids=@null +wktext", RADIUS, LONDON),
+    "VIIRS": ("ESRI:53008", 6371000.0, ALASKA),
+    "Landsat ARD": (ARD, "+proj=aea +lat_0=23 +lon_0=-96 +lat_1=29.5 +lat_2=45.5 +a=6378140 +rf=298.257", KANSAS),
+    "CONUS Albers": ("EPSG:5070", "EPSG:5070", KANSAS),
+    "EASE-Grid 2.0, global": ("EPSG:6933", "EPSG:6933", LONDON),
+    "EASE-Grid 2.0, north": ("EPSG:6931", "EPSG:6931", ALASKA),
+    "MGRS tile": ("EPSG:32614", "EPSG:32614", KANSAS),
+    "UTM of ESRI": (ESRI, "EPSG:26914", KANSAS),
+    "stated shift": ("+proj=utm +zone=14 +ellps=GRS80 +towgs84=0,0,0", "EPSG:26914", KANSAS),
+    "British National Grid": ("EPSG:27700", "EPSG:27700", LONDON),
+    "Swiss LV95": ("EPSG:2056", "EPSG:2056", BERN),
+    "LAEA Europe": ("+proj=laea +lat_0=52 +lon_0=10 +x_0=4321000 +y_0=3210000 +datum=WGS84", "EPSG:3035", BERN),
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_cells_of_foreign_maps_are_in_the_right_place(tmp_path, name):
+    """
+    The file holds its own column or row, so that each cell of the grid states where it was read.
+
+    Geodetic latitude is used on spheres: y is the radius times the latitude. The tolerance is 0.5 m.
+    """
+    crs, equal, grid = FOREIGN[name]
+    place = grids.coordinates(grid)
+    x, y = np.meshgrid(place["x"].values, place["y"].values)
+    if isinstance(equal, float):
+        longitude, latitude = np.radians(pyproj.Transformer.from_crs(grid.crs, 4326, always_xy=True).transform(x, y))
+        x, y = equal * longitude * np.cos(latitude), equal * latitude
+    else:
+        x, y = pyproj.Transformer.from_crs(grid.crs, equal, always_xy=True).transform(x, y)
+    cell = 463.3127
+    affine = Affine(cell, 0, x.min() // cell * cell - 2 * cell, 0, -cell, y.max() // cell * cell + 2 * cell)
+    shape = [int(np.ptp(each) / cell) + 5 for each in (y, x)]
+    rows, columns = np.indices(shape) + 0.5
+    for values, expected in ((columns, (x - affine.c) / cell), (rows, (affine.f - y) / cell)):
+        path = write(tmp_path / "map.tif", values, affine, crs)
+        np.testing.assert_allclose(warp.file_onto_grid(path, grid), expected, rtol=0, atol=1e-3)
+        opened = rioxarray.open_rasterio(path)[0]
+        np.testing.assert_allclose(warp.raster_onto_grid(opened, grid), expected, rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "crs, name",
+    [
+        ("+proj=utm +zone=14 +ellps=WGS84", "Unknown based on WGS 84 ellipsoid"),  # not EPSG:32614
+        ("+proj=utm +zone=14 +ellps=clrk66 +nadgrids=@absent.gsb", "Clarke 1866"),
+        ("+proj=eqc +R=1737400", "unknown"),  # the Moon
+        ("+proj=lcc +lat_1=30 +lat_2=60 +R=6370000 +towgs84=0,0,0", "unknown"),  # PROJ is 20 km off
+        (ARD.replace("WGS_1984", "Clarke").replace(',AUTHORITY["EPSG","6326"]', ""), "Clarke"),
+    ],
+)
+def test_unknown_datum_is_rejected_by_its_own_name(crs, name):
+    for ends in ((crs, "EPSG:26914"), ("EPSG:26914", crs)):
+        with pytest.raises(ValueError, match="no operation of known accuracy.*gdal_edit.py -a_srs") as caught:
+            projection.operation(*ends, FIFE)
+        assert name in str(caught.value) and "EPSG:32614" not in str(caught.value)
+
+
+def test_radius_that_proj_ignores_is_rejected():
+    """SR-ORG:6974 states the sphere of MODIS by parameters of the projection, and WGS 84: 18 km off."""
+    wkt = ARD.replace('PARAMETER["false_easting",0]', 'PARAMETER["semi_major",6371007.181],PARAMETER["false_easting",0]')
+    with pytest.raises(ValueError, match=r"Albers.*semi_major.*gdal_edit.py -a_srs"):
+        projection.operation(wkt, "EPSG:26914", FIFE)
+
 
 @pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:4269"])
 def test_degrees_onto_metres_is_bilinear_interpolation(tmp_path, crs):
