@@ -169,6 +169,21 @@ def storage(raster):
     return {**raster.attrs, **raster.encoding} if raster.dtype.kind in "iu" else raster.attrs
 
 
+def one_layer(raster, quantity):
+    """Layer of an array that holds a quantity, with the dimensions y and x only."""
+    name = str(raster.name or "the raster")
+    if "band" in raster.dims:
+        words, names = raster.attrs.get("long_name"), raster["band"].values
+        words = words if np.shape(words) == np.shape(names) else names
+        raster = raster.isel(band=cf.band_of(name, np.array(words, object)[:, None], quantity), drop=True)
+    if raster.ndim != 2:
+        raise ValueError(
+            f"{name} has dimensions {raster.dims}, where {cf.QUANTITIES[quantity].long_name} has y and x: select one "
+            "layer, such as .isel(time=0)"
+        )
+    return raster
+
+
 # Range of reflectance factors; glint, snow and slopes in low sun stay within. [1]
 LOWEST, HIGHEST = -0.5, 5.0
 

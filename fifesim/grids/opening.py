@@ -5,7 +5,7 @@ import re
 import warnings
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from xml.etree import ElementTree
 
@@ -20,11 +20,12 @@ import rioxarray
 import xarray as xr
 from pyproj.aoi import AreaOfInterest
 from pyproj.database import query_utm_crs_info
+from rasterio.enums import ColorInterp
 from rasterio.windows import Window
 
 from fifesim.base.files import check_regular, in_a_line, shown
+from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
-from fifesim.grids import projection
 from fifesim.grids.projection import lies_in_words
 
 # [byte]
@@ -140,6 +141,7 @@ class RasterFile:
 
     path: str
     driver: str
+    band: int = 1
 
     @property
     def name(self):
@@ -300,6 +302,21 @@ def sound_raster(file):
     with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
         check_raster(source, file.name)
         yield source, horizontal_crs(source, file.name)
+
+
+def file_of(quantity, path, allow_remote=False):
+    """Checked raster file, with the number of the band that holds a quantity."""
+    file = raster_file(path, allow_remote)
+    with sound_raster(file) as (source, _):
+        numbers = [each for each in source.indexes if source.colorinterp[each - 1] != ColorInterp.alpha]
+        index = cf.band_of(file.name, [words_of(source, each) for each in numbers], quantity)
+    return replace(file, band=numbers[index])
+
+
+def words_of(source, band):
+    """Texts that describe a band of an open file."""
+    tags = source.tags(band)
+    return source.descriptions[band - 1], *(tags.get(key) for key in ("NETCDF_VARNAME", "long_name", "standard_name"))
 
 
 def check_raster(source, name, *, north_up=False):

@@ -24,7 +24,7 @@ from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids import projection, windows
 from fifesim.grids.grid import regular_geobox
-from fifesim.grids.opening import raster_file, sound_raster
+from fifesim.grids.opening import file_of, sound_raster
 from fifesim.grids.projection import lies_in_words
 
 # Cells are made in fixed tiles of this size, so that the warper's rounding is the same under any chunking.
@@ -55,12 +55,12 @@ _SOURCE_MARGIN = 4
 _MOST_SAMPLES = 64
 
 
-def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False, check=None):
-    """One band of a raster file on a grid, dims (y, x), NaN for no data."""
+def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, quantity="lai", classes=False, check=None):
+    """Band of a raster file that holds a quantity, on a grid, dims (y, x), NaN for no data."""
     # Bilinear interpolation to cells up to the size of the file cells, averages for larger cells; a file on the same
     # grid is read directly.
     grids.check_grid(grid)
-    file = raster_file(path, allow_remote)
+    file = file_of(quantity, path, allow_remote)
     with sound_raster(file) as (source, crs):
         pipeline, back = _operations(source, crs, grid, file.name)
     # A changed file is a different file for the cache.
@@ -84,7 +84,7 @@ def raster_onto_grid(raster, grid, chunks=None, *, classes=False, check=None):
     def kernel(rows, columns, cells):
         down, across = reads.window(rows, columns)
         known = replace(reads.source, cells=cells, first=(down.start, across.start))
-        make_tile = partial(_tile, known, crs, source.name, grid, pipeline, back, classes, check)
+        make_tile = partial(_tile, known, crs, known, grid, pipeline, back, classes, check)
         shape = rows.stop - rows.start, columns.stop - columns.start
         return assemble(make_tile, _TILE, row + rows.start, column + columns.start, shape)
 
@@ -103,6 +103,7 @@ class _ArraySource:
     shape: tuple[int, int]
     transform: Affine
     first: tuple[int, int] = (0, 0)
+    band: int = 1
     scales: tuple = (1.0,)
     offsets: tuple = (0.0,)
 
@@ -200,12 +201,12 @@ def _cells_per_cell(source, crs, grid, back):
 
 @cached(16, "warped tiles of files")
 def _warp_tile(file, state, grid, pipeline, back, classes, check, tile_row, tile_column):
-    """One lattice tile of the first band of a file, in its physical unit."""
+    """One lattice tile of a file, in its physical unit."""
     with sound_raster(file) as (source, crs):
-        return _tile(source, crs, file.name, grid, pipeline, back, classes, check, tile_row, tile_column)
+        return _tile(source, crs, file, grid, pipeline, back, classes, check, tile_row, tile_column)
 
 
-def _tile(source, crs, name, grid, pipeline, back, classes, check, tile_row, tile_column):
+def _tile(source, crs, file, grid, pipeline, back, classes, check, tile_row, tile_column):
     """One lattice tile of a file or array; blocks outside of the grid stay empty."""
     row, column = grids.lattice_position(grid)
     top, left = tile_row * _TILE - row, tile_column * _TILE - column
@@ -227,7 +228,7 @@ def _tile(source, crs, name, grid, pipeline, back, classes, check, tile_row, til
             columns = slice(max(start, 0), min(start + size, grid.shape.x))
             inside = None if check is None else _source_window(source, crs, grid[rows, columns], back)
             checked = (inside, check) if inside else None
-            filled = _warp_block(source, name, block, back, options, samples, checked)
+            filled = _warp_block(source, file, block, back, options, samples, checked)
             out[down : down + size, across : across + size] = filled
     return out
 
@@ -280,7 +281,7 @@ def _most_frequent(values, samples):
     return out
 
 
-def _warp_block(source, name, block, back, options, samples, checked):
+def _warp_block(source, file, block, back, options, samples, checked):
     """Block of cells from one window of the file; with several samples, the most frequent value of each cell."""
     # `checked` is a part of the window, and the function that checks it.
     size, a = block.shape.x, block.affine
@@ -290,15 +291,15 @@ def _warp_block(source, name, block, back, options, samples, checked):
         return out
     if window.width * window.height > _MOST_CELLS:
         raise ValueError(
-            f"{name} is far finer than the cells, {window.width * window.height:.2g} of its cells lie in {size} x "
+            f"{file.name} is far finer than the cells, {window.width * window.height:.2g} of its cells lie in {size} x "
             f"{size}: average it first, with gdalwarp -r average -tr and a cell between the two"
         )
-    values = source.read(1, window=window, masked=True).astype(float).filled(np.nan)
-    values = values * source.scales[0] + source.offsets[0]
+    values = source.read(file.band, window=window, masked=True).astype(float).filled(np.nan)
+    values = values * source.scales[file.band - 1] + source.offsets[file.band - 1]
     if checked is not None:
         part, check = checked
         top, left = (max(int(at), 0) for at in (part.row_off - window.row_off, part.col_off - window.col_off))
-        check(name, values[top : top + int(part.height), left : left + int(part.width)])
+        check(file.name, values[top : top + int(part.height), left : left + int(part.width)])
     for first in range(0, size, _STRIP):
         strip = np.full((size * samples, min(size, _STRIP) * samples), np.nan)
         transform = Affine(a.a / samples, 0.0, a.c + first * a.a, 0.0, a.e / samples, a.f)

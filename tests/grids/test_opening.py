@@ -14,8 +14,10 @@ import pytest
 import rasterio
 import rasterio.shutil
 import rasterio.vrt
+import rioxarray
 from affine import Affine
 from rasterio.control import GroundControlPoint
+from rasterio.enums import ColorInterp
 
 import fifesim
 from fifesim.grids import opening
@@ -319,3 +321,73 @@ def test_unsuitable_crs_is_rejected(tmp_path):
         with pytest.raises(ValueError, match=said) as caught:
             covering_grid(path, 10.0, 30.0, crs)
         assert len(str(caught.value)) < 500 and "\n" not in str(caught.value)
+
+
+# Numbers in a band, and the function that opens a file or an array of them.
+CODES = {"a": fifesim.CoverClass(code=2, lai=2.0), "b": fifesim.CoverClass(code=3, lai=3.0)}
+BY_BAND = {
+    "lai": lambda given: fifesim.open_lai(given, GRID),
+    "elevation": lambda given: fifesim.fine_dem(given, GRID),
+    "DEM": lambda given: fifesim.source_dem(given, GRID, margin=0)[0],
+    "cover": lambda given: fifesim.landscape(GRID, cover=given, classes=CODES).cover,
+    "brown": lambda given: 10 * fifesim.landscape(GRID, brown=given).brown,
+}
+
+
+def bands(path, names, values, colours=None, dtype="float32"):
+    """Write a raster of several bands around the grid."""
+    profile = {"driver": "GTiff", "width": 60, "height": 60, "dtype": dtype, "crs": "EPSG:26914", "transform": PLACED}
+    with rasterio.open(path, "w", count=len(values), **profile) as sink:
+        if colours:
+            sink.colorinterp = colours
+        sink.write(np.broadcast_to(np.reshape(values, (-1, 1, 1)), (len(values), 60, 60)).astype(dtype))
+        sink.descriptions = names
+    return path
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", BY_BAND)
+def test_band_is_the_only_one_that_names_the_quantity(tmp_path, name):
+    found, scale = BY_BAND[name], 0.1 if name == "brown" else 1
+    path = bands(tmp_path / "two.tif", ["quality", name], np.array([3.0, 2.0]) * scale)
+    for given in (path, rioxarray.open_rasterio(path)):
+        np.testing.assert_allclose(found(given), 2.0, rtol=1e-6)
+    twice = bands(tmp_path / "twice.tif", ["elevation", "altitude"], np.array([2.0, 3.0]) * scale)
+    undescribed = bands(tmp_path / "none.tif", [None, None, None], np.array([3.0, 2.0, 3.0]) * scale)
+    for path in (twice, undescribed):
+        for given in (path, rioxarray.open_rasterio(path)):
+            with pytest.raises(
+                ValueError, match=r"has \d bands, and not exactly one .*sel\(band=2\).*gdal_translate -b 2"
+            ):
+                found(given)
+
+
+def test_scale_and_unit_are_of_the_band_of_the_quantity(tmp_path):
+    path = bands(tmp_path / "lai.tif", ["Lai_QC", "Lai_500m"], [7, 25], dtype="uint8")
+    with rasterio.open(path, "r+") as sink:
+        sink.scales, sink.units = [1.0, 0.1], ["%", "m2/m2"]
+    np.testing.assert_allclose(fifesim.open_lai(path, GRID), 2.5, rtol=1e-6)
+    path = bands(tmp_path / "dem.tif", ["NDVI", "elevation"], [1, 4000], dtype="int16")
+    with rasterio.open(path, "r+") as sink:
+        sink.scales, sink.units = [1.0, 0.1], ["1", "m"]
+    np.testing.assert_allclose(fifesim.fine_dem(path, GRID), 400.0, rtol=1e-6)
+
+
+def test_alpha_is_no_band_of_data(tmp_path):
+    colours = [ColorInterp.gray, ColorInterp.alpha]
+    path = bands(tmp_path / "alpha.tif", [None, None], [400, 255], colours, dtype="int16")
+    np.testing.assert_allclose(fifesim.fine_dem(path, GRID), 400.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("driver", ["AAIGrid", "PNG", "EHdr", "ENVI"])
+@pytest.mark.parametrize("header", ["EHdr", "ENVI"])
+def test_header_of_another_file_does_not_make_a_raster_raw_bytes(tmp_path, driver, header):
+    twin = write(tmp_path / "lai.bil", driver=header)
+    kept = tmp_path / ("lai.bil" if driver == header else {"AAIGrid": "lai.asc", "PNG": "lai.png"}.get(driver, "x.bil"))
+    if kept != twin:
+        source = write(tmp_path / "source.tif", dtype="uint8" if driver == "PNG" else "float32")
+        rasterio.shutil.copy(source, kept, driver=driver, **({"WORLDFILE": "YES"} if driver == "PNG" else {}))
+    assert (tmp_path / "lai.hdr").exists()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        np.testing.assert_array_equal(fifesim.open_lai(kept, GRID), 3.0)

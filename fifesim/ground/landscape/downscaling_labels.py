@@ -21,11 +21,12 @@ from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.dates import by_date
 from fifesim.grids.grid import north_up
+from fifesim.grids.inputs import one_layer
 from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.landscape import downscaling
 from fifesim.ground.landscape.autoregression import check_streaming_arp, window_field
 from fifesim.ground.landscape.distribution import lai_distribution
-from fifesim.ground.landscape.lai_labels import distribution_name, one_layer
+from fifesim.ground.landscape.lai_labels import distribution_name
 
 # Cells along a fixed tile, and pixels at least.
 _TILE, _FEWEST_PIXELS = 504, 8
@@ -231,7 +232,7 @@ def downscale(
     """
     grid, seed = grids.check_grid(grid), check_seed(seed)
     check_streaming_arp(arp)
-    pixels = one_layer(north_up(lai))
+    pixels = one_layer(north_up(lai), "lai")
     cf.check_quantity(pixels, "lai")
     lattice = pixel_lattice(pixels, grid)
     model = _model(float(arp), distribution, cv, lattice.ratio)

@@ -20,7 +20,7 @@ from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.classes import NO_CLASS, check_codes, numbers_of
 from fifesim.grids.directions import Directions
-from fifesim.grids.inputs import FileOrRaster, unpacked
+from fifesim.grids.inputs import FileOrRaster, one_layer, unpacked
 from fifesim.grids.sites import is_fife, made_on_site
 from fifesim.grids.warp import file_onto_grid, raster_onto_grid
 from fifesim.ground.canopy.leaf_area import check_share
@@ -30,7 +30,7 @@ from fifesim.ground.landscape.autoregression import FIELD_TILE, check_arp, strea
 from fifesim.ground.landscape.classes import CoverClass, Field, class_table, fife_classes, read_table, table_text
 from fifesim.ground.landscape.cover import Patches, patch_classes
 from fifesim.ground.landscape.field_labels import drawn_fields
-from fifesim.ground.landscape.lai_labels import lai_window, one_layer
+from fifesim.ground.landscape.lai_labels import lai_window
 
 # Chunk size for "auto" is a multiple of this. [cell]
 _TILE = 1008
@@ -64,7 +64,7 @@ def cover_map(path_or_raster, grid, table, chunks=None, *, allow_remote=False):
         found = raster_onto_grid(unpacked(one_layer(path_or_raster, "cover")), grid, chunks, classes=True)
     else:
         name = in_a_line(Path(path_or_raster).name, 150)
-        found = file_onto_grid(path_or_raster, grid, chunks, allow_remote, classes=True)
+        found = file_onto_grid(path_or_raster, grid, chunks, allow_remote, quantity="cover", classes=True)
     codes = tuple(each.code for each in table)
     cover = grids.place(chunking.pointwise(check_codes, found, dtype=np.int16, table=codes), grid)
     if cover.chunks is None and not (cover.values != NO_CLASS).any():
@@ -320,9 +320,9 @@ def _property(name, given, grid, chunks, allow_remote):
     if isinstance(given, Number):
         return cf.label(xr.DataArray(check(float(given))), name, history=f"landscape: {name} {given:g}")
     if isinstance(given, xr.DataArray):
-        found = raster_onto_grid(given.rename(name), grid, chunks)
+        found = raster_onto_grid(one_layer(given, name).rename(name), grid, chunks)
     elif is_path(given):
-        found = file_onto_grid(given, grid, chunks, allow_remote)
+        found = file_onto_grid(given, grid, chunks, allow_remote, quantity=name)
     else:
         raise TypeError(
             f"{name} must be a number, a fifesim.Field, the path of a raster or an xarray.DataArray, got "

@@ -19,8 +19,8 @@ from fifesim.base.times import utc
 from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
-from fifesim.grids.inputs import FileOrRaster, storage_of
-from fifesim.grids.opening import raster_file, sound_raster
+from fifesim.grids.inputs import FileOrRaster, one_layer, storage_of
+from fifesim.grids.opening import file_of, sound_raster, words_of
 from fifesim.grids.sites import made_on_site, one_or_several
 from fifesim.grids.warp import file_onto_grid, raster_onto_grid
 from fifesim.ground.canopy.leaf_area import check_map, check_source, warn_of_large
@@ -116,8 +116,8 @@ def open_lai(
     Parameters
     ----------
     path_or_raster : str, path or xarray.DataArray
-        Map of LAI in any CRS and orientation: a raster file, whose first band is used, or an array. Scaled integers
-        (e.g. MODIS) are converted with ``scale_factor``. [m2 m-2]
+        Map of LAI in any CRS and orientation: a raster file or an array. From several bands, the one described as LAI
+        is used. Scaled integers (e.g. MODIS) are converted with ``scale_factor``. [m2 m-2]
     grid : odc.geo.geobox.GeoBox
         Grid of the ground cells. Cells no larger than the map cells are interpolated bilinearly; larger cells are
         means.
@@ -256,8 +256,9 @@ def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
     """Map of leaf area index on a grid, possibly without data, dims (y, x). [m2 m-2]"""
     if isinstance(path_or_raster, xr.DataArray):
         name = in_a_line(str(path_or_raster.name or "raster"), 150)
-        _check_array(path_or_raster)
-        found = raster_onto_grid(one_layer(path_or_raster), grid, chunks, check=check_source)
+        layer = one_layer(path_or_raster, "lai")
+        _check_array(layer)
+        found = raster_onto_grid(layer, grid, chunks, check=check_source)
     else:
         name = in_a_line(Path(path_or_raster).name, 150)
         _check_band(path_or_raster, name, allow_remote)
@@ -274,15 +275,15 @@ def _check_array(raster):
 
 
 def _check_band(path, name, allow_remote):
-    """Check the first band of a file as `_check_array` does."""
-    with sound_raster(raster_file(path, allow_remote)) as (source, _):
-        tags = source.tags(1)
-        words = [source.descriptions[0], *(tags.get(key) for key in ("NETCDF_VARNAME", "long_name", "standard_name"))]
-        scaled = (source.scales[0], source.offsets[0]) != (1.0, 0.0)
-        counts = np.dtype(source.dtypes[0]).kind in "iu" and not scaled
+    """Check the band of a file as `_check_array` does."""
+    file = file_of("lai", path, allow_remote)
+    with sound_raster(file) as (source, _):
+        band = file.band - 1
+        scaled = (source.scales[band], source.offsets[band]) != (1.0, 0.0)
+        counts = np.dtype(source.dtypes[band]).kind in "iu" and not scaled
         # GDAL assigns the height unit of a compound CRS to bands without a unit.
-        units = None if len(pyproj.CRS(source.crs).axis_info) > 2 else source.units[0]
-        _check_metadata(name, words, units, counts)
+        units = None if len(pyproj.CRS(source.crs).axis_info) > 2 else source.units[band]
+        _check_metadata(name, words_of(source, file.band), units, counts)
 
 
 def _check_metadata(name, words, units, counts):
@@ -297,14 +298,6 @@ def _check_metadata(name, words, units, counts):
 
 def _plausible(lai):
     return warn_of_large(check_map(lai))
-
-
-def one_layer(raster, what="leaf area"):
-    """Map without its dimensions of length one, dims (y, x)."""
-    raster = raster.squeeze([name for name in raster.dims if raster.sizes[name] == 1 and name == "band"], drop=True)
-    if raster.ndim != 2:
-        raise ValueError(f"a map of {what} has rows and columns, got dimensions {raster.dims}: select one layer")
-    return raster
 
 
 def scene_cells(grid, distribution, arp, seed, method="streaming"):

@@ -216,8 +216,8 @@ def fine_dem(
     Parameters
     ----------
     path_or_raster : str, path or xarray.DataArray
-        Elevation model in any CRS and orientation: a raster file, whose first band is used, or an array. It should
-        extend beyond the grid.
+        Elevation model in any CRS and orientation: a raster file or an array. From several bands, the one described as
+        elevation is used. It should extend beyond the grid.
     grid : odc.geo.geobox.GeoBox
         Grid of the ground cells.
     fill : float, optional

@@ -19,7 +19,8 @@ from fifesim.base.messages import warn
 from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import regular_geobox
-from fifesim.grids.opening import ErrorsOfGdal, RasterFile, check_raster, horizontal_crs, raster_file
+from fifesim.grids.inputs import one_layer
+from fifesim.grids.opening import ErrorsOfGdal, RasterFile, file_of
 from fifesim.ground.terrain import spline
 from fifesim.ground.terrain.slope import metres_per_unit
 
@@ -94,20 +95,15 @@ def open_source(raster, vertical_units=None, allow_remote=False):
         return _array_source(raster, vertical_units)
     if not isinstance(raster, str | Path):
         raise TypeError(f"an elevation model is a path or an xarray.DataArray, got {type(raster).__name__}")
-    file = raster_file(raster, allow_remote)
+    file = file_of("dem", raster, allow_remote)
     name = in_a_line(Path(file.path).name, 150)
     with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as opened:
-        check_raster(opened, file.name)
-        horizontal_crs(opened, file.name)
         source = Source(name, file, opened.shape, opened.transform, None, 1.0)
-        return _in_metres(source, opened.crs.to_wkt(), in_a_line(opened.units[0] or "", 40), vertical_units)
+        return _in_metres(source, opened.crs.to_wkt(), in_a_line(opened.units[file.band - 1] or "", 40), vertical_units)
 
 
 def _array_source(raster, vertical_units):
-    raster = raster.squeeze([name for name in raster.dims if raster.sizes[name] == 1 and name == "band"], drop=True)
-    name = str(raster.name or "the elevation model")
-    if raster.ndim != 2:
-        raise ValueError(f"an elevation model has one band of rows and columns, got dimensions {raster.dims}")
+    raster, name = one_layer(raster, "dem"), str(raster.name or "the elevation model")
     crs = raster.rio.crs
     found = regular_geobox(raster)
     if found is None:
@@ -147,8 +143,8 @@ def _file_window(file, rows, columns):
     window = rasterio.windows.Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
     task = f"cannot read rows {rows.start} to {rows.stop} and columns {columns.start} to {columns.stop} of {file.name}"
     with ErrorsOfGdal(task), file.opened() as opened:
-        values = opened.read(1, window=window, masked=True).astype(float).filled(np.nan)
-        return values * opened.scales[0] + opened.offsets[0]
+        values = opened.read(file.band, window=window, masked=True).astype(float).filled(np.nan)
+        return values * opened.scales[file.band - 1] + opened.offsets[file.band - 1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,6 +236,8 @@ def elevation_grid(dem):
         raise TypeError(
             f"a dem is an xarray.DataArray, got {type(dem).__name__}: bring it onto the grid with fifesim.fine_dem"
         )
+    if dem.ndim != 2:
+        raise ValueError(f"a dem has dimensions (y, x), got {dem.dims}: select one layer, such as .isel(band=0)")
     cf.check_quantity(dem, "dem")
     cf.check_words("the dem", (dem.name, dem.attrs.get("long_name")), "dem")
     if dem.chunks is None:

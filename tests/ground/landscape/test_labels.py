@@ -280,7 +280,7 @@ def test_unusable_cover_maps_are_refused(tmp_path, site, codes):
     with pytest.raises(ValueError, match=r"none\.tif has no data on the grid"):
         cover_map(empty, site, TABLE)
     two = rioxarray.open_rasterio(write(tmp_path / "cover.tif", codes, site.affine))
-    with pytest.raises(ValueError, match="select one layer"):
+    with pytest.raises(ValueError, match="has 2 bands, and not exactly one"):
         cover_map(xr.concat([two, two], "band"), site, TABLE)
 
 

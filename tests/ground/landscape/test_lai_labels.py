@@ -95,7 +95,7 @@ def test_open_raster_equals_its_file(tmp_path, site):
     modis[0, 0, 0] = 255
     lai = fifesim.open_lai(modis, site)
     assert np.isnan(lai[0, 0]) and np.allclose(lai[1:], 3.5, rtol=1e-15, atol=0)
-    with pytest.raises(ValueError, match="select one layer"):
+    with pytest.raises(ValueError, match="has 2 bands, and not exactly one"):
         fifesim.open_lai(xr.concat([opened, opened], "band"), site)
 
 

@@ -52,7 +52,7 @@ def test_invalid_elevation_models_are_refused(tmp_path, path):
         with pytest.raises(ValueError, match="has no CRS: give it one"):
             fifesim.fine_dem(raster, grid())
     bands = xr.concat([rioxarray.open_rasterio(path)] * 2, "band")
-    with pytest.raises(ValueError, match="has one band"):
+    with pytest.raises(ValueError, match="has 2 bands, and not exactly one"):
         fifesim.fine_dem(bands, grid())
 
 
