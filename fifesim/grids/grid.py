@@ -286,10 +286,13 @@ def with_coordinates(array, coordinates):
 def _with(array, coordinates, indexes):
     """Raster with other coordinates, assembled at once, because xarray aligns assigned ones."""
     variables, known, axes = dict(array.coords.variables), dict(array.xindexes), {}
-    for name, each in coordinates.items():
+    given = {name: each for name, each in variables.items() if each.dtype.kind == "U"} | dict(coordinates)
+    for name, each in given.items():
         variables.pop(name, None)
         known.pop(name, None)
-        variables[name] = variable = getattr(each, "variable", each)
+        variable = getattr(each, "variable", each)
+        # Zarr has no specification of text of fixed width, and warns of it.
+        variables[name] = variable = variable.astype(object) if variable.dtype.kind == "U" else variable
         if variable.dims == (name,) and name not in indexes:
             axes[name] = variable
     made = xr.Coordinates(axes)
