@@ -33,6 +33,12 @@ def check_regular(path):
         raise ValueError(f"{in_a_line(str(path), 200)} is {_KINDS.get(stat.S_IFMT(mode), 'a device')}: name a file")
 
 
+def check_suffix(path, kind, *suffixes):
+    """Raise ValueError for the name of a new file that ends as another kind of file."""
+    if path.suffix.lower() not in suffixes:
+        raise ValueError(f"{in_a_line(path, 150)} is to be a {kind}: end its name in {suffixes[0]}")
+
+
 def read_csv(path, what):
     """Read a CSV table, in which ``#`` starts a comment, with the file name in every message."""
     name = in_a_line(str(path), 200)

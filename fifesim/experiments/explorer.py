@@ -14,6 +14,7 @@ import numpy as np
 from markupsafe import Markup
 
 from fifesim.base.arguments import FilePath
+from fifesim.base.files import check_suffix
 from fifesim.experiments.explorer_settings import LINE_NUMBERS, outcomes_of, sweep_of
 from fifesim.experiments.scatter.shares import CURVATURE
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES
@@ -323,5 +324,6 @@ def check_file(path, overwrite):
     """Raise ValueError if the file of a page exists and may not be overwritten."""
     if path.is_dir():
         raise ValueError(f"{str(path)!r} is a folder, and explore writes one page: type -o {path}/explore.html")
+    check_suffix(path, "page", ".html", ".htm")
     if path.exists() and not overwrite:
         raise ValueError(f"the page {str(path)!r} exists: name another with -o, or add --overwrite")

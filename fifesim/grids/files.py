@@ -24,7 +24,7 @@ from rioxarray.raster_writer import RasterioWriter
 
 from fifesim.base.arguments import Chunks, FilePath
 from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, nearest_band
-from fifesim.base.files import in_a_line
+from fifesim.base.files import check_suffix, in_a_line
 from fifesim.base.geometry import ANGLES
 from fifesim.base.messages import warn
 from fifesim.grids import cf
@@ -177,7 +177,7 @@ def to_geotiff(
     Raises
     ------
     ValueError
-        If the raster has no projected grid, or other dimensions.
+        If the raster has no projected grid, or other dimensions, or the name does not end in .tif or .tiff.
     FileExistsError
         If the file exists and ``overwrite`` is False.
     OSError
@@ -205,6 +205,7 @@ def to_geotiff(
     path = Path(path)
     if path.is_dir():
         raise IsADirectoryError(f"{in_a_line(path, 150)} is a folder: give the name of a file, such as image.tif")
+    check_suffix(path, "GeoTIFF", ".tif", ".tiff")
     if path.exists() and not overwrite:
         raise FileExistsError(
             f"there is a file {in_a_line(path, 150)}: type overwrite=True to replace it, or another name"

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.arguments import FilePath
-from fifesim.base.files import check_regular, in_a_line
+from fifesim.base.files import check_regular, check_suffix, in_a_line
 from fifesim.retrieval import methods
 
 RETRIEVED = {"lai": (0.0, 20.0), "fpar": (0.0, 1.0), "green_fpar": (0.0, 1.0)}
@@ -156,8 +156,9 @@ class Retrieval:
         Parameters
         ----------
         path : str or path
-            An existing file is replaced when the new one is complete.
+            Its name ends in ``.nc``. An existing file is replaced when the new one is complete.
         """
+        check_suffix(path := Path(path), "NetCDF file", ".nc", ".nc4")
         found = xr.Dataset(attrs={"fifesim_retrieval": self.version, "method": self.method, "level": self.level})
         found.attrs |= {"instrument": self.instrument, "prior": self.prior, "seed": self.seed}
         found.attrs |= {"bands": " ".join(self.bands), "quantities": " ".join(self.quantities)}
@@ -168,7 +169,6 @@ class Retrieval:
         if self.score is not None:
             for name, scores in self.score.drop_vars("quantity").data_vars.items():
                 found[f"score_{name}"] = scores
-        path = Path(path)
         partial_path = path.with_name(f".{path.name}.partial")
         try:
             found.to_netcdf(partial_path)

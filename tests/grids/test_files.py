@@ -2,6 +2,7 @@
 
 import json
 import math
+import warnings
 
 import dask.array as da
 import numpy as np
@@ -158,7 +159,9 @@ def test_netcdf_and_zarr_keep_crs_and_names(image, lai, tmp_path, kind, name):
         raster.to_netcdf(path)
         opened = xr.open_dataset(path, decode_coords="all", mask_and_scale=False)
     else:
-        raster.to_dataset().to_zarr(path, consolidated=False)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", "The data type .* does not have a Zarr V3 spec")
+            raster.to_dataset().to_zarr(path, consolidated=False)
         opened = xr.open_zarr(path, decode_coords="all", mask_and_scale=False, consolidated=False)
     with opened:
         again = opened[raster.name].load()
