@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ from fifesim.base.geometry import ANGLES, relative_azimuth
 from fifesim.base.messages import warn
 from fifesim.base.surface_kernels import RossLi, ross_li
 from fifesim.chain.steps import air_bands_and_geometry, as_bands_of, planetary_reflectance, sunlight
-from fifesim.grids import cf, chunks, directions, swaths
+from fifesim.grids import cf, chunks, directions, reductions, swaths
 from fifesim.grids.dates import by_date
 from fifesim.grids.directions import Directions
 from fifesim.grids.inputs import Horizon, RasterOrDataset
@@ -80,13 +81,21 @@ def topographic_correction(
     Returns
     -------
     reflectance : xarray.DataArray, dims (band, y, x)
-        NaN in shadow, except for "kt". Coordinates along band hold the constant ``c`` or the exponent ``k``. Lazy if an
-        input is. [1]
+        Except for "kt", NaN in shadow and where the divisor is below 0.1: cos i of "cosine", "scs" and "minnaert", cos
+        i + c of "c" and "scs+c". The attribute ``masked_cells`` of a result in memory is the number of such cells in
+        the sun. Coordinates along band hold the constant ``c`` or the exponent ``k``. Lazy if an input is, with the
+        same bits. [1]
 
     Raises
     ------
     ValueError
         If the sun varies from cell to cell, or the dem does not cover the reflectance.
+
+    Notes
+    -----
+    At cos i = 0.1, an incidence of 84 degrees, an error of 1 degree of the slope changes a correction by 17 %, and the
+    light of a clear sky, which cos i leaves out, is about as strong as the sunbeam. Below, a quotient of both has no
+    meaning.
 
     See Also
     --------
@@ -111,14 +120,18 @@ def topographic_correction(
         air = air_bands_and_geometry(image, atmosphere, geometry, instrument, time)
         geometry = air[-1]
         light = sunlight(dem, horizon, *air, "topographic_correction")  # type: ignore[call-arg]
-        out, found = _over_kt(image, light, upwelling), {}
+        out, found, dark = _over_kt(image, light, upwelling), {}, None
     else:
         known = directions.given_geometry(geometry, image, time)
         geometry = directions.uniform_geometry(known, "topographic_correction")
-        out, found = _corrected(image, method, _slopes(image, dem, horizon, geometry), geometry.sza, c, k)
+        slopes = _slopes(image, dem, horizon, geometry)
+        out, found = _corrected(image, method, slopes, geometry.sza, c, k)
+        dark = _masked(out, image, slopes[1])
     out = directions.with_geometry(swaths.placed_as(out, image, found), geometry)
     history = f"topographic_correction: {method}, sza {geometry.sza:.2f}, saa {geometry.saa:.2f}"
-    return cf.label(out, _quantity(image), source=image, history=history, references=_REFERENCES[method])
+    history += f", least divisor {corrections.LEAST_COSINE:g}" * (method != "kt")
+    masked = {} if dark is None else {"masked_cells": dark}
+    return cf.label(out, _quantity(image), source=image, history=history, references=_REFERENCES[method], **masked)
 
 
 def _quantity(image):
@@ -159,11 +172,27 @@ def _corrected(image, method, slopes, sza, c, k):
         arguments.append(slope)
     if method in ("c", "scs+c", "minnaert"):
         name, given = ("k", k) if method == "minnaert" else ("c", c)
-        estimate = corrections.minnaert_exponent if name == "k" else corrections.regression_constant
-        values = estimate(image.data, cos_i.data) if given is None else _per_band(given, image, name)
+        values = _estimate(name, image.data, cos_i.data, sza) if given is None else _per_band(given, image, name)
         found[name] = xr.Variable("band", values, cf.attributes(f"topographic_{name}"))
         arguments.append(found[name])
     return chunks.pointwise(kernels[method], image, *arguments), found
+
+
+def _estimate(name, reflectance, cos_i, sza):
+    """Constant c or exponent k of each band, from sums by row, so that its bits do not depend on chunks."""
+    options = {"logarithmic": name == "k", "level": np.cos(np.radians(sza))}
+    kernel, last = (partial(each, **options) for each in (corrections.line_sums, corrections.line_constant))
+    sums = reductions.row_by_row(kernel, reflectance, cos_i, leading=(6, len(reflectance)))
+    if isinstance(sums, np.ndarray):
+        return last(sums)
+    return sums.rechunk(-1).map_blocks(last, dtype=float, drop_axis=[0, 2], meta=np.empty(0))
+
+
+def _masked(corrected, image, cos_i):
+    """Number of cells in the sun that a correction leaves out, None for a lazy raster."""
+    if corrected.chunks is not None:
+        return None
+    return int(((cos_i > 0) & (np.isnan(corrected.data) & np.isfinite(image.data)).any(axis=0)).sum())
 
 
 def _with_bands(image):

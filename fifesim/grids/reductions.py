@@ -31,18 +31,23 @@ def extremes(array):
     return float(low), float(high)
 
 
-def sums_by_row(kernel, *arrays, count, **parameters):
-    """Sums over rows by a kernel, shape (rows, count); computes."""
-    height, width = arrays[0].shape
+def row_by_row(kernel, *arrays, leading):
+    """Sums over rows by a kernel in fixed blocks, shape (*leading, rows), lazy where an input is."""
+    height, width = arrays[0].shape[-2:]
     row = np.arange(height)
     # Each row of the single-column result reads a complete row.
-    reads = [Reads(array.data, (row, row + 1), ([0], [width])) for array in arrays]
+    reads = [Reads(array, (row, row + 1), ([0], [width])) for array in arrays]
 
     def sums(rows, columns, *blocks):
-        return kernel(*(np.ascontiguousarray(block, float) for block in blocks), **parameters).T[..., None]
+        return kernel(*(np.ascontiguousarray(block, float) for block in blocks))[..., None]
 
-    (found,) = computed(in_blocks(sums, reads, (count, height, 1), max(_CELLS // width, 1)))
-    return found[..., 0].T
+    return in_blocks(sums, reads, (*leading, height, 1), max(_CELLS // width, 1))[..., 0]
+
+
+def sums_by_row(kernel, *arrays, count, **parameters):
+    """Sums over rows by a kernel, shape (rows, count); computes."""
+    data = [array.data for array in arrays]
+    return computed(row_by_row(lambda *cells: kernel(*cells, **parameters).T, *data, leading=(count,)))[0].T
 
 
 def sums_by_block(kernel, array, shape, size, margin=(0, 0)):

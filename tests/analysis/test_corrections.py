@@ -98,6 +98,42 @@ def test_corrections_are_lazy_and_do_not_change_level_ground(method):
     np.testing.assert_allclose(flat, scene(), rtol=1e-12)
 
 
+@pytest.mark.parametrize("method", ["c", "scs+c", "minnaert"])
+def test_constants_of_a_scene_have_the_same_bits_in_any_chunks(method):
+    """Also with one band per chunk, and when threads add in any order."""
+    hilly = scene(DEM)
+    whole = hilly.fifesim.topographic_correction(DEM, method)
+    for chunks in ({"y": 70, "x": 90}, {"y": 300, "x": 13}, {"band": 1, "y": 41, "x": 100}):
+        lazy = hilly.chunk(chunks).fifesim.topographic_correction(DEM, method)
+        for scheduler in ("synchronous", "threads"):
+            found = lazy.compute(scheduler=scheduler)
+            np.testing.assert_array_equal(found, whole)
+            name = "k" if method == "minnaert" else "c"
+            assert found[name].values.tobytes() == whole[name].values.tobytes()
+
+
+@pytest.mark.parametrize("method", ["cosine", "c", "scs", "scs+c", "minnaert"])
+def test_corrections_end_where_the_divisor_is_below_a_tenth(method):
+    """Hills of up to 63 degrees below a low sun, where the quotient would reach 160; c and k are near 0 and 1."""
+    sun, constant = fifesim.Geometry(65.0, 140.0), {"c": 0.02, "scs+c": 0.02, "minnaert": 0.9}.get(method)
+    y, x = np.mgrid[:60, :60]
+    dem = DEM[:60, :60].copy(data=400 + 100 * np.sin(x / 5) * np.sin(y / 5))
+    given = {} if constant is None else {"k" if method == "minnaert" else "c": constant}
+    rho = scene()[:, :60, :60].drop_vars(["sza", "saa", "vza", "vaa"])
+    found = rho.fifesim.topographic_correction(dem, method, geometry=sun, **given)
+    cos_i = dem.fifesim.illumination(sun).values
+    divisor = cos_i + given.get("c", 0.0)
+    kept = (cos_i > 0) & (divisor >= 0.1)
+    np.testing.assert_array_equal(np.isfinite(found), np.broadcast_to(kept, found.shape))
+    assert float(found.max()) <= 10 * float(rho.max())
+    assert found.attrs["masked_cells"] == ((cos_i > 0) & ~kept).sum() > 10
+
+
+def test_constant_of_level_ground_is_unknown():
+    cos_i = np.full((4, 5), 0.7) + 1e-16 * np.arange(20).reshape(4, 5)
+    assert np.isnan(corrections.regression_constant(0.2 + cos_i, cos_i))
+
+
 def test_brdf_normalise_converts_between_views():
     land = fifesim.RossLi([0.1, 0.3], [0.05, 0.15], [0.01, 0.03])
     slant = fifesim.Geometry(sza=40.0, saa=120.0, vza=35.0, vaa=300.0)
