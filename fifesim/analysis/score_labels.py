@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
+from functools import partial, reduce
 from typing import Annotated
 
 import numpy as np
@@ -298,7 +298,7 @@ def _pixel_scores(given, truth):
         )  # fmt: skip
 
     if "member" in value.dims:
-        values["error"] = value.mean("member", skipna=False) - truth
+        values["error"] = each_pixel(_mean_of_members, value, core=("member",)) - truth
         values["crps"] = each_pixel(scores.ensemble_crps, value, truth, core=("member",))
         values["pit"] = each_pixel(scores.ensemble_pit, value, truth, core=("member",))
     else:
@@ -318,6 +318,11 @@ def _pixel_scores(given, truth):
         values[f"width {number}"] = high - low
         values[f"score {number}"] = each_pixel(partial(scores.interval_score, level=level), low, high, truth)
     return {name: each.drop_vars(set(each.coords) - set(each.dims)) for name, each in values.items()}, levels
+
+
+def _mean_of_members(members):
+    """Mean over the last axis, added in order, because numpy's order depends on the memory layout."""
+    return reduce(np.add, np.moveaxis(members, -1, 0)) / members.shape[-1]
 
 
 def _sums_by_landscape(values, group, truth, landscape, groups):

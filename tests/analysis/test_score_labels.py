@@ -102,6 +102,15 @@ def test_scores_are_identical_in_any_chunks(estimate, truth):
     xr.testing.assert_identical(lazy.fifesim.score(truth.chunk(pieces)), estimate.fifesim.score(truth))
 
 
+def test_scores_of_ensembles_are_identical_in_any_chunks(truth):
+    truth = truth.isel(landscape=1, drop=True)
+    noise = np.random.default_rng(4).normal(0, 0.3, (37, *truth.shape))
+    members = (truth + xr.DataArray(noise, dims=("member", *truth.dims))).transpose("member", ...).rename("lai")
+    whole = members.fifesim.score(truth, pair="index")
+    for pieces in ({"member": 5}, {"member": -1, "y": 7}, {"member": 1, "x": 11}):
+        xr.testing.assert_identical(members.chunk(pieces).fifesim.score(truth, pair="index"), whole)
+
+
 def test_maps_without_other_dimensions_have_intervals_by_level(estimate, truth):
     found = estimate.isel(landscape=1, drop=True).fifesim.score(truth.isel(landscape=1, drop=True), pair="index")
     xr.testing.assert_identical(found, estimate.isel(landscape=[1]).fifesim.score(truth.isel(landscape=[1])))
