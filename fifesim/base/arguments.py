@@ -120,6 +120,13 @@ def _is_size(value):
     return isinstance(value, str) and re.fullmatch(r"auto|[\d.]+ *[kMGT]?i?B", value) is not None
 
 
+def _are_chunks(value):
+    sizes = value.values() if _is_mapping(value) else value if isinstance(value, tuple) else [value]
+    if any(_is_number(each) and (each == 0 or each < -1) for each in sizes):
+        raise ValueError(f"chunks have 1 cell or more, or -1 for all, got {value!r}: type for instance chunks='auto'")
+    return value is None or _is_number(value) or isinstance(value, tuple) or _is_mapping(value) or _is_size(value)
+
+
 NUMBER = Kind("a number", _is_number)
 WHOLE_NUMBER = Kind("a whole number", _is_whole)
 NUMBERS = Kind("a number, or an array of them", _are_numbers)
@@ -134,12 +141,7 @@ NAMES = Kind("a list of names", lambda value: isinstance(value, str) or (_is_pla
 PATH = Kind("the path of a file", is_path)
 MAPPING = Kind("a mapping of names", _is_mapping)
 FUNCTION = Kind("a function", callable)
-CHUNKS = Kind(
-    "a number of cells, 'auto', '64MB', None or a mapping such as {'y': 1024, 'x': 1024}",
-    lambda value: (
-        value is None or _is_number(value) or isinstance(value, tuple) or _is_mapping(value) or _is_size(value)
-    ),
-)
+CHUNKS = Kind("a number of cells, 'auto', '64MB', None or a mapping such as {'y': 1024, 'x': 1024}", _are_chunks)
 RASTER = Kind("an xarray.DataArray over (y, x)", lambda value: is_a(value, "DataArray"), dimensions=2)
 GRID = Kind(
     "an odc.geo.geobox.GeoBox, such as fifesim.grid_at or raster.odc.geobox give", lambda value: is_a(value, "GeoBox")

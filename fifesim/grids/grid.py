@@ -45,7 +45,7 @@ def check_axes(array):
     if not isinstance(array, xr.DataArray):
         raise TypeError(f"a raster is an xarray.DataArray, got {type(array).__name__}: open it with rioxarray")
     if {"y", "x"} <= set(array.dims):
-        return
+        return _check_first(array)
     if is_scan(array):
         raise ValueError(
             f"a raster needs dimensions y and x, got {array.dims} of a scan: map it with .fifesim.grid_swath(grid)"
@@ -68,11 +68,19 @@ _TOLERANCE_SINGLE = 1 / 10
 def regular_geobox(array):
     """Grid of a raster in any CRS and orientation whose coordinates are evenly spaced, None if odc-geo finds none."""
     # odc-geo reads the first and the last coordinates only.
+    _check_first(array)
     found = array.odc.geobox
     if found is not None:
         for name in array.odc.spatial_dims:
             along_axis(array, name, 0.0, 0.0)
     return found
+
+
+def _check_first(array):
+    """Raise ValueError if the first two coordinates of an axis are equal, where the accessor of odc-geo fails."""
+    for name in {"y", "x", *array.dims[-2:]} & set(array.coords):
+        if array.coords[name].size > 1 and array.coords[name].values[0] == array.coords[name].values[1]:
+            along_axis(array, name, 0.0, 0.0)
 
 
 def along_axis(array, name, edge, cell):
@@ -93,7 +101,7 @@ def along_axis(array, name, edge, cell):
         found = f"{np.nanmin(steps):.6g} to {np.nanmax(steps):.6g}"
         raise ValueError(
             f"the raster's {name} is not evenly spaced, its steps are {found}: "
-            f"sort it with .sortby({name!r}), put tiles together on one grid with .reindex, or interpolate it onto a "
+            f"drop repeated ones with .drop_duplicates({name!r}), sort it with .sortby({name!r}), put tiles together on one grid with .reindex, or interpolate it onto a "
             "regular grid with .interp"
         )
     return float(centres[0] - cell / 2), float(cell)

@@ -18,6 +18,7 @@ from dask.base import tokenize
 from dask.highlevelgraph import HighLevelGraph, MaterializedLayer
 
 from fifesim.grids import grid as grids
+from fifesim.grids.opening import check_memory
 
 # Chunk size of in-memory arrays that are combined with lazy arrays. [cell]
 _CHUNK = 1024
@@ -258,6 +259,9 @@ _ROWS = 252
 def tiles(kernel, grid, chunks=None, *, tile, dtype=float):
     """Array of a kernel that computes cells from their place, dims (y, x), lazy with ``chunks``."""
     if chunks is None:
+        rows, columns = grid.shape
+        what = f"a raster of {rows} x {columns} cells"
+        check_memory(rows * columns, np.dtype(dtype).itemsize, what, "give chunks='auto', which makes it by parts")
         return grids.place(xr.DataArray(kernel(0, 0, tuple(grid.shape)), dims=("y", "x")), grid)
     normal = chunk_sizes(grid, chunks, tile=tile)
     lazy = xr.DataArray(array_by_place(kernel, normal, token=tokenize(kernel, normal), dtype=dtype), dims=("y", "x"))
