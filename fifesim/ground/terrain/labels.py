@@ -151,7 +151,7 @@ def wetness(dem: xr.DataArray, *, resolution: float | None = None) -> xr.DataArr
         [m]
     resolution : float, optional
         Spacing of the nodes at which the index is computed, a whole number of cells; by default the attribute
-        ``source_resolution`` of ``dem``, else 30 m. The index is interpolated between nodes. [m]
+        ``source_resolution`` of ``dem``, else the cell size. The index is interpolated between nodes. [m]
 
     Returns
     -------

@@ -158,6 +158,9 @@ def horizon_places(grid, horizon):
     return places_on(grid, found)
 
 
+# Places of a part of the sky along each side.
+_PART = 512
+
 DIRECTIONS = 32
 HORIZON_REACH = 5000.0  # [m]
 
@@ -183,7 +186,7 @@ def horizon(
         Maximum distance of the terrain. [m]
     resolution : float, optional
         Spacing of the nodes at which the horizon is computed, a whole number of cells; by default the attribute
-        ``source_resolution`` of ``dem``, else 30 m. [m]
+        ``source_resolution`` of ``dem``, else the cell size. [m]
     beside : xarray.DataArray, dims (y, x), optional
         Elevation model inside ``dem``. A lazy result then has the same number of chunks, or one if this model is in
         memory.
@@ -247,7 +250,10 @@ def sky_above(data, grid, resolution, horizon, geometry, check=True):
         return _layers(find(block), directions, own, geometry)
 
     reads = [chunking.margin_reads(samples[1:], 0), known]
-    layers = chunking.windows(kernel, reads, (4, *samples.shape[1:]), chunks)
+    shape = (4, *samples.shape[1:])
+    # In memory by parts, because the horizons of all directions take several times the memory of the result.
+    parts = chunks is None
+    layers = chunking.in_blocks(kernel, reads, shape, _PART) if parts else chunking.windows(kernel, reads, shape, chunks)
     if check and not isinstance(layers, da.Array):
         _check_sun(samples[1:], layers[3], geometry)
     return layers, places

@@ -202,7 +202,8 @@ def _chebyshev(values):
 
 def check_heights(name, values):
     """Raise ValueError for heights that do not occur on land, and warn of voids of 0."""
-    low, high = LAND_ELEVATIONS
+    # Whole numbers have no infinity, and unsigned ones no difference.
+    values, (low, high) = np.asarray(values, float), LAND_ELEVATIONS
     wrong = values[(values < low) | (values > high)]
     if wrong.size:
         raise ValueError(
@@ -218,9 +219,6 @@ def check_heights(name, values):
 
 
 REFERENCE = "Dozier and Frew (1990), doi:10.1109/36.58986"
-
-# Distance at which elevations are independent, for models without this attribute. [m]
-_SOURCE_RESOLUTION = 30.0
 
 # [m]
 _FOOT = 0.3048
@@ -272,8 +270,9 @@ def look_at_altitude(cells, altitude, warned=()):
 
 
 def source_resolution(dem, given=None):
-    """Resolution of the source of an elevation model: as given, from the attribute, or 30. [m]"""
-    found = float(dem.attrs.get("source_resolution", _SOURCE_RESOLUTION) if given is None else given)
+    """Resolution of the source of an elevation model: as given, from the attribute, or the smaller side of a cell. [m]"""
+    known = dem.attrs.get("source_resolution") if given is None else given
+    found = min(grids.cell_size(grids.geobox(dem))) if known is None else float(known)
     if not 0 < found < np.inf:
         raise ValueError(f"the resolution of an elevation's source must be positive metres, got {found:g}")
     return found

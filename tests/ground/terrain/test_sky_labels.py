@@ -5,6 +5,7 @@ import pytest
 from elevations import labelled
 from lazy import check_raster_function, no_compute
 from oracles_terrain import hills, plane
+from scipy import ndimage
 
 import fifesim
 from fifesim.base.geometry import Geometry
@@ -24,11 +25,32 @@ def test_coarse_horizons_agree_with_horizons_at_every_cell():
     """Terrain with waves of 200 m and more, which 30 m cells resolve; tolerances from the docstring."""
     grid = fifesim.grid_at("EPSG:26914", 700000, 4330000, 900, 900, 10 / 3)
     z = hills((270, 270), seed=2, relief=26.0, length=60.0)
-    coarse, fine = labelled(grid, z), labelled(grid, z, source_resolution=10 / 3)
+    coarse, fine = labelled(grid, z, source_resolution=30.0), labelled(grid, z)
     difference = fifesim.sky_view(coarse) - fifesim.sky_view(fine)
     assert float(fifesim.sky_view(fine).std()) > 0.003
     assert float(abs(difference).max()) < 0.004
     assert float(difference.std()) < 5e-4
+
+
+@pytest.mark.parametrize(("size", "cell"), [(41, 10.0), (64, 1.0), (110, 90.0)])
+@pytest.mark.parametrize("azimuth", [0.0, 45.0, 117.3])
+def test_rotating_scene_and_sun_by_90_degrees_rotates_the_result(size, cell, azimuth):
+    """The lattice of cells is symmetric, so only rounding may differ; a model without a source has places at its cells."""
+    grid = fifesim.grid_at("EPSG:26914", 700000, 4330000, size * cell, size * cell, cell)
+    z = 500 + cell * ndimage.gaussian_filter(np.random.default_rng(5).normal(size=(size, size)), 3) * 12
+    found = []
+    for turns, chunks in ((0, None), (1, None), (1, {"y": 19, "x": 33})):
+        dem = labelled(grid, np.rot90(z, -turns).copy())
+        lai = 2 + dem.copy(data=np.cos(dem.values))
+        if chunks:
+            dem, lai = dem.chunk(chunks), lai.chunk(chunks)
+        angles = Geometry(50.0, azimuth + 90 * turns, 20.0, 40.0 + 90 * turns)
+        lai.attrs = {"units": "1", "site": "FIFE"}
+        rho = fifesim.surface_reflectance(lai.rename("lai"), "TM", bands=["TM3", "TM4"], dem=dem, geometry=angles)
+        found.append(np.rot90([*rho.values, fifesim.sky_view(dem).values], turns, axes=(1, 2)))
+    assert found[0][2].std() > 0.003
+    np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(found[2], found[1])
 
 
 def test_sun_below_the_horizon_of_all_slopes_is_refused(site):
@@ -76,6 +98,7 @@ def test_horizon_that_does_not_cover_the_scene_is_refused(lai, dem, around):
 def test_horizon_may_end_less_than_one_cell_before_the_elevation(cut):
     """A horizon on nine of ten cells of 30 m is too small, but sufficient for the elevation without its last cell."""
     dem = labelled(fifesim.fife_site(30 / 9, window=((0, 90), (0, 90))), np.full((90, 90), 7.0))
+    dem.attrs["source_resolution"] = 30.0
     horizon = fifesim.horizon(dem).isel(cut)
     with pytest.raises(ValueError, match="does not cover the dem's"):
         fifesim.sky_view(dem, horizon)
@@ -84,7 +107,7 @@ def test_horizon_may_end_less_than_one_cell_before_the_elevation(cut):
 
 def test_horizons_of_small_and_coarse_rasters():
     """A raster smaller than one cell of the source, and cells larger than the reach."""
-    tiny = labelled(fifesim.grid_at("EPSG:26914", 700000, 4330000, 12, 9, 3), np.full((3, 4), 7.0))
+    tiny = labelled(fifesim.grid_at("EPSG:26914", 700000, 4330000, 12, 9, 3), np.full((3, 4), 7.0), source_resolution=30.0)
     np.testing.assert_allclose(fifesim.sky_view(tiny), 1, rtol=1e-12)
     wide = labelled(fifesim.grid_at("EPSG:26914", 700000, 4330000, 80000, 60000, 10000), np.full((6, 8), 7.0))
     np.testing.assert_allclose(fifesim.sky_view(wide), 1, rtol=1e-12)

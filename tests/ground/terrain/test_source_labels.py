@@ -309,8 +309,11 @@ def test_elevation_may_be_of_integers_but_not_in_km_without_crs_or_south_up(dem)
             fifesim.slope(raster)
 
 
-def test_source_resolution_is_the_argument_or_the_attribute_or_30_m(dem):
-    assert source_resolution(dem) == 30.0
+def test_source_resolution_is_the_argument_or_the_attribute_or_the_cell_size(dem):
+    assert source_resolution(dem) == pytest.approx(10 / 3)
+    oblong = grids.place(dem[:4, :4], fifesim.grid_at(CRS, 7e5, 4.33e6, 120, 80, (20, 30)))
+    assert source_resolution(oblong) == 20
+    assert source_resolution(hills(10)) == 30, "synthetic hills state it"
     assert source_resolution(dem.assign_attrs(source_resolution=10.0)) == 10.0
     assert source_resolution(dem.assign_attrs(source_resolution=10.0), 12.5) == 12.5
     for wrong in (0.0, -3.0, np.nan, np.inf):
