@@ -101,8 +101,8 @@ def along_axis(array, name, edge, cell):
         found = f"{np.nanmin(steps):.6g} to {np.nanmax(steps):.6g}"
         raise ValueError(
             f"the raster's {name} is not evenly spaced, its steps are {found}: "
-            f"drop repeated ones with .drop_duplicates({name!r}), sort it with .sortby({name!r}), put tiles together on one grid with .reindex, or interpolate it onto a "
-            "regular grid with .interp"
+            f"drop repeated ones with .drop_duplicates({name!r}), sort it with .sortby({name!r}), put tiles together "
+            "on one grid with .reindex, or interpolate it onto a regular grid with .interp"
         )
     return float(centres[0] - cell / 2), float(cell)
 

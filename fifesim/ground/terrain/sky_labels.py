@@ -253,7 +253,9 @@ def sky_above(data, grid, resolution, horizon, geometry, check=True):
     shape = (4, *samples.shape[1:])
     # In memory by parts, because the horizons of all directions take several times the memory of the result.
     parts = chunks is None
-    layers = chunking.in_blocks(kernel, reads, shape, _PART) if parts else chunking.windows(kernel, reads, shape, chunks)
+    layers = (
+        chunking.in_blocks(kernel, reads, shape, _PART) if parts else chunking.windows(kernel, reads, shape, chunks)
+    )
     if check and not isinstance(layers, da.Array):
         _check_sun(samples[1:], layers[3], geometry)
     return layers, places

@@ -32,14 +32,14 @@ def metres_per_unit(name):
 
 def terrace_step(values):
     """Vertical resolution of terraced whole-number elevations, None for elevations without terraces."""
-    # The greatest common divisor of the differences, where more than a quarter of the neighbours are equal and some are
-    # not.
-    differences = np.concatenate([np.diff(values, axis=axis).ravel() for axis in (0, 1)])
-    differences = differences[np.isfinite(differences)]
-    known = values[np.isfinite(values)]
+    # The greatest common divisor of the differences, where along both axes more than a quarter of the neighbours are
+    # equal, and some are not. A plane along one axis has equal neighbours along the other.
+    both = [np.diff(values, axis=axis) for axis in (0, 1)]
+    both = [each[np.isfinite(each)] for each in both]
+    differences, known = np.concatenate(both), values[np.isfinite(values)]
     if not known.size or not differences.any() or np.any(known != np.rint(known)):
         return None
-    equal = np.mean(differences == 0)
+    equal = min(np.mean(each == 0) if each.size else 1.0 for each in both)
     return int(np.gcd.reduce(np.abs(differences).astype(np.int64))) if equal > TERRACES else None
 
 

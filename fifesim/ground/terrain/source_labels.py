@@ -12,6 +12,7 @@ import rasterio.windows
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 from affine import Affine
+from scipy import ndimage
 
 from fifesim.base.files import in_a_line
 from fifesim.base.lattice import KeptTiles, assemble, centres
@@ -220,12 +221,26 @@ def check_heights(name, values):
 
 REFERENCE = "Dozier and Frew (1990), doi:10.1109/36.58986"
 
-# [m]
-_FOOT = 0.3048
 # Elevations that all differ by more from the altitude of the atmosphere are in another place or unit. [m]
 _APART = 500.0
-# Elevations farther above it than this may be in feet: 150 m are 492 feet. [m]
+# Nearer ones may still be in another unit: 150 m are 492 feet. [m]
 _NOT_FEET = 150.0
+# Relief of a scene in kilometres is less, and only the flattest coasts have so little in metres.
+_RELIEF_IN_KM = 1.0
+
+_UNITS_IN_WORDS = {"ft": "feet", "dm": "decimetres", "km": "kilometres"}
+
+
+def likely_unit(low, high, at):
+    """Unit in which elevations that are far from an altitude [m] agree with it, or None."""
+    if low - _NOT_FEET <= at <= high + _NOT_FEET:
+        return None
+    for unit in _UNITS_IN_WORDS:
+        metres = metres_per_unit(unit)
+        agree = metres * low - _APART / 5 < at < metres * high + _APART / 5
+        if agree and (unit != "km" or high - low < _RELIEF_IN_KM):
+            return unit
+    return None
 
 
 def elevation_grid(dem):
@@ -255,22 +270,26 @@ def beside_altitude(dem, altitude):
 
 def look_at_altitude(cells, altitude, warned=()):
     """Warn once if elevations disagree with the altitude of the atmosphere, and return them."""
-    low, high, at = np.fmin.reduce(cells, axis=None), np.fmax.reduce(cells, axis=None), 1000 * altitude
-    in_feet = low > at + _NOT_FEET and _FOOT * low - _APART / 5 < at < _FOOT * high + _APART / 5
-    if not warned and (in_feet or low > at + _APART or high < at - _APART):
+    low, high = (float(end.reduce(cells, axis=None)) for end in (np.fmin, np.fmax))
+    at = 1000 * altitude
+    unit = likely_unit(low, high, at)
+    if not warned and (unit or low > at + _APART or high < at - _APART):
         warned += [True] if isinstance(warned, list) else ()
-        feet = ""
-        if in_feet:
-            feet = "where they are feet, take dem * 0.3048 (vertical_units = 'ft' of a file); where metres, "
+        other = ""
+        if unit:
+            words, metres = _UNITS_IN_WORDS[unit], metres_per_unit(unit)
+            other = (
+                f"where they are {words}, take dem * {metres:g} (vertical_units = '{unit}' of a file); where metres, "
+            )
         warn(
-            f"the dem has elevations of {low:.0f} to {high:.0f} m beside an altitude of the atmosphere of {altitude:g} "
-            f"km: {feet}give fifesim.Atmosphere(altitude={np.clip((low + high) / 2000, 0, None):.1f})"
+            f"the dem has elevations of {low:.4g} to {high:.4g} m beside an altitude of the atmosphere of {altitude:g} "
+            f"km: {other}give fifesim.Atmosphere(altitude={np.clip((low + high) / 2000, 0, None):.1f})"
         )
     return cells
 
 
 def source_resolution(dem, given=None):
-    """Resolution of the source of an elevation model: as given, from the attribute, or the smaller side of a cell. [m]"""
+    """Resolution of the source of an elevation model: given, from the attribute, or the smaller side of a cell. [m]"""
     known = dem.attrs.get("source_resolution") if given is None else given
     found = min(grids.cell_size(grids.geobox(dem))) if known is None else float(known)
     if not 0 < found < np.inf:
@@ -293,6 +312,7 @@ class Model:
     blocks: tuple[int, int]  # source cells down and across that are averaged
     fill: tuple[float, float]  # distance from known elevation [source cell]
     resolution: float  # [m]
+    linear: bool = False  # interpolate linearly, which does not overshoot
 
     @property
     def source(self):
@@ -364,8 +384,11 @@ class Model:
         columns = columns.clip(left + 3 * across, left + width - 4 * across)
         if down > 1 or across > 1:
             values = spline.block_means(spline.extend(values, 2 * max(self.blocks), rest=False), down, across)
-        coefficients = spline.spline_coefficients(spline.extend(values, spline.SPLINE_MARGIN))
+        values = spline.extend(values, spline.SPLINE_MARGIN)
         in_blocks = (rows - top + 0.5) / down - 0.5, (columns - left + 0.5) / across - 0.5
+        if self.linear:
+            return np.where(found, ndimage.map_coordinates(values, np.broadcast_arrays(*in_blocks), order=1), np.nan)
+        coefficients = spline.spline_coefficients(values)
         if self.place.parallel:
             out = spline.spline_grid(coefficients, *(axis.ravel() for axis in in_blocks))
         else:

@@ -35,7 +35,7 @@ def test_coarse_horizons_agree_with_horizons_at_every_cell():
 @pytest.mark.parametrize(("size", "cell"), [(41, 10.0), (64, 1.0), (110, 90.0)])
 @pytest.mark.parametrize("azimuth", [0.0, 45.0, 117.3])
 def test_rotating_scene_and_sun_by_90_degrees_rotates_the_result(size, cell, azimuth):
-    """The lattice of cells is symmetric, so only rounding may differ; a model without a source has places at its cells."""
+    """Only rounding may differ: a model of unknown source has places at all its cells."""
     grid = fifesim.grid_at("EPSG:26914", 700000, 4330000, size * cell, size * cell, cell)
     z = 500 + cell * ndimage.gaussian_filter(np.random.default_rng(5).normal(size=(size, size)), 3) * 12
     found = []
@@ -107,7 +107,9 @@ def test_horizon_may_end_less_than_one_cell_before_the_elevation(cut):
 
 def test_horizons_of_small_and_coarse_rasters():
     """A raster smaller than one cell of the source, and cells larger than the reach."""
-    tiny = labelled(fifesim.grid_at("EPSG:26914", 700000, 4330000, 12, 9, 3), np.full((3, 4), 7.0), source_resolution=30.0)
+    tiny = labelled(
+        fifesim.grid_at("EPSG:26914", 700000, 4330000, 12, 9, 3), np.full((3, 4), 7.0), source_resolution=30.0
+    )
     np.testing.assert_allclose(fifesim.sky_view(tiny), 1, rtol=1e-12)
     wide = labelled(fifesim.grid_at("EPSG:26914", 700000, 4330000, 80000, 60000, 10000), np.full((6, 8), 7.0))
     np.testing.assert_allclose(fifesim.sky_view(wide), 1, rtol=1e-12)

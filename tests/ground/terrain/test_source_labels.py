@@ -178,12 +178,30 @@ def test_band_limited_surface_is_recovered(path):
 
 @pytest.mark.parametrize("cell", [30 / 9, 7.0, 45.0])
 @pytest.mark.parametrize("margin", [0.0, 600.0])
-def test_plane_is_exact(tmp_path, cell, margin):
+@pytest.mark.parametrize("method", ["lowpass", "linear"])
+def test_plane_is_exact(tmp_path, cell, margin, method):
     """Also at the outer edge of the outermost cells of the source, and for sources finer than the grid."""
     where = write(tmp_path / "plane.tif", *model(tilted, margin=margin))
-    dem = fifesim.fine_dem(where, grid(cell))
+    dem = fifesim.fine_dem(where, grid(cell), method=method)
     np.testing.assert_allclose(dem, truth(dem, tilted), rtol=0, atol=1e-8)
     np.testing.assert_allclose(slopes(dem.values, cell), np.hypot(0.1, 0.05), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("crs", [CRS, "EPSG:32614"])
+def test_linear_interpolation_has_no_overshoot_and_lowpass_at_most_13_percent(tmp_path, crs):
+    """A corner of 0, 5 and 10 m, also where rows are not parallel to the grid, in windows and in chunks."""
+    values, affine = model()
+    values = np.add.outer(*(5.0 * (np.arange(size) > size // 2) for size in values.shape))
+    where = write(tmp_path / "step.tif", values, affine, crs)
+    lowpass, linear = (
+        fifesim.fine_dem(where, grid(), method=method, vertical_units="m") for method in ("lowpass", "linear")
+    )
+    assert -1.3 < float(lowpass.min()) < -1.1 and 11.1 < float(lowpass.max()) < 11.3
+    assert float(linear.min()) >= -1e-14 and float(linear.max()) <= 10 + 1e-14
+    assert float(abs(linear - lowpass).mean()) < 0.1
+    assert "linear" in linear.attrs["history"] and "quintic" in lowpass.attrs["history"]
+    lazy = fifesim.fine_dem(where, grid(), method="linear", vertical_units="m", chunks={"y": 31, "x": 77})
+    xr.testing.assert_identical(lazy.compute(), linear)
 
 
 def test_source_in_degrees(tmp_path):
@@ -278,13 +296,35 @@ def test_undeclared_fill_values_next_to_the_grid_are_refused(tmp_path, fill, for
 def test_large_slopes_cause_a_warning_of_feet(cell):
     dem = hills(cell)
     grid = fifesim.fife_site(10, window=((20, 80), (20, 80)))
-    steep = 300 + 12 * (dem - 300)
+    steep = 380 + 12 * (dem - 380)
     said = "mean slope of dem is .* degrees at 30 m.*feet or decimetres.*vertical_units='m'"
     with pytest.warns(UserWarning, match=said):
         fifesim.fine_dem(steep.rename("dem"), grid)
     with warnings.catch_warnings(action="error", category=UserWarning):
         fifesim.fine_dem(dem, grid)
         fifesim.fine_dem(steep, grid, vertical_units="m")
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "east", "message"),
+    [
+        ("ft", 1 / 0.3048, 0, "elevations of .* m, but the FIFE site lies at 400 m: give vertical_units='ft'"),
+        ("dm", 10, 0, "but the FIFE site lies at 400 m: give vertical_units='dm'"),
+        ("km", 1e-3, 0, "but the FIFE site lies at 400 m: give vertical_units='km'"),
+        ("km", 1e-3, 90e3, r"mean slope of dem is 0.0\d* degrees .* if they are kilometres, give vertical_units='km'"),
+    ],
+)
+def test_elevations_in_another_unit_cause_a_warning_that_names_it(unit, factor, east, message):
+    """On the FIFE site by the elevation, elsewhere by the slope; hills of three times the relief are no mistake."""
+    dem, there = hills(), fifesim.grid_at(CRS, WEST + east + 600, NORTH - 600, 300, 300, 10)
+    own = fifesim.grid_at(CRS, WEST + east, NORTH, 3000, 3000, 30)
+    dem = grids.place(dem.drop_vars(["x", "y", "spatial_ref"]), own).rename("dem")
+    with pytest.warns(UserWarning, match=message):
+        fifesim.fine_dem(factor * dem, there)
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        fifesim.fine_dem(factor * dem, there, vertical_units=unit)
+        fifesim.fine_dem(dem, there)
+        fifesim.fine_dem(dem.mean() + 3 * (dem - dem.mean()), there)
 
 
 def test_voids_of_0_m_cause_a_warning():
@@ -297,8 +337,17 @@ def test_voids_of_0_m_cause_a_warning():
 
 
 def test_elevation_may_be_of_integers_but_not_in_km_without_crs_or_south_up(dem):
-    whole = dem.round().astype("int16").assign_attrs(dem.attrs)
-    np.testing.assert_array_equal(fifesim.slope(whole), fifesim.slope(whole.astype(float).assign_attrs(dem.attrs)))
+    whole = dem.round().assign_attrs(dem.attrs)
+    whole[3:5, 7] = 0.0  # next to the sea
+    steps = fifesim.slope, fifesim.aspect, fifesim.sky_view, fifesim.horizon, fifesim.wetness, fifesim.terrain_view
+    with warnings.catch_warnings(action="ignore", category=UserWarning):
+        for step in steps:
+            expected = step(whole)
+            for dtype, chunks in product(("int16", "uint16", "uint8", "int32", "float32"), (None, {"y": 17, "x": 20})):
+                exact = whole if dtype != "uint8" else (whole - 300).clip(0, 255).assign_attrs(dem.attrs)
+                narrow = exact.astype(dtype).assign_attrs(dem.attrs)
+                narrow = narrow if chunks is None else narrow.chunk(chunks)
+                np.testing.assert_array_equal(step(narrow), expected if dtype != "uint8" else step(exact), str(dtype))
     wrong = {
         "units 'km', dem needs 'm'": dem.assign_attrs(units="km"),
         "no CRS": dem.drop_vars("spatial_ref"),
@@ -326,6 +375,9 @@ def test_source_resolution_is_the_argument_or_the_attribute_or_the_cell_size(dem
     [
         (1239, 1393, 0.4, r"1239 to 1393 m beside .* of 0.4 km: .* feet, take dem .*Atmosphere.altitude=1.3"),
         (656, 700, 0.2, "feet"),
+        (0.31, 0.45, 0.4, r"0.31.* to 0.45 m .* kilometres, take dem \* 1000 "),
+        (3100, 4500, 0.4, r"decimetres, take dem \* 0.1 "),
+        (0.0, 5.0, 0.4, None),
         (2500, 3100, 1.5, "1.5 km: give fifesim.Atmosphere.altitude=2.8"),
         (0, 100, 2.0, "2 km: give fifesim.Atmosphere.altitude=0.1"),
         (320, 440, 0.4, None),
@@ -397,8 +449,14 @@ def test_terraces_cause_a_warning(tmp_path, path):
     def gentle(x, y):
         return np.rint(tilted(x, y) / 10)
 
-    with pytest.warns(UserWarning, match="vertical resolution of 1 m"):
+    with pytest.warns(UserWarning, match="vertical resolution of 1 m") as caught:
         fifesim.fine_dem(write(tmp_path / "steps.tif", *model(gentle)), grid())
+    assert sum("terraces" in str(each.message) for each in caught) == 1
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         fifesim.fine_dem(path, grid())
+        # A plane that rises by 2 m from cell to cell, along one axis.
+        for axis in (0, 1):
+            values, affine = model(tilted)
+            plane = 300.0 + 2 * np.indices(values.shape)[axis]
+            fifesim.fine_dem(write(tmp_path / "plane.tif", plane, affine), grid())
