@@ -12,9 +12,18 @@ import pvlib
 
 from fifesim.base.arguments import Numbers, described
 from fifesim.base.caches import cached
+from fifesim.base.messages import warn
 
-# Wavelengths of sunlight in micrometres are shorter than this, in nanometres longer. [um]
-LONGEST = 100.0
+# Wavelengths of sunlight in micrometres are between these, in nanometres or metres outside. [um]
+SHORTEST, LONGEST = 0.1, 100.0
+
+PER_MICROMETRE = dict.fromkeys(
+    ("um", "µm", "μm", "micrometer", "micrometers", "micrometre", "micrometres", "micron", "microns"), 1.0
+) | dict.fromkeys(("nm", "nanometer", "nanometers", "nanometre", "nanometres"), 1000.0)
+"""Spellings of units of wavelengths, in lower case, and how many of them are a micrometre."""
+
+# Noise of measured spectra and responses, relative to their peak: larger negative values are errors. [1]
+NOISE = 0.01
 
 
 class Window(NamedTuple):
@@ -66,6 +75,29 @@ COMMON_NAMES = {
 }
 
 
+def check_micrometres(what, wavelengths):
+    """Raise ValueError if increasing wavelengths are in another unit."""
+    if not SHORTEST <= wavelengths[-1] <= LONGEST:
+        nm = wavelengths[-1] > LONGEST
+        cure = "divide nanometres by 1000, or state the unit nm" if nm else "convert them to micrometres"
+        raise ValueError(f"{what} are in um, got {wavelengths[-1]:g}: {cure}")
+
+
+def without_noise(what, values, wavelength, highest=np.inf):
+    """Values with noise outside of 0 to `highest` removed, with a warning; values beyond `NOISE` of the peak stay."""
+    values = np.asarray(values, float)
+    clipped = np.clip(values, 0, highest)
+    outside = np.abs(values - clipped)
+    if not 0 < outside.max() <= NOISE * values.max():
+        return values
+    at = outside.argmax()
+    warn(
+        f"{what} is {values[at]:g} at {wavelength[at]:g} um, {outside[at] / values.max():.2g} of its peak outside of "
+        f"its range: up to {NOISE:g} is taken as noise and set to {clipped[at]:g}"
+    )
+    return clipped
+
+
 def nearest_band(wavelengths, window):
     """Index of the band inside a window that is nearest to its best wavelength, None if there is none."""
     wavelengths = np.asarray(wavelengths, float)
@@ -115,7 +147,8 @@ class Band:
     Raises
     ------
     ValueError
-        If the wavelengths do not increase or are longer than 100 um, or the response is negative or zero throughout.
+        If the wavelengths do not increase or are not in um, or the response is zero throughout, missing or
+        negative by more than noise of 1 % of its peak.
 
     Examples
     --------
@@ -133,17 +166,18 @@ class Band:
         if not isinstance(self.name, str):
             raise TypeError(f"name of a Band must be text, got {described(self.name)}")
         wavelength, response = (_numbers(self, name) for name in ("wavelength", "response"))
-        if len(wavelength) < 2 or len(wavelength) != len(response) or np.any(np.diff(wavelength) <= 0):
+        if len(wavelength) < 2 or len(wavelength) != len(response) or not np.all(np.diff(wavelength) > 0):
             raise ValueError(f"band {self.name}: wavelengths must increase, one for each response")
-        if wavelength[-1] > LONGEST:
+        check_micrometres(f"band {self.name}: wavelengths", wavelength)
+        response = without_noise(f"band {self.name}: the response", response, wavelength)
+        if not np.all(response >= 0) or response.max() == 0:
             raise ValueError(
-                f"band {self.name}: wavelengths must be at most {LONGEST:g} um, got {wavelength[-1]:g}: "
-                "divide nanometres by 1000"
+                f"band {self.name}: the response must not be negative, nor missing, nor zero everywhere, got "
+                f"{response.min():g} to {response.max():g}: noise up to {NOISE:.0%} of the peak is set to 0; for more, "
+                "type numpy.clip(response, 0, None), and leave missing points out"
             )
-        if min(response) < 0 or max(response) == 0:
-            raise ValueError(f"band {self.name}: the response must not be negative, nor zero everywhere")
         object.__setattr__(self, "wavelength", wavelength)
-        object.__setattr__(self, "response", response)
+        object.__setattr__(self, "response", tuple(response.tolist()))
 
     @cached_property
     def center(self) -> float:

@@ -10,7 +10,7 @@ import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 
 from fifesim.base.arguments import RASTER, FilePath, Kind
-from fifesim.base.bands import LONGEST
+from fifesim.base.bands import LONGEST, PER_MICROMETRE
 from fifesim.base.messages import warn
 from fifesim.grids import cf, chunks
 from fifesim.grids import grid as grids
@@ -189,11 +189,6 @@ LOWEST, HIGHEST = -0.5, 5.0
 
 # Distance of the rows in which the scale of a raster from fifesim is checked. [row]
 SAMPLED_ROWS = 16
-
-PER_MICROMETRE = dict.fromkeys(
-    ("um", "µm", "μm", "micrometer", "micrometers", "micrometre", "micrometres", "micron", "microns"), 1.0
-) | dict.fromkeys(("nm", "nanometer", "nanometers", "nanometre", "nanometres"), 1000.0)
-"""Spellings of units of wavelengths, in lower case, and how many of them are a micrometre."""
 
 
 def incoming(raster, name):

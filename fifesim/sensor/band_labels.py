@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.arguments import Names
-from fifesim.base.bands import LONGEST
+from fifesim.base.bands import LONGEST, PER_MICROMETRE
 from fifesim.grids import cf
-from fifesim.grids.inputs import PER_MICROMETRE, AnyDimensions, check_reflectance, storage_of
+from fifesim.grids.inputs import AnyDimensions, check_reflectance, storage_of
 from fifesim.grids.reductions import combined
 from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument

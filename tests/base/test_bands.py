@@ -121,3 +121,20 @@ def test_counts_are_kept_and_no_data_becomes_0():
     check_counts(np.array([np.nan, 0.0, 255.0]), 255, "")
     assert counts(np.array([300]), 0, 65535, "").dtype == np.uint16
     assert counts(np.array([30]), 0, 255, "").dtype == np.uint8
+
+
+def test_noise_below_zero_is_set_to_zero_with_its_size():
+    """Published responses scatter around zero outside of the band, such as those of ETM+."""
+    wavelength = (1.5, 1.6, 1.7, 1.8)
+    with pytest.warns(UserWarning, match=r"band B5: the response is -0\.0001 at 1\.8 um, 0\.0002 of its peak"):
+        noisy = Band("B5", wavelength, (0.0, 0.5, 0.5, -0.0001))
+    assert noisy == Band("B5", wavelength, (0.0, 0.5, 0.5, 0.0))
+    for response in ((0.0, 0.5, 0.5, -0.006), (0.0, 0.5, np.nan, 0.0), (0.0, -0.0, 0.0, 0.0)):
+        with pytest.raises(ValueError, match=r"band B5: the response must not .* numpy\.clip\(response, 0, None\)"):
+            Band("B5", wavelength, response)
+
+
+@pytest.mark.parametrize("wavelength", [(620.0, 650.0, 690.0), (6.2e-7, 6.5e-7, 6.9e-7), (0.62, np.nan, 0.69)])
+def test_wavelengths_of_a_band_are_in_micrometres(wavelength):
+    with pytest.raises(ValueError, match=r"band red: wavelengths (are in um, got|must increase)"):
+        Band("red", wavelength, (0.0, 1.0, 0.0))

@@ -13,16 +13,15 @@ from fifesim.base.bands import Band
 from fifesim.base.caches import cached
 from fifesim.ground.canopy.interpolation import refined
 from fifesim.ground.canopy.leaf_area import check_fraction, check_share
+from fifesim.ground.canopy.measured_spectra import LeafSpectrum, Spectrum, read_spectrum
 from fifesim.ground.canopy.prospect import CONTENTS, LARGEST_STRUCTURE, Leaf, leaf_band_means, leaf_spectrum
 from fifesim.ground.canopy.spectra import (
     Background,
-    LeafSpectrum,
-    Spectrum,
     background_means,
     band_means,
     did_you_mean,
+    is_file,
     is_mixture,
-    read_spectrum,
 )
 
 # Dead tallgrass: the default leaf without green pigments and with little water; see ``data/README.md``.
@@ -56,10 +55,11 @@ def band_leaf_optics(bands, given=None):
     if given is None or (isinstance(given, Leaf) and not given.varying()):
         return tuple(each.copy() for each in optics_of_leaf(tuple(bands), given))
     if is_path(given):
-        given = read_spectrum(_csv(given), LeafSpectrum)
+        given = read_spectrum(_path(given), LeafSpectrum)
     elif isinstance(given, Leaf):
         given = _leaf_means(_responses(bands, "Leaf"), given)
     if isinstance(given, LeafSpectrum):
+        given.check_gaps(bands)
         given = band_means(_responses(bands, "LeafSpectrum"), given.wavelength, given.values())
     if isinstance(given, Mapping):
         given = np.reshape([of_band(given, band, "leaf optics") for band in _names(bands)], (-1, 2)).T
@@ -85,11 +85,11 @@ def band_background(bands, given=None):
     return reflectance
 
 
-def _csv(path):
-    if not str(path).lower().endswith(".csv"):
+def _path(path):
+    if not is_file(path):
         raise ValueError(
-            f"leaf_optics={str(path)!r} is not the path of a .csv file: give one with the columns wavelength [um], "
-            "reflectance and transmittance [1], or a fifesim.Leaf"
+            f"leaf_optics={str(path)!r} is not the path of a .csv or .txt file: give one with the columns wavelength "
+            "[um], reflectance and transmittance [1], or a fifesim.Leaf"
         )
     return path
 

@@ -12,10 +12,11 @@ from fifesim.grids.chunks import by_band, layers_of
 from fifesim.grids.grid import with_crs_of
 from fifesim.grids.inputs import micrometres
 from fifesim.ground.canopy import optics
+from fifesim.ground.canopy.measured_spectra import PER_FRACTION, LeafSpectrum, Spectrum
 from fifesim.ground.canopy.optics import leaf_means
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.soil import brightened, moistened, soil_line, water_films
-from fifesim.ground.canopy.spectra import LeafSpectrum, Spectrum, check_shares, is_mixture
+from fifesim.ground.canopy.spectra import check_shares, is_mixture
 
 
 def background(bands, given, lai):
@@ -43,9 +44,17 @@ def spectrum_of(dataset, what, kind=Spectrum):
             f"{' and '.join(kind.names())} [1], rename them with .rename"
         )
     try:
-        return kind(micrometres(dataset["wavelength"]), *(dataset[name].values for name in kind.names()))
+        return kind(micrometres(dataset["wavelength"]), *(_fractions(dataset[name]) for name in kind.names()))
     except ValueError as error:
         raise ValueError(f"{what}: {error}") from None
+
+
+def _fractions(array):
+    """Reflectance or transmittance as fractions, from the unit in their attribute. [1]"""
+    unit = str(array.attrs.get("units", "1")).strip()
+    if unit.lower() not in PER_FRACTION:
+        raise ValueError(f"{array.name} has units {unit!r}: they are to be 1 or percent")
+    return np.asarray(array.values, float) / PER_FRACTION[unit.lower()]
 
 
 def as_it_lies(bands, below, lai, soil=None, moisture=None):

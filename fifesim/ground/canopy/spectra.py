@@ -1,9 +1,10 @@
-"""Spectra of leaves and backgrounds: CSV files, mixtures, means over bands, and a library of land spectra."""
+"""Spectra of leaves and backgrounds: mixtures, means over bands, and a library of land spectra."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,84 +13,15 @@ from fifesim.base import files
 from fifesim.base.arguments import NumberOrArray, described
 from fifesim.base.bands import solar_spectrum
 from fifesim.base.caches import cached
-from fifesim.base.files import read_csv
 from fifesim.base.lattice import generator
 from fifesim.base.messages import closest
 from fifesim.ground.canopy.layers import mixed
+from fifesim.ground.canopy.measured_spectra import Spectrum, read_spectrum
 from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
 from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
 
-
-@dataclass(frozen=True)
-class Spectrum:
-    """Reflectance spectrum: increasing wavelengths [um], and reflectance [1], each a sequence of shape (n,)."""
-
-    wavelength: tuple = field(repr=False)
-    reflectance: tuple = field(repr=False)
-
-    def __post_init__(self):
-        wavelength, shapes = np.asarray(self.wavelength, float), {np.shape(each) for each in self.values()}
-        if wavelength.ndim != 1 or wavelength.size < 2 or shapes != {wavelength.shape}:
-            raise ValueError("a spectrum needs two wavelengths or more, and one value for each")
-        if not np.all(np.diff(wavelength) > 0):
-            raise ValueError("the wavelengths of a spectrum must increase, and none be missing: sort them")
-        if wavelength[-1] > 100:
-            raise ValueError(f"wavelengths are in um, got {wavelength[-1]:g}: divide nanometres by 1000")
-        if wavelength[-1] < 0.1:
-            raise ValueError(f"wavelengths are in um, the largest is {wavelength[-1]:g}: convert them to micrometres")
-        object.__setattr__(self, "wavelength", tuple(wavelength.tolist()))
-        for name, values in zip(self.names(), self.values(), strict=True):
-            values = np.asarray(values, float)
-            wrong = ~((values >= 0) & (values <= 1))
-            if wrong.any():
-                raise ValueError(
-                    f"the {name} of a spectrum must be in [0, 1], got {values[wrong][0]:g} at "
-                    f"{wavelength[wrong][0]:g} um: give a fraction, not percent"
-                )
-            object.__setattr__(self, name, tuple(values.tolist()))
-
-    @classmethod
-    def names(cls):
-        """Names of the quantities by wavelength."""
-        return tuple(each.name for each in fields(cls) if each.name != "wavelength")
-
-    def values(self):
-        """Values of the quantities by wavelength, each of shape (n,). [1]"""
-        return tuple(getattr(self, name) for name in self.names())
-
-
-@dataclass(frozen=True)
-class LeafSpectrum(Spectrum):
-    """Spectra of reflectance and transmittance of a leaf [1]; together at most 1."""
-
-    transmittance: tuple = field(repr=False)
-
-    def __post_init__(self):
-        super().__post_init__()
-        total = np.add(self.reflectance, self.transmittance)
-        if np.max(total) > 1 + 1e-12:
-            raise ValueError(
-                f"leaf reflectance and transmittance add up to {np.max(total):g} at "
-                f"{self.wavelength[np.argmax(total)]:g} um: the sum must not exceed 1, the rest is absorbed"
-            )
-
-
-def read_spectrum(path, kind=Spectrum):
-    """Read a spectrum from a CSV file with columns wavelength [um], reflectance and, for a leaf, transmittance."""
-    table = read_csv(path, "the spectrum")
-    columns = [str(column).strip().lower() for column in table.columns]
-    wanted = ("wavelength", *kind.names())
-    missing = [name for name in wanted if columns.count(name) != 1]
-    if missing:
-        raise ValueError(
-            f"{path} has no column {' nor '.join(missing)}, or several: its first line must name wavelength [um] and "
-            f"{' and '.join(kind.names())} [1], it has {', '.join(map(str, table.columns))}"
-        )
-    try:
-        return kind(*(table.iloc[:, columns.index(name)] for name in wanted))
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
-
+# Paths of spectra have these, or exist.
+_SUFFIXES = (".csv", ".txt", ".tsv", ".asc", ".tab", ".dat")
 
 SHADE = "shade"  # part of a mixture that reflects nothing
 
@@ -105,8 +37,9 @@ class Background:
     Parameters
     ----------
     fractions : mapping of str to float
-        Ground fraction of each spectrum, which sum to 1. Keys are names in ``data/ground_spectra.csv``, paths of CSV
-        files with columns ``wavelength`` [um] and ``reflectance`` [1], or ``"shade"``, which reflects nothing. [1]
+        Ground fraction of each spectrum, which sum to 1. Keys are names in ``data/ground_spectra.csv``, paths of
+        text files with columns ``wavelength`` and ``reflectance`` (CSV, or a spectral library such as ECOSTRESS), or
+        ``"shade"``, which reflects nothing. [1]
 
     Raises
     ------
@@ -128,10 +61,10 @@ class Background:
         fractions = {str(name): _share(name, value) for name, value in self.fractions.items()}
         names = spectrum_names()
         for name, value in fractions.items():
-            if name not in names and not _is_file(name):
+            if name not in names and not is_file(name):
                 raise ValueError(
                     f"Background: no spectrum {name!r}{did_you_mean(name, names)} There are {', '.join(names)}, "
-                    "or the path of a .csv file"
+                    "or the path of a file, .csv or .txt, with the columns wavelength and reflectance"
                 )
             if np.isnan(value):
                 raise ValueError(f"Background: the fraction of {name!r} must be in [0, 1], got nan")
@@ -168,7 +101,7 @@ def spectrum_names():
 def is_mixture(given):
     """Whether the keys of a mapping are spectra rather than bands."""
     names = spectrum_names()
-    return isinstance(given, Mapping) and bool(given) and all(str(name) in names or _is_file(name) for name in given)
+    return isinstance(given, Mapping) and bool(given) and all(str(name) in names or is_file(name) for name in given)
 
 
 def band_means(bands, wavelength, values):
@@ -201,6 +134,8 @@ def _nodes(wavelength):
 def background_means(bands, given):
     """Reflectance of a background in bands, shape (band,). [1]"""
     parts = [(given, 1.0)] if isinstance(given, Spectrum) else given.spectra()
+    for part, _ in parts:
+        part.check_gaps(bands)
     means = [share * band_means(bands, part.wavelength, part.reflectance) for part, share in parts]
     return np.sum([np.zeros(len(bands)), *means], axis=0)
 
@@ -221,12 +156,13 @@ def _share(name, value):
         ) from None
 
 
-def _is_file(name):
-    return Path(str(name)).suffix.lower() == ".csv"
+def is_file(name):
+    """Whether a name is the path of a spectrum."""
+    return Path(str(name)).suffix.lower() in _SUFFIXES or os.path.isfile(name)
 
 
 def _spectrum(name):
-    return read_spectrum(name) if _is_file(name) else _known_spectrum(name)
+    return _known_spectrum(name) if name in spectrum_names() else read_spectrum(name)
 
 
 @cached(16, "ground spectra")

@@ -104,7 +104,7 @@ def test_background_spectrum_from_file_dataset_or_mixture(tmp_path, lai):
         ("nm,reflectance\n400,0.1\n2500,0.2\n", "mine.csv has no column wavelength"),
         ("wavelength,reflectance\n400,0.1\n2500,0.2\n", r"mine.csv: wavelengths are in um, got 2500"),
         ("wavelength,reflectance\n0.4,10\n2.5,20\n", "got 10 at 0.4 um: give a fraction"),
-        ("wavelength,reflectance\n0.5,0.1\n0.4,0.2\n", "must increase"),
+        ("wavelength,reflectance\n0.5,0.1\n0.4,0.2\n0.6,0.2\n", "must increase or decrease"),
         ("wavelength,reflectance\n0.5,0.1\n1.0,0.2\n", "no leaf or background spectrum for band TM1.*by band"),
         ("", "cannot read the spectrum .*mine.csv"),
     ],
@@ -112,6 +112,87 @@ def test_background_spectrum_from_file_dataset_or_mixture(tmp_path, lai):
 def test_unusable_background_spectra_are_refused(tmp_path, text, message):
     with pytest.raises(ValueError, match=message):
         optics.band_background(TM, fifesim.Background({written(tmp_path, text): 1.0}))
+
+
+# The headers of a spectrum of ECOSTRESS, of splib06 of the USGS and of RELAB, shortened.
+ECOSTRESS = "Name: soil\nType: soil\n\nX Units: Wavelength (micrometers)\nY Units: Reflectance (percent)\n\n"
+SPLIB06 = "USGS library\nline 17 to end:  3-columns of data:\n     wavelength    reflectance    standard deviation\n"
+SPLIB06 += "(      -1.23e34  indicates a deleted number)\nDry soil  W1R1Ba AREF\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ECOSTRESS + "2.5\t60\n1.4\t60\n0.4\t10\n",
+        SPLIB06 + "  0.3  -1.23e34  -1.23e34\n  0.4  0.1  0.0\n  1.4  0.6  0.0\n  2.5  0.6  0.0\n",
+        "sample.asc\n3\nWavelength(nm) Reflectance\n400 0.1\n1400 0.6\n2500 0.6\n",
+        "wavelength_nm;reflectance (%);site\n400;10;1\n1400;60;1\n2500;60;1\n",
+        "\ufeffWavelength (um)\tReflectance\n0.4\t0.1\n1.4\t0.6\n2.5\t0.6\n",
+        '"wavelength [µm]","transmittance","reflectance"\n0.4,,0.1\n1.4,,0.6\n2.5,,0.6\n',
+    ],
+)
+def test_spectra_are_read_by_their_header(tmp_path, text):
+    path = tmp_path / "soil.spectrum.txt"
+    path.write_text(text, encoding="utf-8")
+    plain = optics.band_background(TM, written(tmp_path, "wavelength,reflectance\n0.4,0.1\n1.4,0.6\n2.5,0.6\n"))
+    np.testing.assert_allclose(optics.band_background(TM, path), plain, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (" splib07a Record=11: Sand\n" + " 1.0e-01\n" * 50, "50 values without wavelengths.*Dataset"),
+        ("0.4 0.1\n2.5 0.2\n", "has no column wavelength nor reflectance.*it has no such line"),
+        ("wavelength,reflectance\n0.4,0.1\nabc,0.2\n0.6,0.3\n", "no rows of numbers"),
+        ("wavelength,reflectance\n0.4,0.1\n0.5,0.1\nabc,0.2\n0.6,0.3\n", "the line 'abc,0.2' has not 2 numbers"),
+        ("wavelength,reflectance\n0.4,abc\n0.5,0.1\n0.6,0.3\n", "the line '0.4,abc' has not 2 numbers"),
+        ("wavelength,reflectance\n0.4,1\nabc,2\n0.6,3\n0.7,3\n", "the line 'abc,2' has not 2 numbers"),
+        ("wavelength;reflectance\n0,4;0,1\n2,5;0,2\n", "decimals with a point"),
+        (ECOSTRESS.replace("Reflectance", "Emissivity") + "0.4 1\n2.5 2\n", "has no column reflectance"),
+        ("wavelength (cm-1),reflectance\n0.4,0.1\n2.5,0.2\n", "has no column wavelength"),
+        ("wavelength,reflectance\n0.4,-1.23e34\n0.5,0.1\n2.5,0.2\n", "if it marks a missing value, write nan"),
+    ],
+)
+def test_files_without_a_readable_spectrum_name_the_remedy(tmp_path, text, message):
+    with pytest.raises(ValueError, match=message):
+        optics.band_background(TM, written(tmp_path, text))
+
+
+def test_percent_that_looks_like_a_fraction_is_warned_of(tmp_path):
+    path = written(tmp_path, ECOSTRESS + "0.4\t0.3\n2.5\t0.3\n")
+    with pytest.warns(UserWarning, match=r"mine.csv states percent, and its largest reflectance is 0\.3 %"):
+        np.testing.assert_allclose(optics.band_background(TM, path), 0.003)
+
+
+def test_narrow_gaps_are_interpolated_and_bands_in_wide_gaps_are_refused(tmp_path):
+    wavelength = np.round(np.arange(0.4, 2.5005, 0.001), 3)
+    straight = 0.1 + 0.2 * wavelength
+
+    def with_gap(low, high):
+        values = np.where((wavelength > low) & (wavelength < high), np.nan, straight)
+        return xr.Dataset({"reflectance": ("wavelength", values)}, {"wavelength": wavelength})
+
+    def read(data, bands=TM):
+        lines = [f"{w},{r}" for w, r in zip(data.wavelength.values, data.reflectance.values, strict=True)]
+        return optics.band_background(bands, written(tmp_path, "\n".join(["wavelength,reflectance", *lines])))
+
+    whole = read(with_gap(3, 3))
+    np.testing.assert_allclose(read(with_gap(0.649, 0.668)), whole, rtol=1e-12)
+    # Water vapour lies between the bands of TM.
+    np.testing.assert_array_equal(read(with_gap(1.34, 1.45)), whole)
+    with pytest.raises(ValueError, match=r"band TM3 lies by \d\d\.\d% in a gap .* from 0\.649 to 0\.671 um"):
+        read(with_gap(0.6495, 0.6705))
+    np.testing.assert_array_equal(read(with_gap(0.6495, 0.6705), TM[3:]), whole[3:])
+
+
+def test_noise_of_a_spectrum_is_removed_with_a_warning(tmp_path):
+    path = written(tmp_path, "wavelength,reflectance\n0.4,-0.0004\n0.5,0\n1.4,0.5\n2.5,0.2\n")
+    with pytest.warns(UserWarning, match=r"reflectance of a spectrum is -0\.0004 at 0\.4 um, 0\.0008 of its peak"):
+        found = optics.band_background(TM, path)
+    plain = written(tmp_path, "wavelength,reflectance\n0.4,0\n0.5,0\n1.4,0.5\n2.5,0.2\n")
+    np.testing.assert_array_equal(found, optics.band_background(TM, plain))
+    with pytest.raises(ValueError, match=r"must be in \[0, 1\], got -0\.006"):
+        optics.band_background(TM, written(tmp_path, "wavelength,reflectance\n0.4,-0.006\n1.4,0.5\n2.5,0.2\n"))
 
 
 def test_spectra_need_responses_and_known_names():
@@ -181,12 +262,13 @@ def test_leaf_spectra_from_file_or_dataset(tmp_path, lai):
     ("given", "message"),
     [
         (leaf_dataset((400, 700, 800, 2500)), "leaf_optics: wavelength reaches 2500 um: if these are nanometres"),
-        (leaf_dataset((4e-7, 7e-7, 8e-7, 2.5e-6)), "leaf_optics: wavelengths are in um, the largest is 2.5e-06"),
+        (leaf_dataset((4e-7, 7e-7, 8e-7, 2.5e-6)), "leaf_optics: wavelengths are in um, got 2.5e-06"),
         (leaf_dataset(units="m"), "leaf_optics: wavelength has units 'm'"),
         (leaf_dataset(transmittance=(0.01, 0.05, 0.6, 0.1)), r"leaf_optics: .*add up to 1\.1 at 0\.8 um"),
         (leaf_dataset(transmittance=(1, 5, 40, 10)), "leaf_optics: the transmittance .* got 5 at 0.7 um: give a fract"),
         (leaf_dataset().drop_vars("transmittance"), "leaf_optics: the Dataset has no transmittance"),
-        ("leaf.txt", r"leaf_optics='leaf.txt' is not the path of a \.csv file"),
+        ("leaf.txt", "cannot read the spectrum leaf.txt: there is no such file"),
+        ("leaf", r"leaf_optics='leaf' is not the path of a \.csv or \.txt file"),
     ],
 )
 def test_unusable_leaf_spectra_are_refused(lai, given, message):
