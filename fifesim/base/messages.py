@@ -14,9 +14,25 @@ PARTS: dict = {}
 """Names of a description and of its fields by the argument that takes it, for messages."""
 
 
+# Names in PROSAIL, PROSPECT, 6S and other programs of what has these names here.
+_ELSEWHERE = {
+    "structure": "n", "chlorophyll": "cab chl", "carotenoids": "car cxc", "anthocyanins": "ant canth", "water": "cw ewt",
+    "dry_matter": "cm lma", "brown": "cbrown cbp fb", "leaf_angles": "lidfa lidfb typelidf ala lad", "hotspot": "hspot",
+    "background": "rsoil rsoil0 albedo", "moisture": "psoil", "crown_cover": "fc", "sza": "tts", "vza": "tto",
+    "visibility": "vis", "aot": "aod aod550 aot550 taer550 tau", "h2o": "wv cwv tcwv pwv watervapour watervapor",
+    "o3": "ozone", "altitude": "elevation height", "mtf_at_nyquist": "mtf", "temperature": "tair", "humidity": "rh",
+    "net_radiation": "rn", "shortwave": "rg",
+}  # fmt: skip
+
+
 def closest(value, allowed):
-    """Name that a misspelt one probably stands for, ignoring case; empty if none is close."""
+    """Name that a misspelt or foreign one probably stands for, ignoring case; empty if none is close."""
     names = {str(name).lower(): str(name) for name in allowed}
+    typed = str(value).lower().replace("_", "")
+    known = next((name for name, others in _ELSEWHERE.items() if typed in others.split()), "")
+    for name in (known, f"leaf_{known}"):
+        if name in names:
+            return names[name]
     return next((names[found] for found in get_close_matches(str(value).lower(), names, n=1)), "")
 
 

@@ -9,7 +9,7 @@ from fifesim.atmosphere.labels import diffuse_fraction
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import Names
 from fifesim.base.geometry import Geometry
-from fifesim.base.messages import closest
+from fifesim.base.messages import nearest
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.description import TALLGRASS, Canopy, is_raster
@@ -116,10 +116,10 @@ def canopy_spectra(
     dim, values, coords = _values(canopies, len(responses))
     for name in (*values, *derivatives):
         if name not in _NAMES:
-            near = closest(name, _NAMES)
-            meant = f", did you mean {near!r}?" if near else ""
-            known = ", ".join(_NAMES)
-            raise ValueError(f"{name!r} is no quantity of canopies and their derivatives{meant} There are {known}")
+            raise ValueError(
+                f"{name!r} is no quantity of canopies and their derivatives: {nearest(name, _NAMES)}There are "
+                f"{', '.join(_NAMES)}"
+            )
     model = _Model(responses, canopy or TALLGRASS, bool(_LEAF.keys() & {*values, *derivatives}))
     values = model.defaults(geometry, atmosphere, values) | values
     count = max(np.shape(each)[0] for each in values.values())

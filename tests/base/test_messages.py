@@ -39,12 +39,35 @@ def test_class_keeps_its_signature_and_names_misspelt_arguments():
         Plain(visibilty=23.0)
 
 
+FOREIGN = {
+    fifesim.Leaf: {
+        "cab": "chlorophyll", "car": "carotenoids", "ant": "anthocyanins", "cbrown": "brown", "cw": "water",
+        "cm": "dry_matter", "n": "structure", "N": "structure",
+    },
+    fifesim.Canopy: {"lidfa": "leaf_angles", "LIDF_a": "leaf_angles", "hspot": "hotspot", "psoil": "moisture"},
+    fifesim.Atmosphere: {"vis": "visibility", "aod550": "aot", "water_vapour": "h2o", "ozone": "o3"},
+    fifesim.Weather: {"rh": "humidity"},
+}  # fmt: skip
+
+
 def test_misspelt_names_give_a_suggestion(lai):
     typed = [
         (lambda: lai.fifesim.sens, AttributeError, "no method 'sens' of an xarray.DataArray: did you mean 'sense'"),
         (lambda: lai.fifesim.fife_site, AttributeError, "fife_site is no method of a raster.* fifesim.fife_site is"),
         (lambda: lai.fifesim.fpar(leaf_angles="spherical"), TypeError, r"type canopy=.*\.Canopy\(leaf_angles=...\)"),
         (lambda: fifesim.Atmosphere(visibilty=23), TypeError, "Atmosphere has no .* did you mean 'visibility'"),
+        # Names of PROSAIL and 6S.
+        *(
+            (lambda kind=kind, name=name: kind(**{name: 1.0}), TypeError, f"has no argument {name!r}: .*'{own}'")
+            for kind, names in FOREIGN.items()
+            for name, own in names.items()
+        ),
+        (lambda: lai.fifesim.fpar(hspot=0.1), TypeError, r"type canopy=fifesim\.Canopy\(hotspot=...\)"),
+        (
+            lambda: fifesim.canopy_spectra({"cab": 40}),
+            ValueError,
+            "derivatives: did you mean 'leaf_chlorophyll'. There",
+        ),
     ]
     for call, kind, said in typed:
         with pytest.raises(kind, match=said) as caught:

@@ -345,6 +345,12 @@ def _table(folder, name):
         reason = "no such file beside it" if isinstance(error, FileNotFoundError) else in_a_line(error, 150)
         raise ValueError(f"bands = {shown(name)}: {reason}; type a CSV file of bands, or [[bands]]") from None
     missing = {"name", "center", "width"} - set(table.columns)
+    if missing and "wavelength" in table.columns:
+        raise ValueError(
+            f"bands = {shown(name)}: it has responses by wavelength; a table of bands has one row for each band, with "
+            "name, center and width [um]. Write measured responses as [[bands]] with srf = { wavelength = [...], "
+            "response = [...] }"
+        )
     if missing:
         raise ValueError(f"bands = {shown(name)}: it lacks the columns {', '.join(sorted(missing))} [um]")
     return [{name: cell for name, cell in row.items() if not pd.isna(cell)} for row in table.to_dict("records")]

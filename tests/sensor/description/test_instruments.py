@@ -65,6 +65,7 @@ MISTAKES = [
     # Keys and value types.
     (("bits = 8 ", f'bits = "\\u001b{"a" * 5000}" '), r"bits = '\\x1baaa.*must be a whole number"),
     (("bits = 8 ", "bitz = 8 "), "bits is missing; unknown key bitz, did you mean 'bits'"),
+    (("bits = 8 ", "mtf = 0.2\nbits = 8 "), "unknown key mtf, did you mean 'mtf_at_nyquist'"),
     (("bits = 8 ", "bits = 8.5 "), "bits = 8.5: must be a whole number"),
     (("bits = 8 ", "bits = 32 "), "bits = 32: .*16"),
     (("= 705000.0", "= '705 km'"), "altitude = '705 km': .*number"),
@@ -288,6 +289,7 @@ def test_blur_from_mtf_at_nyquist(changed):
         ("bands.csv/", TABLE, "no such file beside it"),
         ("other.csv", TABLE, "bands = 'other.csv': no such file beside it"),
         ("bands.csv", "name,center\nred,0.6\n", "lacks the columns width"),
+        ("bands.csv", "wavelength,red,nir\n0.6,1,0\n", r"it has responses by wavelength; .* srf = \{ wavelength"),
     ],
 )
 def test_invalid_band_table_raises(changed, tmp_path, name, table, said):
