@@ -16,8 +16,9 @@ PARTS: dict = {}
 
 # Names in PROSAIL, PROSPECT, 6S and other programs of what has these names here.
 _ELSEWHERE = {
-    "structure": "n", "chlorophyll": "cab chl", "carotenoids": "car cxc", "anthocyanins": "ant canth", "water": "cw ewt",
-    "dry_matter": "cm lma", "brown": "cbrown cbp fb", "leaf_angles": "lidfa lidfb typelidf ala lad", "hotspot": "hspot",
+    "structure": "n", "chlorophyll": "cab chl", "carotenoids": "car cxc", "anthocyanins": "ant canth",
+    "water": "cw ewt", "dry_matter": "cm lma", "brown": "cbrown cbp fb", "hotspot": "hspot",
+    "leaf_angles": "lidfa lidfb typelidf ala lad",
     "background": "rsoil rsoil0 albedo", "moisture": "psoil", "crown_cover": "fc", "sza": "tts", "vza": "tto",
     "visibility": "vis", "aot": "aod aod550 aot550 taer550 tau", "h2o": "wv cwv tcwv pwv watervapour watervapor",
     "o3": "ozone", "altitude": "elevation height", "mtf_at_nyquist": "mtf", "temperature": "tair", "humidity": "rh",
