@@ -9,11 +9,12 @@ from typing import Annotated, Self
 
 import numpy as np
 
-from fifesim.atmosphere import ENGINES, aerosols, five_s, gases, mixtures
+from fifesim.atmosphere import ENGINES, RANGES, aerosols, five_s, gases, mixtures
 from fifesim.atmosphere.aerosols import Aerosol, known_aerosol
 from fifesim.atmosphere.gases import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, Levels, column, profile_above
 from fifesim.base.arguments import PLAIN, AerosolMixture, Numbers, check_fields, described
 from fifesim.base.messages import closest
+from fifesim.base.ranges import check_range
 
 # Band limits of the Thematic Mapper, as its designers state them. [um]
 _BANDS = ((0.45, 0.52), (0.52, 0.60), (0.63, 0.69), (0.76, 0.90), (1.55, 1.75), (2.08, 2.35))
@@ -131,10 +132,9 @@ class Atmosphere:
             self._check_own_aerosol()
         elif self.aerosol != "none":
             self._set(aerosol=mixtures.canonical(self.aerosol))
-        self._set(altitude=_checked("altitude", self.altitude, 0, 4, "km"))
-        for name, high, unit in (("h2o", 10, "g cm-2"), ("o3", 1, "cm-atm")):
-            if getattr(self, name) is not None:
-                self._set(**{name: _checked(name, getattr(self, name), 0, high, unit)})
+        for name in ("altitude", "h2o", "o3"):
+            if name == "altitude" or getattr(self, name) is not None:
+                self._set(**{name: _checked(name, getattr(self, name))})
         self._set_amount()
 
     def _check_own_aerosol(self):
@@ -154,9 +154,9 @@ class Atmosphere:
     def _set_amount(self):
         visibility, aot = self.visibility, self.aot
         if aot is not None:
-            aot = _checked("aot", aot, 0, 2, "optical thickness at 0.55 um")
+            aot = _checked("aot", aot)
         if visibility is not None or aot is None:
-            visibility = _checked("visibility", 45.0 if visibility is None else visibility, 5, 100, "km")
+            visibility = _checked("visibility", 45.0 if visibility is None else visibility)
             follows = 0.0 if self.aerosol == "none" else aerosols.aerosol_optical_thickness(visibility)
             if aot not in (None, follows):
                 raise ValueError(
@@ -316,16 +316,9 @@ def _check_name(what, value, allowed):
     raise ValueError(f"{what} must be one of {', '.join(allowed)}, got {value!r}{hint}")
 
 
-def _checked(what, value, low, high, unit):
+def _checked(what, value):
+    """Number in its range."""
     if not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
-        raise TypeError(
-            f"{what} must be a number from {low} to {high} [{unit}], got {described(value)}: leave the unit out"
-        )
-    if not low <= value <= high:
-        if unit == "km" and 10 * high < value <= 1000 * high:
-            raise ValueError(
-                f"{what} must be from {low} to {high} {unit}, got {value:g}: where that is metres, type "
-                f"{what}={value / 1000:g}"
-            )
-        raise ValueError(f"{what} must be from {low} to {high} {unit}, got {value:g}")
+        raise TypeError(f"{what} must be a number in {RANGES[what].unit}, got {described(value)}: leave the unit out")
+    check_range(what, value, RANGES[what])
     return float(value)

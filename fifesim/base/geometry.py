@@ -44,7 +44,7 @@ class Geometry:
     Warns
     -----
     UserWarning
-        If the angles of the sun look like radians.
+        If the angles of the sun or of the sensor look like radians.
 
     Examples
     --------
@@ -68,8 +68,8 @@ class Geometry:
                 )
         check_fields(self)
         for name in ("saa", "vaa"):
-            if not np.isfinite(getattr(self, name)):
-                raise ValueError(f"{name} must be finite degrees, got {getattr(self, name)}")
+            if not -360 <= getattr(self, name) <= 360:
+                raise ValueError(f"{name} must be in [-360, 360] degrees, got {getattr(self, name)}")
         hints = {
             "sza": "the sun is below the horizon; check time, latitude and longitude",
             "vza": "the sensor looks down",
@@ -83,6 +83,7 @@ class Geometry:
                 f"earth_sun_distance is in astronomical units, 0.983 to 1.017, got {self.earth_sun_distance:g}"
             )
         warn_of_radians(self.sza, self.saa)
+        warn_of_radians(self.vza, self.vaa, "vza", "vaa")
 
     @cached_property
     def raa(self) -> float:
@@ -100,12 +101,13 @@ class Geometry:
         return np.cos(np.radians(self.vza))
 
 
-def warn_of_radians(sza, saa):
-    """Warn if the directions of the sun look like radians."""
-    if 0 < sza <= np.pi / 2 and 0 < saa <= 2 * np.pi:
+def warn_of_radians(zenith, azimuth, *names):
+    """Warn if the directions of the sun, or of the sensor by the names of its angles, look like radians."""
+    if 0 < zenith <= np.pi / 2 and 0 < azimuth <= 2 * np.pi:
+        one, two = names or ("sza", "saa")
         warn(
-            f"sza={sza:g} and saa={saa:g} are taken as degrees and look like radians: if they are, convert them with "
-            f"numpy.degrees, which gives sza={np.degrees(sza):.1f} and saa={np.degrees(saa):.1f}"
+            f"{one}={zenith:g} and {two}={azimuth:g} are taken as degrees and look like radians: if they are, convert "
+            f"them with numpy.degrees, which gives {one}={np.degrees(zenith):.1f} and {two}={np.degrees(azimuth):.1f}"
         )
 
 

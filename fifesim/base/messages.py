@@ -2,6 +2,7 @@
 
 import inspect
 import logging
+import re
 import sys
 import warnings
 from contextlib import contextmanager
@@ -103,13 +104,14 @@ def in_own_words(error):
     return known.format(**error.get("ctx", {})) if known else error["msg"]
 
 
-_PACKAGE = str(Path(__file__).parents[1])
+# Files of frames that are not the user's: of the package, of pydantic, and of methods of dataclasses.
+_INSIDE = re.compile(rf"{re.escape(str(Path(__file__).parents[1]))}|<string>|.*[\\/]pydantic[\\/]")
 
 
 def warn(message, category=UserWarning):
     """Warn that a result may be wrong or a function will go, at the first line outside of the package."""
     frame, level = sys._getframe(1), 2
-    while frame.f_back and frame.f_code.co_filename.startswith(_PACKAGE):
+    while frame.f_back and _INSIDE.match(frame.f_code.co_filename):
         frame, level = frame.f_back, level + 1
     warnings.warn(message, category, stacklevel=level)
 

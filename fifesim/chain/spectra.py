@@ -10,27 +10,27 @@ from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import Names
 from fifesim.base.geometry import Geometry
 from fifesim.base.messages import nearest
+from fifesim.base.ranges import check_range
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.description import TALLGRASS, Canopy, is_raster
 from fifesim.ground.canopy.leaf_area import LARGEST_LAI, check_lai
 from fifesim.ground.canopy.optics import check_background
 from fifesim.ground.canopy.properties import NUMERIC_PROPERTIES
-from fifesim.ground.canopy.prospect import CONTENTS, Leaf, leaf_band_means
+from fifesim.ground.canopy.prospect import LEAF_RANGES, Leaf, leaf_band_means
 from fifesim.ground.canopy.reflectance_table import Scene, model_reflectance
 from fifesim.ground.canopy.soil import brightened, moistened, soil_line, water_films
 from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
-_LEAF = {f"leaf_{name}": name for name in ("structure", *CONTENTS)}
+_LEAF = {f"leaf_{name}": name for name in LEAF_RANGES}
 _ANGLES = {"sza": (0.0, 90.0), "vza": (0.0, 90.0), "raa": (-360.0, 360.0)}
 _RANGES = {
     "lai": (0.0, LARGEST_LAI),
-    **{name: (each.lowest, each.highest) for name, each in NUMERIC_PROPERTIES.items()},
     **_ANGLES,
     "diffuse_fraction": (0.0, 1.0),
 }
-_NAMES = (*_RANGES, "background", *_LEAF)
+_NAMES = ("lai", *NUMERIC_PROPERTIES, *_ANGLES, "diffuse_fraction", "background", *_LEAF)
 """Names of the quantities that may differ from canopy to canopy."""
 
 _BLOCK = 2**12  # canopies per batch, so that intermediate results fit into the processor cache
@@ -193,9 +193,9 @@ class _Model:
     def derivative(self, values, name):
         """Derivative of the reflectance factor by one quantity, shape (band, n)."""
         if name in ("soil", "moisture"):
-            ground, (low, high) = self._ground(values), _RANGES[name]
+            ground, known = self._ground(values), NUMERIC_PROPERTIES[name]
             # Five points around each soil state, shifted into the valid range.
-            middle = np.clip(values[name], low + 2 * _SPACING, high - 2 * _SPACING)
+            middle = np.clip(values[name], known.lowest + 2 * _SPACING, known.highest - 2 * _SPACING)
             at = (values[name] - middle) / _SPACING
             slope = sum(
                 weight * self._ground(values | {name: middle + node * _SPACING})
@@ -282,6 +282,8 @@ def _check(values):
         if name != "lai" and outside.any():
             allowed = f"[{low:g}, {high:g}{')' if name in ('sza', 'vza') else ']'}"
             raise ValueError(f"{name} must be in {allowed}, got {each[outside].flat[0]:g}")
+    for name, known in NUMERIC_PROPERTIES.items():
+        check_range(name, values[name], known)
     check_background(values["background"])
     check_crowns(values["lai"], values["crown_cover"])
     Leaf(**{content: values[name] for name, content in _LEAF.items() if name in values})

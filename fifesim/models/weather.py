@@ -12,7 +12,7 @@ import numpy as np
 
 from fifesim.base.arguments import check_fields
 from fifesim.base.messages import warn
-from fifesim.ground.canopy.description import NumberByCell, is_raster
+from fifesim.ground.canopy.description import ByValue, NumberByCell, is_raster
 from fifesim.ground.canopy.leaf_area import LARGEST_LAI
 
 
@@ -39,11 +39,11 @@ WEATHER_LIMITS = {
     "humidity": Limits("1", 0, 1, "it is a fraction: divide percent by 100", (0, 1)),
     # Highest and lowest places with vegetation.
     "pressure": Limits("Pa", 1e4, 1.2e5, "multiply hPa by 100, kPa by 1000", (5e4, 1.1e5)),
-    # Above the solar constant only next to clouds.
-    "shortwave": Limits("W m-2", 0, 2000, "it is the mean over the daylight hours", (0, 1361)),
+    # Above the solar constant only next to clouds. Overcast days have more than 35 W m-2, no day 35 MJ m-2.
+    "shortwave": Limits("W m-2", 0, 2000, "it is the mean over the daylight hours, not MJ m-2 d-1", (35, 1361)),
     "net_radiation": Limits("W m-2", -500, 2000, "it is the mean over the daylight hours", (-200, 1100)),
     "ground_heat": Limits("W m-2", -1000, 1000, "it is the mean over the daylight hours", (-300, 300)),
-    "day_length": Limits("h", 0, 24, "it is the time between sunrise and sunset in hours", (0, 24)),
+    "day_length": Limits("h", 0, 24, "it is the time between sunrise and sunset in hours", (2, 24)),
     "diffuse_fraction": Limits("1", 0, 1, "it is a fraction: divide percent by 100", (0, 1)),
 }
 
@@ -77,7 +77,7 @@ FORMULA_LIMITS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Weather:
+class Weather(ByValue):
     """
     Weather of a day. Fluxes and temperature are means over the daylight hours.
 
@@ -139,12 +139,12 @@ class Weather:
         check_fields(self)
         for each in fields(self):
             value, limits = getattr(self, each.name), WEATHER_LIMITS[each.name]
-            if not is_raster(value):
-                check_weather(each.name, value)
-                continue
-            units = str(value.attrs.get("units", limits.unit))
+            units = str(value.attrs.get("units", limits.unit)) if is_raster(value) else limits.unit
             if units != limits.unit:
                 raise ValueError(f"{each.name} has units {units!r}, needs {limits.unit!r}: convert it, then set units")
+            # Lazy rasters are checked when they are computed.
+            if not is_raster(value) or value.chunks is None:
+                check_weather(each.name, value)
         check_order({each.name: getattr(self, each.name) for each in fields(self)})
 
     def replace(self, **changes: Any) -> Weather:
@@ -166,11 +166,15 @@ class Weather:
 def check_weather(name, values):
     """Raise ValueError for impossible values of a quantity, and warn of values outside the range of formulas."""
     limits = WEATHER_LIMITS[name]
+    if not np.all(np.isfinite(values)):
+        raise ValueError(
+            f"{name} must be finite, got NaN or infinity: fill gaps of a raster with .fillna(value)"
+        )
     for end in _checked_ends(name, values, limits):
         if end < limits.valid[0] or end > limits.valid[1]:
             warn(
                 f"{name} is {end:g} {limits.unit}, formulas of the models hold from {limits.valid[0]:g} to "
-                f"{limits.valid[1]:g}: the result may be wrong"
+                f"{limits.valid[1]:g}: the result may be wrong; {limits.remedy}"
             )
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
 
-from fifesim.atmosphere import ENGINES
+from fifesim.atmosphere import ENGINES, RANGES
 from fifesim.base.arguments import Coupling
 from fifesim.base.files import check_regular, shown
 from fifesim.base.messages import nearest
@@ -24,6 +24,13 @@ _LENGTHS = {"km": 3, "m": 0, "cm": -2}
 def number(default, unit, description, **limits):
     """Field of a numeric key, optional if its default is None."""
     return Field(default, description=description, json_schema_extra={"unit": unit}, allow_inf_nan=False, **limits)
+
+
+def ranged(default, known, description):
+    """Field of a numeric key with the range of a description."""
+    field = number(default, known.unit, description, ge=known.lowest, le=known.highest)
+    field.json_schema_extra["range"] = known
+    return field
 
 
 def text(default, description):
@@ -152,7 +159,7 @@ def _key(known):
     """Type and field of the key for a canopy property."""
     if not known.unit:
         return str, text(known.default, known.meaning)
-    return float, number(known.default, known.unit, known.meaning, ge=known.lowest, le=known.highest)
+    return float, ranged(known.default, known, known.meaning)
 
 
 _Structure = create_model("_Structure", __base__=_LeafArea, **{name: _key(known) for name, known in KEYS.items()})
@@ -343,11 +350,11 @@ class AirKeys(Section):
         "optical properties, which needs aot",
         suffix=(".nc", ".csv"),
     )
-    visibility: float | None = number(45.0, "km", "meteorological range; give either this or aot", ge=5, le=100)
-    aot: float | None = number(None, "1", "aerosol optical thickness at 0.55 um, instead of visibility", ge=0, le=2)
-    altitude: float = number(0.4, "km", "ground elevation above sea level; default only on the FIFE site", ge=0, le=4)
-    h2o: float | None = number(None, "g cm-2", "column water vapour; by default from the profile", ge=0, le=10)
-    o3: float | None = number(None, "cm-atm", "column ozone; by default from the profile", ge=0, le=1)
+    visibility: float | None = ranged(45.0, RANGES["visibility"], "meteorological range; give either this or aot")
+    aot: float | None = ranged(None, RANGES["aot"], "aerosol optical thickness at 0.55 um, instead of visibility")
+    altitude: float = ranged(0.4, RANGES["altitude"], "ground elevation above sea level; default only on the FIFE site")
+    h2o: float | None = ranged(None, RANGES["h2o"], "column water vapour; by default from the profile")
+    o3: float | None = ranged(None, RANGES["o3"], "column ozone; by default from the profile")
     engine: str = text("5S", f"radiative transfer model: {', '.join(ENGINES)}")
     coupling: Coupling = text(
         "lambert",

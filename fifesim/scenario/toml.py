@@ -11,12 +11,15 @@ from pydantic import ValidationError
 
 from fifesim.base.files import in_a_line, read_toml, shown
 from fifesim.base.messages import closest, in_own_words, nearest
+from fifesim.base.ranges import likely_units
 from fifesim.scenario.keys import Keys
 
 # Maximum length of the message on all mistakes of a scenario. [character]
 _LONGEST = 500
 # Types of errors whose message is followed by the meaning of the key.
 _OTHER_KINDS = ("dict_type", "list_type", "string_type")
+# Types of errors whose message is followed by the likely unit.
+_OUTSIDE = ("greater_than_equal", "less_than_equal")
 
 
 def load_values(path):
@@ -153,10 +156,13 @@ def _explain(error):
         hint = nearest(place[-1], known)
         return in_a_line(f"unknown key {key} = {shown(value)}: {hint}allowed are {', '.join(known)}")
     message = str(error["ctx"]["error"]) if error["type"] == "value_error" else in_own_words(error)
-    if error["type"] in _OTHER_KINDS and len(place) > 1:
-        section = Keys.section(place[:-1])
-        known = section.model_fields.get(place[-1]) if section else None
-        message += f" ({known.description})" if known else ""
+    section = Keys.section(place[:-1]) if len(place) > 1 else None
+    known = section.model_fields.get(place[-1]) if section else None
+    if known and error["type"] in _OTHER_KINDS:
+        message += f" ({known.description})"
+    if known and error["type"] in _OUTSIDE and "range" in (known.json_schema_extra or {}):
+        hint = likely_units(place[-1], float(value), known.json_schema_extra["range"])
+        message += f": {hint}" if hint else ""
     if isinstance(value, str):
         # Messages of libraries repeat the complete value.
         message = message.replace(repr(value), shown(value))

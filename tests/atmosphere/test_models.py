@@ -33,10 +33,10 @@ def test_text_of_the_default_atmosphere():
     [
         ({"profile": "midlat_summer"}, r"profile must be one of .*'midlat_summer': type profile='midlatitude-sum"),
         ({"aerosol": "continentl"}, r"aerosol must be one of .*, got 'continentl': type aerosol='continental'"),
-        ({"visibility": float("nan")}, r"visibility must be from 5 to 100 km, got nan"),
-        ({"altitude": 5}, r"altitude must be from 0 to 4 km, got 5"),
-        ({"h2o": -1}, "h2o must be from 0 to 10 g cm-2, got -1"),
-        ({"aot": -0.1}, "aot must be from 0 to 2 optical thickness at 0.55 um, got -0.1"),
+        ({"visibility": float("nan")}, r"visibility must be in \[5, 100\] km, got nan"),
+        ({"altitude": 5}, r"altitude must be in \[0, 4\] km, got 5"),
+        ({"h2o": -1}, r"h2o must be in \[0, 10\] g cm-2, got -1"),
+        ({"aot": -0.1}, r"aot must be in \[0, 2\], got -0\.1"),
         ({"aerosol": "none", "aot": 0.1}, r"aot must be 0 without aerosol, got 0\.1"),
     ],
 )

@@ -72,14 +72,19 @@ def test_albedo_equals_the_two_stream_model_of_each_band(lai):
         ({"temperature": 25.0}, r"temperature must be in \[150, 350\] K, got 25: degC was given for K: add 273.15"),
         ({"humidity": 50.0}, "divide percent by 100"),
         ({"pressure": 965.0}, "multiply hPa by 100, kPa by 1000"),
+        ({"shortwave": np.nan}, "shortwave must be finite"),
+        ({"day_length": np.inf}, "day_length must be finite"),
     ],
 )
 def test_other_units_are_refused(lai, change, message):
     with pytest.raises(ValueError, match=message):
         WEATHER.replace(**change)
     (name, value), *_ = change.items()
-    rasters = WEATHER.replace(**{name: xr.full_like(lai, value).drop_attrs()})
-    lazy = in_chunks(lai, {"y": 9, "x": 9}).fifesim.evapotranspiration(rasters)
+    raster = xr.full_like(lai, value).drop_attrs()
+    with pytest.raises(ValueError, match=message):
+        WEATHER.replace(**{name: raster})
+    in_blocks = WEATHER.replace(**{name: in_chunks(raster, {"y": 9, "x": 9})})
+    lazy = in_chunks(lai, {"y": 9, "x": 9}).fifesim.evapotranspiration(in_blocks)
     with pytest.raises(ValueError, match=message):
         lazy.compute()
 
@@ -90,6 +95,17 @@ def test_units_of_rasters_and_ranges_of_formulas_are_checked(lai):
         WEATHER.replace(temperature=celsius)
     with pytest.warns(UserWarning, match=r"temperature is 340 K.*hold from 228.15 to 333.15"):
         WEATHER.replace(temperature=340.0, temperature_max=345.0)
+    with pytest.warns(UserWarning, match=r"shortwave is 29\.5 W m-2, .* not MJ m-2 d-1"):
+        WEATHER.replace(shortwave=29.5)
+    with pytest.raises(ValueError, match="humidity must be finite"):
+        WEATHER.replace(humidity=field(lai, 0, 1).where(lai > lai.min()))
+
+
+def test_weather_is_equal_by_value(lai):
+    moist, dry = field(lai, 0.5, 1), field(lai, 0, 0.5)
+    assert fifesim.fife_weather() == WEATHER and hash(fifesim.fife_weather()) == hash(WEATHER)
+    assert WEATHER.replace(humidity=moist) == WEATHER.replace(humidity=moist.copy())
+    assert WEATHER.replace(humidity=moist) != WEATHER.replace(humidity=dry) != WEATHER
 
 
 def test_contradictory_weather_is_rejected(lai):

@@ -1,7 +1,7 @@
 """Description of a canopy: leaves, structure and background."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
@@ -10,8 +10,10 @@ import numpy as np
 from fifesim.base import arguments
 from fifesim.base.arguments import Array, FilePath, NumberOrArray
 from fifesim.base.messages import PARTS
+from fifesim.base.ranges import check_range
 from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
+from fifesim.ground.canopy.optics import check_background
 from fifesim.ground.canopy.properties import PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background
@@ -55,8 +57,35 @@ NumberByCell: TypeAlias = Annotated[
 LEAST_HOTSPOT = 1e-6
 
 
+class ByValue:
+    """Dataclass whose instances are equal if all fields are, rasters included."""
+
+    def __eq__(self, other):
+        return _same(self, other) if type(other) is type(self) else NotImplemented
+
+    def __hash__(self):
+        return hash(type(self))
+
+
+def _same(one, other):
+    """Whether two values are equal, where rasters may be among them."""
+    if one is other or type(one) is not type(other):
+        return one is other or bool(np.ndim(one) == np.ndim(other) == 0 and one == other)
+    if arguments.is_a(one, "DataArray", "Dataset"):
+        return one.identical(other)
+    if isinstance(one, np.ndarray):
+        return np.array_equal(one, other)
+    if isinstance(one, Mapping):
+        return one.keys() == other.keys() and all(_same(each, other[name]) for name, each in one.items())
+    if isinstance(one, list | tuple):
+        return len(one) == len(other) and all(map(_same, one, other))
+    if is_dataclass(one):
+        return all(_same(getattr(one, each.name), getattr(other, each.name)) for each in fields(one))
+    return bool(one == other)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Canopy:
+class Canopy(ByValue):
     """
     A canopy: leaves, structure and background.
 
@@ -124,7 +153,7 @@ class Canopy:
     >>> Canopy(brown=20)
     Traceback (most recent call last):
     ...
-    ValueError: brown must be in [0, 1], got 20: it is the share of dead leaf area, not percent
+    ValueError: brown must be in [0, 1], got 20: it is the share of dead leaf area; if it is in percent, type brown=0.2
     """
 
     _in_words: ClassVar[str] = "a fifesim.Canopy, such as fifesim.Canopy(brown=0.2)"
@@ -227,11 +256,11 @@ def _check(name, value, known):
     """Raise ValueError if a field cannot have a value."""
     if name == "leaf_angles":
         leaf_angle_classes(value)
+    elif name == "background":
+        numbers = [value] if arguments.NUMBER.fits(value) and not is_raster(value) else []
+        check_background(np.array(numbers, float))
     elif known.unit and not is_raster(value):
-        if not known.lowest <= value <= known.highest:
-            percent = ", not percent" if known.meaning.startswith("share") else ""
-            allowed = f"[{known.lowest:g}, {known.highest:g}]"
-            raise ValueError(f"{name} must be in {allowed}, got {value:g}: it is the {known.meaning}{percent}")
+        check_range(name, value, known)
         if name == "hotspot" and 0 < value < LEAST_HOTSPOT:
             raise ValueError(f"hotspot must be 0, for no hot spot, or at least {LEAST_HOTSPOT:g}, got {value:g}")
     elif known.unit and value.dtype.kind not in "iuf":

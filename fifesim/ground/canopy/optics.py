@@ -14,7 +14,7 @@ from fifesim.base.caches import cached
 from fifesim.ground.canopy.interpolation import refined
 from fifesim.ground.canopy.leaf_area import check_fraction, check_share
 from fifesim.ground.canopy.measured_spectra import LeafSpectrum, Spectrum, read_spectrum
-from fifesim.ground.canopy.prospect import CONTENTS, LARGEST_STRUCTURE, Leaf, leaf_band_means, leaf_spectrum
+from fifesim.ground.canopy.prospect import LEAF_RANGES, Leaf, leaf_band_means, leaf_spectrum
 from fifesim.ground.canopy.spectra import (
     Background,
     background_means,
@@ -228,4 +228,4 @@ def _table(bands, name, leaf):
 
 def _range(name):
     """Smallest and largest value of a content of a leaf."""
-    return (1.0, LARGEST_STRUCTURE) if name == "structure" else (0.0, CONTENTS[name][1])
+    return LEAF_RANGES[name].lowest, LEAF_RANGES[name].highest

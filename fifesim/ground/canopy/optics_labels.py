@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from fifesim.base.ranges import check_range
 from fifesim.grids import cf
 from fifesim.grids import chunks as chunking
 from fifesim.grids.chunks import by_band, layers_of
@@ -14,6 +15,7 @@ from fifesim.grids.inputs import micrometres
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.measured_spectra import PER_FRACTION, LeafSpectrum, Spectrum
 from fifesim.ground.canopy.optics import leaf_means
+from fifesim.ground.canopy.properties import PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.soil import brightened, moistened, soil_line, water_films
 from fifesim.ground.canopy.spectra import check_shares, is_mixture
@@ -83,7 +85,7 @@ def soil_kernel(bands, lai, soil=None, moisture=None):
     """Kernel of a changed background, ``kernel(dry, *blocks)`` of shape (..., band), and its rasters."""
     steps, rasters = [], []
     if soil is not None:
-        steps.append((brightened, soil_line(bands)))
+        steps.append((_brightened, soil_line(bands)))
         rasters.append(_by_cell("soil", soil, lai))
     if moisture is not None:
         steps.append((moistened, water_films(tuple(bands))))
@@ -95,6 +97,12 @@ def soil_kernel(bands, lai, soil=None, moisture=None):
         return reflectance
 
     return kernel, rasters
+
+
+def _brightened(dry, change, line):
+    """Background of another brightness, with a warning if its change is large in the mean."""
+    check_range("soil", change, PROPERTIES["soil"])
+    return brightened(dry, change, line)
 
 
 def changes_of(canopy):

@@ -11,18 +11,22 @@ from fifesim.base import files
 from fifesim.base.arguments import Array, NumberOrArray, described
 from fifesim.base.arrays import as_rows, compiled, jitable
 from fifesim.base.caches import cached
+from fifesim.base.ranges import Range, check_range
 
-# Absorbing constituents of a leaf: unit and largest plausible content.
+_PIGMENT = {"mg m-2": 0.1, "g m-2": 100.0, "mg cm-2": 1000.0}
+
+# Absorbing constituents of a leaf. The usual ranges contain LOPEX and ANGERS (Feret et al., 2008) and dead leaves.
 CONTENTS = {
-    "chlorophyll": ("ug cm-2", 200.0),
-    "carotenoids": ("ug cm-2", 100.0),
-    "anthocyanins": ("ug cm-2", 100.0),
-    "brown": ("1", 10.0),
-    "water": ("cm", 0.2),
-    "dry_matter": ("g cm-2", 0.1),
+    "chlorophyll": Range("ug cm-2", 0.0, 200.0, (2.0, 120.0), _PIGMENT),
+    "carotenoids": Range("ug cm-2", 0.0, 100.0, (0.5, 30.0), _PIGMENT),
+    "anthocyanins": Range("ug cm-2", 0.0, 100.0, (0.05, 40.0), _PIGMENT),
+    "brown": Range("1", 0.0, 10.0, (0.0, 3.0), {"percent": 0.01}),
+    "water": Range("cm", 0.0, 0.2, (0.0004, 0.06), {"mm or kg m-2": 0.1, "m": 100.0, "g m-2 or um": 1e-4}),
+    "dry_matter": Range("g cm-2", 0.0, 0.1, (0.0005, 0.04), {"g m-2": 1e-4, "mg cm-2": 1e-3, "kg m-2": 0.1}),
 }
 
-LARGEST_STRUCTURE = 10.0  # most layers of a leaf [1]; measured leaves have 1 to 3.5
+# Layers of a leaf and its contents; measured leaves have 1 to 3.5 layers.
+LEAF_RANGES = {"structure": Range("1", 1.0, 10.0, (1.0, 4.0)), **CONTENTS}
 
 # Half opening of the cone of incident light around the normal of the rough surface. [degree]
 _INCIDENCE = 40.0
@@ -56,6 +60,11 @@ class Leaf:
     TypeError
         If a value is not a number.
 
+    Warns
+    -----
+    UserWarning
+        If a number is possible, but usual in another unit.
+
     References
     ----------
     [Feret2017]_
@@ -66,7 +75,7 @@ class Leaf:
     >>> Leaf(water=12)
     Traceback (most recent call last):
     ...
-    ValueError: Leaf: water must be in [0, 0.2] cm, got 12: check its unit
+    ValueError: Leaf: water must be in [0, 0.2] cm, got 12: if it is in g m-2 or um, type water=0.0012
     """
 
     structure: NumberOrArray = 1.7
@@ -78,28 +87,22 @@ class Leaf:
     dry_matter: NumberOrArray = 0.0148
 
     def __post_init__(self):
-        ranges = {"structure": ("1", 1.0, LARGEST_STRUCTURE)}
-        ranges |= {name: (unit, 0.0, largest) for name, (unit, largest) in CONTENTS.items()}
-        for name, (unit, low, high) in ranges.items():
+        for name, known in LEAF_RANGES.items():
             value = getattr(self, name)
             if not hasattr(value, "ndim") or not value.ndim:
                 value = _number(name, value)
             # Lazy arrays are checked when they are computed.
             if isinstance(value, float | np.ndarray):
-                outside = np.atleast_1d(value)[np.atleast_1d((value < low) | (value > high))]
-                if outside.size or (isinstance(value, float) and np.isnan(value)):
-                    got = outside[0] if outside.size else value
-                    unit = "" if unit == "1" else f" {unit}"
-                    raise ValueError(f"Leaf: {name} must be in [{low:g}, {high:g}]{unit}, got {got:g}: check its unit")
+                check_range(f"Leaf: {name}", value, known)
             object.__setattr__(self, name, value)
 
     def contents(self) -> list[NumberOrArray]:
         """Structure and contents, in the order of the fields."""
-        return [getattr(self, name) for name in ("structure", *CONTENTS)]
+        return [getattr(self, name) for name in LEAF_RANGES]
 
     def varying(self) -> dict[str, Array]:
         """Contents that vary between leaves, a dict of str to array."""
-        values = {name: getattr(self, name) for name in ("structure", *CONTENTS)}
+        values = {name: getattr(self, name) for name in LEAF_RANGES}
         return {name: value for name, value in values.items() if not isinstance(value, float)}
 
 

@@ -17,7 +17,7 @@ from fifesim.ground.canopy.optics import (
     check_leaf_optics,
     leaf_means,
 )
-from fifesim.ground.canopy.prospect import CONTENTS, LARGEST_STRUCTURE, Leaf
+from fifesim.ground.canopy.prospect import CONTENTS, LEAF_RANGES, Leaf
 
 
 def test_defaults_are_calibrated_to_table_2_of_the_paper():
@@ -81,10 +81,10 @@ def one_by_one(leaf, name, values):
     )
 
 
-@pytest.mark.parametrize("name", ["structure", *CONTENTS])
+@pytest.mark.parametrize("name", list(LEAF_RANGES))
 def test_table_over_a_content_is_within_its_tolerance(name):
     """Over the whole range with its ends, and small contents, where optics change fastest."""
-    low, high = (1.0, LARGEST_STRUCTURE) if name == "structure" else (0.0, CONTENTS[name][1])
+    low, high = LEAF_RANGES[name].lowest, LEAF_RANGES[name].highest
     share = np.concatenate([[0, 1], np.random.default_rng(5).uniform(0, 1, 20) ** 4])
     values = np.minimum(low + share * (high - low), high)
     found = leaf_means(BANDS, Leaf(**{name: values}))

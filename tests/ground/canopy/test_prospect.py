@@ -70,7 +70,10 @@ def test_pile_of_infinitely_many_or_opaque_layers_transmits_nothing():
     [
         ({"structure": 0.9}, r"structure must be in \[1, 10\], got 0.9"),
         ({"chlorophyll": -1}, r"chlorophyll must be in \[0, 200\] ug cm-2, got -1"),
-        ({"dry_matter": 90}, r"dry_matter must be in \[0, 0.1\] g cm-2, got 90: check its unit"),
+        (
+            {"dry_matter": 90},
+            r"dry_matter must be in \[0, 0.1\] g cm-2, got 90: if it is in g m-2, .*=0.009",
+        ),
         ({"water": float("nan")}, r"water must be in .* got nan"),
     ],
 )
