@@ -167,9 +167,7 @@ def check_weather(name, values):
     """Raise ValueError for impossible values of a quantity, and warn of values outside the range of formulas."""
     limits = WEATHER_LIMITS[name]
     if not np.all(np.isfinite(values)):
-        raise ValueError(
-            f"{name} must be finite, got NaN or infinity: fill gaps of a raster with .fillna(value)"
-        )
+        raise ValueError(f"{name} must be finite, got NaN or infinity: fill gaps of a raster with .fillna(value)")
     for end in _checked_ends(name, values, limits):
         if end < limits.valid[0] or end > limits.valid[1]:
             warn(

@@ -19,7 +19,7 @@ from fifesim.grids import grid as grids
 from fifesim.ground.terrain import labels as terrain_labels
 from fifesim.scenario.ground import canopy_of, cut, elevation, ground_scene, truth_of
 from fifesim.scenario.scenario import Scenario
-from fifesim.sensor.pixel_labels import pixel_grid, shifts_of
+from fifesim.sensor.pixel_labels import pixel_grid, shifts_of, warn_of_pixels
 
 
 def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = False) -> xr.DataTree:
@@ -89,6 +89,18 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
     if reach:
         tree["terrain"].attrs = {f"reach_{side}": distance for side, distance in reach.items()}
     return tree
+
+
+def warn_of_scenario_pixels(*scenarios):
+    """Warn once if the pixels of scenarios have other sizes than those of their instruments."""
+    sizes = {}
+    for one in scenarios:
+        own, size = one.sensor, one.sensor.interval
+        if size != "native":
+            place = own.instrument, own.response, tuple(own.bands)
+            sizes.setdefault(place, (own.description, set()))[1].add(own.size if size == "product" else size)
+    for (_, _, bands), (description, found) in sizes.items():
+        warn_of_pixels(description, description.select(bands), found)
 
 
 def _on_slopes(setup, level, land):

@@ -18,6 +18,7 @@ from fifesim.base.messages import nearest
 from fifesim.scenario.distributions import distribution_of
 from fifesim.scenario.keys import COVERS, LAND_FORMS, OFFSET_PARTS
 from fifesim.scenario.scenario import Scenario, find_key, grid_keys, parse_scenario, put, values_of
+from fifesim.scenario.simulation import warn_of_scenario_pixels
 from fifesim.scenario.toml import full_path, load_values, write_tables
 
 _HEADING = "Study of a fifesim dataset. Make it with: fifesim dataset THIS_FILE -o chips.zarr -n 1000"
@@ -94,6 +95,7 @@ class Study:
         object.__setattr__(self, "draws", {key.name: distribution.table for key, distribution in drawn.items()})
         object.__setattr__(self, "drawn", drawn)
         _check_extremes(self)
+        warn_of_scenario_pixels(self.scenario)
 
     @cached_property
     def values(self) -> dict[str, Any]:

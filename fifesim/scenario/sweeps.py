@@ -15,7 +15,8 @@ from fifesim.analysis.regression_labels import check_pair, regress
 from fifesim.base.arguments import PLAIN, Array, Pairing, described
 from fifesim.scenario.ensemble import realise
 from fifesim.scenario.scenario import Scenario, find_key, in_text
-from fifesim.scenario.simulation import simulate
+from fifesim.scenario.simulation import simulate, warn_of_scenario_pixels
+from fifesim.sensor.pixel_labels import warned_of_pixels
 
 # Statistics of the regression of the truth on NDVI.
 STATISTICS = ("slope", "intercept", "r2", "residual_deviation", "n")
@@ -61,6 +62,12 @@ def sweep(
     TypeError
         If `axes` is not a mapping.
 
+    Warns
+    -----
+    UserWarning
+        If pixels are smaller than 0.8 or larger than 1.25 of the instrument's own, because its blur stays: the effect
+        of their size on R2 is mixed with an artefact.
+
     Examples
     --------
     >>> from fifesim import Scenario, sweep
@@ -76,13 +83,15 @@ def sweep(
     steps = {name: _axis(name, given) for name, given in axes.items()}
     names = STATISTICS if measures is None else tuple(measures)
     shape = (len(names),) + ((len(VARIABLES),) if measures is None else ())
-    points = []
+    points, scenarios = [], []
     for values in product(*(values for values, _, _ in steps.values())):
         one = scenario
         for value, (_, change, _) in zip(values, steps.values(), strict=True):
             one = change(one, value)
         one.complete()
+        scenarios.append(one)
         points.append(da.from_delayed(dask.delayed(_point)(one, measures, pair), shape=shape, dtype=float))
+    warn_of_scenario_pixels(*scenarios)
     sizes = tuple(len(values) for values, _, _ in steps.values())
     # Statistics first, then the axes.
     found = da.stack(points, axis=1).reshape(shape[0], *sizes, *shape[1:])
@@ -96,7 +105,8 @@ def sweep(
 def _point(scenario, measures, pair):
     """Results of one scenario, computed in the calling thread, because scenarios run in parallel."""
     if measures is not None:
-        run = simulate(scenario)
+        with warned_of_pixels():
+            run = simulate(scenario)
         kept = xr.DataTree.from_dict({name: run[name].to_dataset() for name in ("image", "truth")})
         # A user-defined measure may need any part of the run.
         kept = kept.map_over_datasets(lambda node: node.compute(scheduler="synchronous"))

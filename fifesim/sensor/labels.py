@@ -30,7 +30,7 @@ from fifesim.sensor.instrument_labels import (
     matching_bands,
     warn_of_others,
 )
-from fifesim.sensor.pixel_labels import bands_by_grid, directions_on, means_by_band, pixel_grid
+from fifesim.sensor.pixel_labels import bands_by_grid, directions_on, means_by_band, pixel_grid, warn_of_pixels
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.calibration import dn_to_radiance, gain_offset, product_gain_offset, radiance_to_dn
 from fifesim.sensor.response.noise import ALL, NoiseModel, NoiseModels, add_noise, check_kinds
@@ -226,6 +226,11 @@ def sense(
         If the instrument, its bands, noise or scaling are unknown; ``onto`` has another CRS or does not overlap the
         scene; a point spread is wider than the scene; or `to_toa` used another sun.
 
+    Warns
+    -----
+    UserWarning
+        If pixels are smaller than 0.8 or larger than 1.25 of the instrument's own, because its blur stays.
+
     See Also
     --------
     fifesim.base.footprints.regularize, fifesim.sensor.response.noise.add_noise,
@@ -267,6 +272,7 @@ def sensed(
 
     def image_of(toa, bands):
         pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
+        warn_of_pixels(description, bands, grids.cell_size(pixels))
         light = None if geometry is None else directions_on(pixels, geometry)
         scene = toa.drop_vars(ANGLES, errors="ignore") if light is None else toa
         means = means_by_band(

@@ -1,9 +1,13 @@
 """Pixels of an instrument over a labelled scene: their positions, and means over their footprints."""
 
+from contextlib import contextmanager
+from contextvars import ContextVar
+
 import numpy as np
 import xarray as xr
 
 from fifesim.base.arguments import described
+from fifesim.base.messages import warn
 from fifesim.grids import directions, projection
 from fifesim.grids import grid as grids
 from fifesim.grids.reductions import areas, regularized
@@ -78,6 +82,36 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
             f"interval must be 'native', or positive metres between pixels, down and across, got {interval}"
         )
     return grids.aligned_grid(scene, interval)
+
+
+# Pixels of other sizes, relative to the instrument's own, have too much or too little blur for their size. [1]
+_OWN = 0.8, 1.25
+
+_WARNED = ContextVar("fifesim_warned_of_pixels", default=False)
+
+
+@contextmanager
+def warned_of_pixels():
+    """Context in which pixels of other sizes give no warning, because their user was warned."""
+    token = _WARNED.set(True)
+    try:
+        yield
+    finally:
+        _WARNED.reset(token)
+
+
+def warn_of_pixels(instrument, bands, sizes):
+    """Warn if pixels [m] have other sizes than the pixels and samples of an instrument, because its blur stays."""
+    own = {size for band in bands for size in (instrument.pixel(band), *instrument.ground_intervals(band))}
+    others = sorted({size for size in sizes if not any(_OWN[0] <= size / each <= _OWN[1] for each in own)})
+    if others and not _WARNED.get():
+        pixels = " and ".join(f"{size:g}" for size in sorted({instrument.pixel(band) for band in bands}))
+        warn(
+            f"pixels of {', '.join(f'{size:g}' for size in others)} m have the blur of {instrument.name}, made for "
+            f"pixels of {pixels} m: smaller ones overlap and larger ones leave gaps, which changes R2. To compare "
+            "pixel sizes, write an instrument file for each, with gsd and the angles of interval, ifov and lsf scaled "
+            "alike (fifesim.read_instrument)"
+        )
 
 
 def _check_overlap(pixels, scene):

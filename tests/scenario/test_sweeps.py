@@ -89,3 +89,13 @@ def test_invalid_axes_are_rejected(small, stage, axes, said):
     with pytest.raises(ValueError) as caught:
         fifesim.sweep(small, axes)
     check_message(str(caught.value), said)
+
+
+def test_sweep_of_pixel_sizes_warns_once_that_the_blur_stays(small):
+    with pytest.warns(UserWarning, match="pixels of .* have the blur of") as caught:
+        fifesim.sweep(small, {"pixel": [15, 25, 30, 37, 60]}, {"n": lambda run: 1.0}).compute()
+    (text,) = [str(each.message) for each in caught if "have the blur" in str(each.message)]
+    assert text.startswith("pixels of 15, 60 m have the blur of TM, made for pixels of 30 m")
+    assert "fifesim.read_instrument" in text
+    with pytest.warns(UserWarning, match="pixels of 60 m have the blur of TM"):
+        fifesim.Study(small.replace(pixel=60), {"visibility": {"uniform": [5, 60]}})

@@ -1,5 +1,6 @@
 """Sensor on labelled rasters: images, calibration, digital numbers of products, and noise."""
 
+import warnings
 from dataclasses import replace
 from functools import partial
 
@@ -177,6 +178,33 @@ def test_one_band_becomes_an_image_of_one_band(toa):
 def test_invalid_input_raises(toa, call, message):
     with pytest.raises(ValueError, match=message):
         call(toa)
+
+
+def test_pixels_of_another_size_warn_that_the_blur_stays(toa, site):
+    """Also in comparisons and adjustments. Native sampling, and one grid for bands of several sizes, are usual."""
+    box = site.boundingbox
+
+    def onto(cell):
+        return fifesim.grid_at(site.crs, box.left, box.top, 600, 600, cell=cell)
+
+    lai = fifesim.lai_scene(site, seed=7)
+    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    verbs = [
+        lambda cell: toa.fifesim.sense("TM", onto=onto(cell)),
+        lambda cell: toa.fifesim.sense("TM", interval=cell),
+        lambda cell: rho.fifesim.as_seen_by("OLI", bands=["OLI4", "OLI5"], onto=onto(cell)),
+        lambda cell: lai.fifesim.compare(["TM"], fifesim.Setup(onto=onto(cell))),
+    ]
+    for verb in verbs:
+        for cell in (20.0, 60.0):
+            with pytest.warns(UserWarning, match=f"pixels of {cell:g} m have the blur of (TM|OLI), .* of 30 m"):
+                verb(cell)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", message="pixels of")
+            verb(25.0), verb(37.5)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message="pixels of")
+        toa.fifesim.sense("TM", interval="native")
 
 
 def test_geometry_argument_overrides_coordinates(toa):

@@ -31,6 +31,7 @@ from fifesim.output.progress import steps
 from fifesim.retrieval.description import Retrieval
 from fifesim.scenario.ground import ground_scene
 from fifesim.scenario.scenario import Scenario, grid_keys
+from fifesim.scenario.simulation import warn_of_scenario_pixels
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.provenance import DASH, origin_text
 
@@ -140,6 +141,7 @@ def budget(
     """
     scenario = budget_scenario() if scenario is None else scenario
     _check_map(scenario)
+    warn_of_scenario_pixels(scenario)
     if quantity is not None:
         target = target_of(quantity, weather)
         check_retrieval(retrieval, scenario)
