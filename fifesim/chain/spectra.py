@@ -8,7 +8,7 @@ import xarray as xr
 from fifesim.atmosphere.labels import diffuse_fraction
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import Names
-from fifesim.base.geometry import Geometry
+from fifesim.base.geometry import Geometry, warn_of_radians
 from fifesim.base.messages import nearest
 from fifesim.base.ranges import check_range
 from fifesim.ground.canopy import optics
@@ -276,6 +276,7 @@ def _values(canopies, n_bands):
 def _check(values):
     """Raise ValueError if a value is out of its range; NaN passes."""
     check_lai(values["lai"])
+    warn_of_radians(*(float(np.nan_to_num(np.abs(values[name])).max()) for name in ("sza", "raa")), "sza", "raa")
     for name, (low, high) in _RANGES.items():
         each = values[name]
         outside = (each < low) | (each > high) | ((each >= high) if name in ("sza", "vza") else False)

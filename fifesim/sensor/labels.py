@@ -14,6 +14,7 @@ from fifesim.base.arguments import Interval, NoiseKinds, NumberByBand, Offset, T
 from fifesim.base.bands import check_counts
 from fifesim.base.geometry import ANGLES
 from fifesim.base.lattice import check_seed
+from fifesim.base.messages import warn
 from fifesim.grids import cf, chunks, directions, swaths, windows
 from fifesim.grids import grid as grids
 from fifesim.grids.dates import by_date, epoch
@@ -139,8 +140,24 @@ def noise_models(instrument, bands, kinds, given=None):
                 f"only {known}; type noise='all' for the kinds that each band has, or give "
                 f"noise_models={{{band.name!r}: fifesim.NoiseModel(...)}}, in a scenario [sensor.noise_model]"
             )
+        _warn_of_large_noise(model, kinds if kinds != (ALL,) else model.kinds, band)
         models.append((model, model.kinds if kinds == (ALL,) else kinds))
     return models
+
+
+# Noise above this share of the largest radiance is probably in another unit; that of MSS, with 6 bits, is 0.02. [1]
+_LARGE_NOISE = 0.2
+
+
+def _warn_of_large_noise(model, kinds, band):
+    """Warn if the noise of a band at half of its largest radiance is implausible."""
+    noise = float(model.noise_equivalent_radiance(band.full_scale_radiance / 2, kinds))
+    if noise > _LARGE_NOISE * band.full_scale_radiance:
+        warn(
+            f"the noise of {band.name} is {noise:g} W m-2 sr-1 um-1 at half of its largest radiance, "
+            f"{band.full_scale_radiance:g}: thermal is a standard deviation in W m-2 sr-1 um-1, shot a variance at a "
+            "radiance of 1; convert counts or W m-2 sr-1 nm-1 to it"
+        )
 
 
 # Minimum weight of a footprint on valid cells. The footprint of Table 1, 30.32 m, extends 0.16 m beyond a scene of

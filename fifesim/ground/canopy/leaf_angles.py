@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from fifesim.base.arguments import described
 from fifesim.base.caches import cached
 from fifesim.base.messages import closest
+from fifesim.base.ranges import Range, check_range
 
 RADIANS_PER_DEGREE = math.pi / 180  # unlike numpy.radians, it serves complex angles, for derivatives
 
@@ -192,10 +193,12 @@ def _ellipsoidal(angle, axis_ratio):
     return 1 - area(height) / area(1.0)
 
 
+_MEAN_INCLINATION = Range("degree", 1, 89, (5, 85), {"radians": math.degrees(1)}, "it is the mean inclination")
+
+
 def _axis_ratio(mean):
     """Axis ratio of the ellipsoidal distribution with a mean inclination [degree]."""
-    if not 1 <= mean <= 89:
-        raise ValueError(f"campbell(mean angle) needs a mean inclination in [1, 89] degrees, got {mean:g}")
+    check_range("campbell: mean", mean, _MEAN_INCLINATION)
 
     def excess(log_ratio):
         # The mean is the integral of one minus the cumulative distribution.

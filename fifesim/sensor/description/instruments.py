@@ -84,6 +84,7 @@ def instrument(
     ('TM', 36.01, 30.315)
     """
     if isinstance(name, Instrument):
+        _check(name)
         found = name
     elif isinstance(name, Path) or (isinstance(name, str) and Path(name).suffix.lower() == ".toml"):
         path = Path(name).absolute()
@@ -208,6 +209,12 @@ def _catalogue():
             if found.setdefault(key(name), item) is not item:
                 raise ValueError(f"two instruments are called {name}: {found[key(name)].name} and {item.name}")
     return found
+
+
+@cached(128, "checked instruments")
+def _check(given):
+    """Check the units of an instrument that was made in Python, once."""
+    check_instrument_units(given)
 
 
 @cached(32, "own instrument files")
