@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy import optimize, stats
+from scipy import optimize, special, stats
 
 from fifesim.base import files
 from fifesim.base.arguments import FrozenDistribution, LaiDistribution
@@ -17,6 +17,9 @@ from fifesim.base.arrays import compiled, read_only
 from fifesim.base.caches import cached
 from fifesim.base.files import in_a_line, read_csv
 from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS
+
+# Distances from values to samples per batch, 1 MB.
+_RUN_OF_KERNELS = 2**17
 
 # A support that starts at zero may start this far below it.
 _ROUNDING = 1e-12
@@ -87,7 +90,7 @@ def lai_distribution(source: LaiDistribution) -> FrozenDistribution:
     if str(source) in treatments():
         return _treatment(str(source))
     if Path(source).suffix.lower() == ".csv":
-        return kernel_density(read_samples(source))
+        return _density_of(read_samples(source).tobytes())
     near = get_close_matches(str(source), treatments(), n=1, cutoff=0.3)
     hint = f"did you mean {near[0]!r}? " if near else ""
     raise ValueError(
@@ -151,6 +154,12 @@ def kernel_density(samples):
     return _ReflectedKernels(samples, bandwidth).freeze()
 
 
+# Return the same object for the same samples, because tables are cached by distribution.
+@cached(64, "kernel densities of LAI samples")
+def _density_of(samples):
+    return kernel_density(np.frombuffer(samples))
+
+
 class _ReflectedKernels(stats.rv_continuous):
     """Mixture of normals at the samples and at their mirror images, restricted to positive values."""
 
@@ -167,12 +176,13 @@ class _ReflectedKernels(stats.rv_continuous):
         return np.mean(stats.norm.pdf(z) + stats.norm.pdf(mirrored), axis=-1) / self._bandwidth
 
     def _cdf(self, x):
+        # As norm.cdf, without its checks of arguments.
         z, mirrored = self._distances(x)
-        return np.mean(stats.norm.cdf(z) + stats.norm.cdf(mirrored) - 1.0, axis=-1)
+        return np.mean(special.ndtr(z) + special.ndtr(mirrored) - 1.0, axis=-1)
 
     def _sf(self, x):
         z, mirrored = self._distances(x)
-        return np.mean(stats.norm.sf(z) + stats.norm.sf(mirrored), axis=-1)
+        return np.mean(special.ndtr(-z) + special.ndtr(-mirrored), axis=-1)
 
     def _ppf(self, q):
         nodes, below, _ = self._tables
@@ -186,7 +196,9 @@ class _ReflectedKernels(stats.rv_continuous):
     def _tables(self):
         """Probability below and above evenly spaced values, 1/8192 of the support apart."""
         nodes = np.linspace(self.a, self.b, 2**13 + 1)
-        return nodes, self._cdf(nodes), self._sf(nodes)
+        # A few nodes at a time, so that the distances to all samples stay in the cache of the processor.
+        parts = np.array_split(nodes, -(-nodes.size * self._samples.size // _RUN_OF_KERNELS))
+        return nodes, *(np.concatenate([each(part) for part in parts]) for each in (self._cdf, self._sf))
 
     def _distances(self, x):
         x = np.asarray(x)[..., None]

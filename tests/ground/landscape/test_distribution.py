@@ -84,6 +84,15 @@ def test_samples_are_read_from_csv_files(tmp_path):
     assert lai_distribution(bare).pdf(0.7) == pytest.approx(kernel_density([*SAMPLES, 0.0]).pdf(0.7), rel=1e-9)
 
 
+def test_tables_of_samples_are_kept_by_content(tmp_path):
+    """Equal samples share one distribution, by which tables are cached, whatever the file; a changed file does not."""
+    one, other = (write(tmp_path / name, "lai\n1\n2\n3\n4\n5\n") for name in ("one.csv", "other.csv"))
+    first = lai_distribution(one)
+    assert quantile_table(lai_distribution(other)) is quantile_table(first)
+    write(one, "lai\n1\n2\n3\n4\n5.5\n")
+    assert lai_distribution(one).support()[1] > first.support()[1]
+
+
 @pytest.mark.parametrize(
     "table, message",
     [
