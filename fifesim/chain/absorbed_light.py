@@ -14,7 +14,7 @@ from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import Time
 from fifesim.base.bands import Band
 from fifesim.base.geometry import Geometry
-from fifesim.chain.landscapes import canopies_of, check_used, land_of, stands_of
+from fifesim.chain.landscapes import canopies_of, check_used, land_of, stands_of, warn_of_tallgrass
 from fifesim.chain.steps import air_of
 from fifesim.grids import cf, chunks, directions
 from fifesim.grids import grid as grids
@@ -23,6 +23,7 @@ from fifesim.grids.dates import by_date
 from fifesim.grids.directions import Directions
 from fifesim.grids.grid import north_up
 from fifesim.grids.inputs import RasterOrDataset
+from fifesim.grids.sites import is_fife
 from fifesim.ground.canopy import labels as ground
 from fifesim.ground.canopy import layers
 from fifesim.ground.canopy.description import TALLGRASS, Canopy
@@ -81,6 +82,12 @@ def fpar(
     ------
     ValueError
         If LAI is negative, a fraction is outside 0 to 1, or the optics for "energy" are not spectra.
+
+    Warns
+    -----
+    UserWarning
+        If LAI is part of a landscape, whose other variables are left out; for "energy", if the atmosphere, leaves or
+        background are not given for a scene outside the FIFE site.
 
     Notes
     -----
@@ -173,6 +180,11 @@ def light(
     ValueError
         If a value is out of range, or leaf optics or background are given by band and not as spectra.
 
+    Warns
+    -----
+    UserWarning
+        As `surface_reflectance`.
+
     Notes
     -----
     Means over 0.4 to 0.7 um, weighted by the solar photons that reach the ground, direct and diffuse, in bands of 0.02
@@ -211,6 +223,8 @@ def _absorbed(lai, part, canopy, atmosphere, geometry, time):
     if "sza" in directions.varying(geometry):
         directions.uniform_geometry(geometry, "light")
     atmosphere = air_of(atmosphere, area)
+    if not is_fife(area):
+        warn_of_tallgrass(area.name or "the raster", land.classes, canopy, land.cells)
     check_spectra(stands_of(land.classes, canopy, land.cells))
     stands = canopies_of(land._replace(lai=area), PAR_BANDS, canopy)
     sza = float(geometry.sza)

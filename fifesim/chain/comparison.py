@@ -20,6 +20,7 @@ from fifesim.base.arguments import Names, Numbers, described
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
 from fifesim.base.geometry import fife_geometry
 from fifesim.base.messages import warn
+from fifesim.chain.landscapes import land_of
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.chain.steps import ndvi
 from fifesim.grids import cf, directions
@@ -94,6 +95,8 @@ def compare(
     bands = {find_instrument(name).name if name not in names else name: each for name, each in (bands or {}).items()}
     if set(bands) - set(names):
         raise ValueError(f"bands are given for {', '.join(set(bands) - set(names))}, which is not compared")
+    # Warn once if the leaf area is part of a landscape.
+    lai = lai if isinstance(lai, xr.Dataset) else land_of(lai).lai
     nodes, compared = {}, []
     for description in descriptions:
         given = bands.get(description.name)

@@ -183,8 +183,16 @@ class Land(NamedTuple):
 
 
 def land_of(scene):
-    """Split a scene into its parts."""
+    """Split a scene into its parts; the leaf area of a landscape, taken from its Dataset, causes a warning."""
     if not isinstance(scene, xr.Dataset):
+        if others := scene.attrs.get("landscape"):
+            warn(
+                f"{scene.name or 'the raster'} is the leaf area of a landscape with {others}, which this call leaves out: "
+                "call the method of the Dataset, such as land.fifesim.surface_reflectance(instrument), or, if only "
+                "leaf area is to vary, remove .attrs['landscape']"
+            )
+            scene = scene.copy(deep=False)
+            del scene.attrs["landscape"]
         return Land(scene)
     if "lai" not in scene.data_vars:
         raise ValueError(

@@ -393,7 +393,8 @@ def surface_reflectance(
     Warns
     -----
     UserWarning
-        If the atmosphere, leaves or background are not given for a scene outside the FIFE site.
+        If the atmosphere, leaves or background are not given for a scene outside the FIFE site, or if LAI is part of a
+        landscape, whose other variables are left out.
 
     References
     ----------

@@ -15,9 +15,10 @@ from fifesim.atmosphere.engines import light_at_ground
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import Time
 from fifesim.base.bands import Band
+from fifesim.base.messages import warn
 from fifesim.chain.absorbed_light import check_spectra
 from fifesim.chain.absorbed_light import fpar as absorbed_fraction
-from fifesim.chain.landscapes import canopies_of, land_of, stands_of
+from fifesim.chain.landscapes import canopies_of, land_of, stands_of, warn_of_tallgrass
 from fifesim.chain.steps import air_of
 from fifesim.grids import cf, directions
 from fifesim.grids import chunks as chunking
@@ -26,6 +27,7 @@ from fifesim.grids.dates import by_date
 from fifesim.grids.directions import Directions
 from fifesim.grids.grid import north_up, with_crs_of
 from fifesim.grids.inputs import RasterOrDataset
+from fifesim.grids.sites import is_fife
 from fifesim.ground.canopy.description import TALLGRASS, Canopy, is_raster
 from fifesim.ground.canopy.interpolation import interpolate, tabulate
 from fifesim.ground.canopy.labels import checked_scene
@@ -153,7 +155,7 @@ def gpp(
     lai : xarray.DataArray, dims (y, x), or xarray.Dataset
         Leaf area index, or a landscape with a variable ``lai``. [m2 m-2]
     weather : Weather, optional
-        By default `fife_weather`, which is assumed.
+        By default `fife_weather`, a day in June that is assumed, with a warning outside the FIFE site.
     model : {"light-use", "photosynthesis", "farquhar"}, optional
         Light use efficiency of MOD17, photosynthesis of leaves integrated over the canopy, or the biochemistry of
         sunlit and shaded leaves.
@@ -179,7 +181,8 @@ def gpp(
     Warns
     -----
     UserWarning
-        If weather is outside of the range of the formulas.
+        If weather is outside of the range of the formulas; if weather, or the leaves and background that determine
+        FPAR, are not given outside the FIFE site; or if LAI is part of a landscape, whose other variables are left out.
 
     References
     ----------
@@ -221,7 +224,7 @@ def evapotranspiration(
     lai : xarray.DataArray, dims (y, x), or xarray.Dataset
         Leaf area index, or a landscape with a variable ``lai``. [m2 m-2]
     weather : Weather, optional
-        By default `fife_weather`, which is assumed.
+        By default `fife_weather`, a day in June that is assumed, with a warning outside the FIFE site.
     model : {"penman-monteith", "pt-jpl"}, optional
         Transpiration of the canopy as in MOD16, or canopy, soil and intercepted rain after Priestley and Taylor.
     fpar : xarray.DataArray, dims (y, x), optional
@@ -242,7 +245,8 @@ def evapotranspiration(
     Warns
     -----
     UserWarning
-        If weather is outside of the range of the formulas.
+        If weather is outside of the range of the formulas; if weather, or the leaves and background that determine
+        FPAR, are not given outside the FIFE site; or if LAI is part of a landscape, whose other variables are left out.
 
     References
     ----------
@@ -268,7 +272,14 @@ def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time)
     """Labelled result of a model, dims (y, x)."""
     land, model = land_of(lai), LAND_MODELS[quantity][name]
     area = checked_scene(north_up(land.lai))
-    weather = fife_weather() if weather is None else weather
+    if weather is None:
+        weather = fife_weather()
+        if not is_fife(area):
+            warn(
+                f"the weather over {area.name or 'the raster'} is unknown: using the assumed June day of the FIFE site, "
+                f"{weather.temperature:g} K, {weather.shortwave:g} W m-2 and {weather.day_length:g} h; give "
+                "weather=fifesim.Weather(...)"
+            )
     geometry = directions.uniform_geometry(directions.given_geometry(geometry, area, time), quantity)
     if model.of_green_leaves and fpar is not None:
         raise ValueError(f"fpar has no effect with model={name!r}, which takes leaf area: leave it out")
@@ -280,7 +291,12 @@ def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time)
         area, share = _green(area, land, canopy or TALLGRASS), None
     elif fpar is None:
         share = absorbed_fraction(
-            lai, method="energy", leaves="green", canopy=canopy, atmosphere=atmosphere, geometry=geometry
+            lai if isinstance(lai, xr.Dataset) else land.lai,
+            method="energy",
+            leaves="green",
+            canopy=canopy,
+            atmosphere=atmosphere,
+            geometry=geometry,
         )
     else:
         cf.check_units(fpar, "fpar")
@@ -361,6 +377,11 @@ def albedo(
     ValueError
         If a property other than LAI varies by cell or class, or optics are given by band.
 
+    Warns
+    -----
+    UserWarning
+        As `surface_reflectance`.
+
     References
     ----------
     [Sellers1985]_
@@ -389,6 +410,8 @@ def albedo(
         )
     check_spectra({None: given})
     geometry = directions.uniform_geometry(directions.given_geometry(geometry, area, time), "albedo")
+    if not is_fife(area):
+        warn_of_tallgrass(area.name or "the raster", (), canopy, land.cells)
     stand = canopies_of(land._replace(lai=area), ALBEDO_BANDS, canopy)[None]
     shares, sky = light_at_ground(air_of(atmosphere, area), ALBEDO_BANDS, float(geometry.sza), photons=False)
     leaf = stand.leaf if stand.dead is None else mixed(stand.leaf, stand.dead, given.brown)

@@ -1,5 +1,7 @@
 """Landscapes through the chain: classes with different canopies, and the closed form of a pixel of two classes."""
 
+import warnings
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -231,3 +233,35 @@ def test_landscape_of_several_dates_is_computed_by_date(land, rho):
     np.testing.assert_array_equal(made[1], seen(season.isel(time=1)))
     means = season.fifesim.aggregate(30)
     assert means.lai.dims == ("time", "y", "x") and means.class_share.dims == ("class", "y", "x")
+
+
+ALONE = {
+    "surface_reflectance": lambda scene: scene.fifesim.surface_reflectance("TM", bands=["TM3"]),
+    "fpar": lambda scene: scene.fifesim.fpar(),
+    "light": lambda scene: scene.fifesim.light(),
+    "gpp": lambda scene: scene.fifesim.gpp(),
+    "evapotranspiration": lambda scene: scene.fifesim.evapotranspiration(),
+    "compare": lambda scene: scene.fifesim.compare(["TM"]),
+}
+
+
+@pytest.mark.parametrize("verb", ALONE)
+def test_leaf_area_of_a_landscape_alone_warns_once_of_the_rest(site, verb):
+    land = fifesim.landscape(site, soil=0.1, brown=0.2, seed=7)
+    with pytest.warns(UserWarning, match=r"landscape with brown, soil, which.*land\.fifesim\.surface") as found:
+        ALONE[verb](land.lai)
+    assert len(found) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        ALONE[verb](land)
+        ALONE[verb](land.lai.assign_attrs(landscape=""))
+
+
+def test_leaf_area_of_a_landscape_may_be_used_alone_where_nothing_is_lost(site, land):
+    """The paper's treatments differ in leaf area only, and statistics of leaf area need nothing else."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        fifesim.landscape(site, seed=7).lai.fifesim.fpar()
+        truth = land.lai.fifesim.aggregate(30)
+        fifesim.regress(truth, 0.5 * truth)
+    assert land.lai.attrs["landscape"] == "cover"

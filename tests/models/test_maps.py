@@ -1,5 +1,6 @@
 """Maps of production, evapotranspiration and albedo: labels, weather and error messages."""
 
+import warnings
 from functools import partial
 
 import numpy as np
@@ -137,3 +138,25 @@ def test_given_fpar_is_a_fraction_and_must_have_an_effect(lai):
     # FPAR of bare and almost bare ground is also a valid fraction.
     for area in (0 * lai, 0 * lai + 1e-9):
         assert (area.fifesim.gpp() >= 0).all()
+
+
+def test_weather_and_leaves_of_another_site_are_asked_for():
+    """Each argument that is given ends its warning; the energy balance needs the leaves, FPAR of a map does not."""
+    grid = fifesim.grid_at("EPSG:32633", 390000, 5820000, width=300, height=300, cell=30)
+    lai = fifesim.lai_scene(grid, seed=7)
+    sun, air = fifesim.Geometry(sza=40, saa=150), fifesim.Atmosphere(altitude=0.1)
+    canopy = fifesim.Canopy(leaf_optics=fifesim.Leaf(), background=0.2)
+    verb = partial(lai.fifesim.evapotranspiration, atmosphere=air, geometry=sun)
+    with pytest.warns(UserWarning, match=r"weather over lai is unknown.*June.*300 K.*weather=fifesim\.Weather"):
+        verb(canopy=canopy)
+    for model in ("light-use", "farquhar"):
+        with pytest.warns(UserWarning, match=r"weather over lai is unknown"):
+            lai.fifesim.gpp(model=model, geometry=sun, canopy=canopy, atmosphere=air)
+    for leaves in (verb, lambda **options: lai.fifesim.light(atmosphere=air, geometry=sun)):
+        with pytest.warns(UserWarning, match=r"vegetation of lai is unknown.*FIFE's tallgrass.*leaf_optics=") as found:
+            leaves(weather=WEATHER)
+        assert len(found) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        verb(weather=WEATHER, canopy=canopy)
+        lai.fifesim.evapotranspiration(WEATHER, fpar=0.1 * lai.rename("fpar"), geometry=sun)

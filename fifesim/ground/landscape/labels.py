@@ -226,6 +226,9 @@ def landscape(
             variables["lai"] = variables["lai"].assign_attrs(made_on_site(grid))
     variables |= made
     order = [name for name in ("lai", "cover", *given) if name in variables]
+    # Functions that get the leaf area alone warn of the properties that they do not see.
+    if others := [name for name in order[1:] if name != "cover" or any(each.canopy.given for each in table)]:
+        variables["lai"].attrs["landscape"] = ", ".join(others)
     site = {key: variables["lai"].attrs[key] for key in ("site",) if key in variables["lai"].attrs}
     return xr.Dataset({name: variables[name] for name in order}, attrs=site)
 
