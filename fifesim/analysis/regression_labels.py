@@ -94,8 +94,8 @@ def _common_index(y, x):
     sizes = [abs(values[1] - values[0]) for values in coordinates if values.size > 1]
     if sizes and max(sizes) > _SAME_PIXEL * min(sizes):
         raise ValueError(
-            f"pair='index' needs pixels of about one size, got {min(sizes):g} and {max(sizes):g} m: bring one raster "
-            "onto the other's grid first, for instance with .fifesim.aggregate"
+            f"pair='index' needs pixels of about one size, got {min(sizes):g} and {max(sizes):g} m: bring the finer "
+            f"one to the cells of the other with .fifesim.aggregate({max(sizes):g})"
         )
     rows, columns = min(y.sizes["y"], x.sizes["y"]), min(y.sizes["x"], x.sizes["x"])
     return y.isel(y=slice(rows), x=slice(columns)), x.isel(y=slice(rows), x=slice(columns))

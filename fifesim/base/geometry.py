@@ -142,9 +142,22 @@ def scattering_angle_cosine(sza, vza, raa):
     return -np.cos(sza) * np.cos(vza) - np.sin(sza) * np.sin(vza) * np.cos(raa)
 
 
+def check_place(latitude, longitude):
+    """Raise ValueError for numbers that are no latitude and longitude."""
+    for name, values, lowest, highest in (("latitude", latitude, -90, 90), ("longitude", longitude, -180, 360)):
+        values = np.atleast_1d(np.asarray(values, float))
+        wrong = ~((values >= lowest) & (values <= highest))
+        if wrong.any():
+            raise ValueError(
+                f"{name} must be in [{lowest}, {highest}] degrees, got {values[wrong][0]:g}: latitude comes first, then "
+                "longitude; swap them?"
+            )
+
+
 def sun_geometry(time, latitude, longitude, altitude=0.0):
     """Geometry of the sun at a time (UTC by default) and place, with a nadir view, by the NREL algorithm in pvlib."""
     # The zenith is true, not refracted.
+    check_place(latitude, longitude)
     return _sun(utc(time)[0], float(latitude), float(longitude), float(altitude))
 
 
@@ -157,6 +170,7 @@ def _sun(time, latitude, longitude, altitude):
 
 def sun_positions(times, latitude, longitude, altitude=0.0):
     """Times in UTC, solar zeniths, possibly above 90, and azimuths [degree], and distances [AU], shape (n,)."""
+    check_place(latitude, longitude)
     stamps = pd.DatetimeIndex([utc(time)[0] for time in times])
     numbers = [np.asarray(each, float) for each in (latitude, longitude, altitude)]
     if any(each.shape not in ((), (1,), stamps.shape) for each in numbers):

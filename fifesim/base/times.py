@@ -24,7 +24,7 @@ SITE_CORNERS = {"NAD83": ("EPSG:26914", 704970.0, 4334220.0), "NAD27": ("EPSG:26
 
 # Day and month in another order are another season, and a time alone is today's.
 _WRITTEN = re.compile(r"\s*\d{4}-?\d{2}-?\d{2}[T ]\d{2}(:?\d{2}.*)?\s*", re.ASCII)
-_YEARS = 1700, 2200  # range of dates in nanoseconds
+_YEARS = 1957, 2100  # from the first satellite on
 
 
 def utc(time, name="time"):
@@ -45,5 +45,8 @@ def utc(time, name="time"):
         raise ValueError(f"{name} must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}")
     if not _YEARS[0] <= stamp.year < _YEARS[1]:
         allowed = f"{_YEARS[0]} to {_YEARS[1]}"
-        raise ValueError(f"{name} must be a date and time of the years {allowed}, got {described(time)}")
+        raise ValueError(
+            f"{name} must be a date and time of the years {allowed}, in which there are satellites, got "
+            f"{described(time)}: correct the year"
+        )
     return pd.DatetimeIndex([stamp.tz_localize("UTC") if stamp.tzinfo is None else stamp.tz_convert("UTC")])

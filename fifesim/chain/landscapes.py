@@ -277,6 +277,11 @@ def aggregate(
     TypeError
         If the size is not a number.
 
+    Warns
+    -----
+    UserWarning
+        If whole blocks do not fill the raster.
+
     See Also
     --------
     fifesim.base.footprints.regularize
@@ -289,11 +294,15 @@ def aggregate(
     >>> lai.fifesim.aggregate(30).shape
     (10, 10)
     """
-    mean = partial(scaling_labels.aggregate_blocks, pixel=pixel, min_valid=min_valid, lsf=lsf)
     if not isinstance(array, xr.Dataset):
-        return mean(array)
+        means = scaling_labels.aggregate_blocks(array, pixel, min_valid=min_valid, lsf=lsf)
+        cells = grids.geobox(north_up(array))
+        cure = "choose a pixel that divides the raster, or crop the raster with .isel"
+        grids.whole_shape(np.multiply(cells.shape, grids.cell_size(cells)), (pixel, pixel), cure)
+        return means
     by_cell = {name: each for name, each in array.data_vars.items() if {"y", "x"} <= set(each.dims)}
     kept = {name: each for name, each in array.data_vars.items() if name != "cover"}
+    mean = partial(aggregate, pixel=pixel, min_valid=min_valid, lsf=lsf)
     out = {name: mean(each) if name in by_cell else each for name, each in kept.items()}
     if "brown" in by_cell and "lai" in by_cell:
         dead = mean(array["lai"] * array["brown"]) / out["lai"]

@@ -203,7 +203,7 @@ def aligned(arrays):
         if not grids.same_grid(own, others):
             raise ValueError(
                 f"{one.name!r} and {other.name!r} have different grids, {grids.in_words(own)} and "
-                f"{grids.in_words(others)}: resample one to the grid of the other"
+                f"{grids.in_words(others)}: {grids.onto_words(own, others)}"
             )
         _check_scalars(one, other)
     # xarray requires identical coordinates, but coordinates from other sources differ by rounding.

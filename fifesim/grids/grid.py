@@ -18,6 +18,7 @@ from odc.geo.xr import xr_coords
 from fifesim.base.arguments import Kind, Pair
 from fifesim.base.caches import Results, cached
 from fifesim.base.lattice import centres, whole_cells
+from fifesim.base.messages import warn
 from fifesim.grids import projection
 
 # Other names of y and x.
@@ -157,6 +158,8 @@ def _edge(origin, cell, size):
 
 _VALUES = "_values"  # the values of a raster among its coordinates
 _LONGEST = 2**31 - 1  # cells along a side, as whole numbers of image files count them
+# Smaller cells [m], and smaller grids [m] so close to the origin of their CRS [m], are probably in km.
+_FINEST, _NARROWEST, _FARTHEST_KM = 0.1, 30.0, 1e4
 
 CRSLike: TypeAlias = Annotated[
     MaybeCRS,
@@ -191,7 +194,7 @@ def grid_at(crs: CRSLike, west: float, north: float, width: float, height: float
     Warns
     -----
     UserWarning
-        If the corner looks like longitude and latitude.
+        If the corner looks like longitude and latitude, numbers look like km, or cells do not fill the size.
 
     Examples
     --------
@@ -207,8 +210,24 @@ def grid_at(crs: CRSLike, west: float, north: float, width: float, height: float
     if not max(width / across, height / down) < _LONGEST:
         raise ValueError(f"{size} over {_LONGEST} cells {of} along a side: use a smaller size, or a larger cell")
     projection.warn_of_degrees(west, north)
-    shape = int(height / down + 1e-6), int(width / across + 1e-6)
+    if min(down, across) < _FINEST or (max(width, height) < _NARROWEST and max(abs(west), abs(north)) < _FARTHEST_KM):
+        warn(
+            f"west={west:g}, north={north:g}, width={width:g}, height={height:g} and cell={across:g} are used as metres "
+            "but look like km: if they are, multiply them by 1000"
+        )
+    shape = whole_shape((height, width), (down, across), "type these, or a cell that divides the size")
     return _checked(shape, (across, 0.0, west, 0.0, -down, north), projection.horizontal(crs))
+
+
+def whole_shape(sizes, cells, cure):
+    """Numbers of whole cells in a height and a width [m]; a rest, which is left out, causes a warning with a cure."""
+    shape = tuple(int(size / cell + 1e-6) for size, cell in zip(sizes, cells, strict=True))
+    used = np.multiply(shape, cells)
+    if np.any(sizes - used > 1e-3 * np.asarray(cells)):
+        given, whole = ("height={:.10g} and width={:.10g} m".format(*each) for each in (sizes, used))
+        unit = "{:.6g} x {:.6g} m".format(*cells)
+        warn(f"whole cells of {unit} do not fill {given}: {whole} are used; {cure}")
+    return shape
 
 
 # Cached, because every step checks its grid.
@@ -372,8 +391,7 @@ def aligned_grid(grid, pixel):
     down, across = np.broadcast_to(np.asarray(pixel, float), 2)
     a = grid.affine
     height, width = -a.e * grid.shape.y, a.a * grid.shape.x
-    shape = int(height / down + 1e-6), int(width / across + 1e-6)
-    if not (down > 0 and across > 0 and min(shape) > 0):
+    if not (min(down, across) > 0 and min(shape := (int(height / down + 1e-6), int(width / across + 1e-6))) > 0):
         raise ValueError(f"no pixel of {down:g} x {across:g} m fits into a scene of {height:g} x {width:g} m")
     # Much smaller pixels are probably given in km.
     if min(-a.e / down, a.a / across) > 50:
@@ -394,9 +412,17 @@ def lattice_offset(one, other):
     rows, columns = (b.f - a.f) / a.e, (b.c - a.c) / a.a
     if one.crs != other.crs or not same_cell or max(abs(rows - round(rows)), abs(columns - round(columns))) > 1e-3:
         raise ValueError(
-            f"the rasters have different lattices, {in_words(one)} and {in_words(other)}: resample one to the other"
+            f"the rasters have different lattices, {in_words(one)} and {in_words(other)}: {onto_words(one, other)}"
         )
     return round(rows), round(columns)
+
+
+def onto_words(one, other):
+    """Text of the call that brings a raster of one of two grids onto the other."""
+    cells = sorted([one.affine.a, other.affine.a])
+    coarser = one.crs == other.crs and cells[1] > 1.01 * cells[0]
+    finer = f"the finer one with .fifesim.aggregate({cells[1]:g}), or " if coarser else ""
+    return f"bring {finer}one onto the other with .rio.reproject_match(other)"
 
 
 def cell_size(grid):

@@ -405,6 +405,8 @@ def covering_grid(path, cell, pixel, crs=None):
         projection.check_metres(crs, (x.min(), y.min(), x.max(), y.max()))
     west, north = np.floor(np.min(x) / pixel) * pixel, np.ceil(np.max(y) / pixel) * pixel
     width, height = np.ceil((np.max(x) - west) / pixel) * pixel, np.ceil((north - np.min(y)) / pixel) * pixel
+    # The last cells may reach beyond the last pixels.
+    width, height = (np.ceil(size / cell - 1e-6) * cell for size in (width, height))
     name = f"EPSG:{crs.to_epsg()}" if crs.to_epsg() else crs.to_wkt()
     return grids.grid_at(name, float(west), float(north), float(width), float(height), cell)
 

@@ -51,6 +51,11 @@ def fife_site(
     ValueError
         If cell, window or datum is invalid.
 
+    Warns
+    -----
+    UserWarning
+        If cells do not fill the site.
+
     Examples
     --------
     >>> from fifesim import fife_site
@@ -61,6 +66,8 @@ def fife_site(
         raise ValueError(f"cell must be in (0, {SITE_SIZE:g}] m, got {cell:g}")
     crs, west, north = SITE_CORNERS[datum]
     size = int(SITE_SIZE / cell + 1e-6)
+    if window is None:
+        grids.whole_shape((SITE_SIZE,) * 2, (cell,) * 2, "take a cell that divides the site")
     site = GeoBox((size, size), Affine(cell, 0.0, west, 0.0, -cell, north), crs)
     return site if window is None else _window(site, window)
 
@@ -132,7 +139,8 @@ def sun_position(
     Raises
     ------
     ValueError
-        If a time is invalid, the numbers of times and places differ, or the sun of a single time is below the horizon.
+        If a time or place is invalid, the numbers of times and places differ, or the sun of a single time is below the
+        horizon.
 
     References
     ----------

@@ -10,6 +10,7 @@ import xarray as xr
 
 from fifesim.base import files
 from fifesim.base.arguments import Kind, Pair, Time
+from fifesim.base.geometry import check_place
 from fifesim.base.times import utc
 from fifesim.grids import cf
 from fifesim.grids.sites import sun_position
@@ -80,8 +81,11 @@ def overpasses(
     if not first < last:
         raise ValueError(f"end must be after start, got {end} and {start}: swap them")
     latitude, longitude = map(float, place)
-    if not (-85 <= latitude <= 85 and -180 <= longitude <= 360):
-        raise ValueError(f"place must be latitude, from -85 to 85, and longitude, got {tuple(place)}: swap them?")
+    check_place(latitude, longitude)
+    if abs(latitude) > 85:
+        raise ValueError(
+            f"place must be at a latitude from -85 to 85, got {latitude:g}: closer to a pole, tracks cross"
+        )
     if not np.isfinite(phase):
         raise ValueError(f"phase must be a finite number of days, got {phase:g}")
     # Phases count from 1970, so that parts of a period have the dates of the whole.

@@ -182,8 +182,16 @@ def test_offset_of_two_grids_is_in_whole_cells():
     grid = box("EPSG:26914")
     assert grids.lattice_offset(grid, grid[1:, 2:]) == (1, 2)
     assert grids.lattice_offset(grid[1:, 2:], grid) == (-1, -2)
-    for other in (box("EPSG:32614"), box("EPSG:26914", Affine(30, 0, 705010, 0, -30, 4334000)), fifesim.fife_site(20)):
-        with pytest.raises(ValueError, match=r"different lattices.*resample one to the other$"):
+    shifted, match = box("EPSG:26914", Affine(30, 0, 705010, 0, -30, 4334000)), r"\.rio\.reproject_match\(other\)"
+    for other, cure in (
+        (box("EPSG:32614"), f"in EPSG:26914 and .* in EPSG:32614: bring one onto the other with {match}"),
+        (shifted, f": bring one onto the other with {match}"),
+        (
+            fifesim.fife_site(20),
+            rf": bring the finer one with \.fifesim\.aggregate\(30\), or one onto the other with {match}",
+        ),
+    ):
+        with pytest.raises(ValueError, match=rf"different lattices.*{cure}$"):
             grids.lattice_offset(grid, other)
 
 

@@ -2,6 +2,8 @@
 
 import datetime
 
+import warnings
+
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
 import pandas as pd
@@ -20,8 +22,22 @@ def test_site_is_15_km_wide_and_starts_at_its_corner():
     np.testing.assert_allclose(grid.boundingbox.bbox, (704970, 4319220, 719970, 4334220), rtol=0, atol=1e-6)
     own = fifesim.fife_site(30, datum="NAD27")
     assert own.crs.epsg == 26714 and (own.affine.c, own.affine.f) == (705000.0, 4334000.0)
-    assert tuple(fifesim.fife_site(29).shape) == (517, 517)
-    assert tuple(fifesim.grid_at("EPSG:32614", 0, 1e6, 100, 70, 30).shape) == (2, 3)
+
+
+def test_sizes_that_cells_do_not_fill_are_rounded_down_with_a_warning():
+    with pytest.warns(UserWarning, match=r"29 x 29 m do not fill height=15000 .* height=14993 and width=14993 m"):
+        assert tuple(fifesim.fife_site(29).shape) == (517, 517)
+    with pytest.warns(UserWarning, match="height=60 and width=90 m are used; type these") as found:
+        grid = fifesim.grid_at("EPSG:32614", 0, 1e6, 100, 70, 30)
+    assert tuple(grid.shape) == (2, 3) and len(found) == 1
+    with pytest.warns(UserWarning, match="height=15000 and width=990 m are used"):
+        assert fifesim.Scenario(grid={"width": 1000, "cell": 30}).geobox().shape.x == 33
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        for cell in (10 / 3, 30 / 9, 2.5, 25, 30):
+            fifesim.fife_site(cell)
+        fifesim.fife_site(29, window=((0, 10), (0, 10)))
+        fifesim.Scenario().geobox()
 
 
 def test_invalid_site_arguments_are_rejected():

@@ -57,7 +57,14 @@ toa = wrap_xr(np.tile(stripes, (540, 1)), scene).expand_dims(band=["TM3"])
 
 grids = {
     "aligned": fifesim.grid_at("EPSG:26914", west, north, size, size, cell=30),
-    "30.315 m": fifesim.grid_at("EPSG:26914", west, north, size, size, cell=tm.ground_interval),
+    "30.315 m": fifesim.grid_at(
+        "EPSG:26914",
+        west,
+        north,
+        59 * tm.ground_interval,
+        59 * tm.ground_interval,
+        cell=tm.ground_interval,
+    ),
     "10 m east": fifesim.grid_at("EPSG:26914", west + 10, north, size - 30, size, cell=30),
 }
 # sphinx_gallery_start_ignore
@@ -98,7 +105,12 @@ for arp, published in paper.items():
         toa = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa()
         truth, corner = lai.fifesim.aggregate(30), grid.boundingbox
         own = fifesim.grid_at(
-            "EPSG:26914", corner.left, corner.top, 1110, 1110, cell=tm.ground_interval
+            "EPSG:26914",
+            corner.left,
+            corner.top,
+            36 * tm.ground_interval,
+            36 * tm.ground_interval,
+            cell=tm.ground_interval,
         )
         aligned.append(fifesim.regress(truth, toa.fifesim.sense("TM").fifesim.ndvi()).r2)
         ndvi = toa.fifesim.sense("TM", onto=own).fifesim.ndvi()

@@ -28,6 +28,7 @@ from fifesim.grids.reductions import computed, extremes
 from fifesim.grids.sites import one_or_several
 
 HIGHEST_CLOUD = 20_000.0  # of clouds [m]
+_LOWEST_TOP = 50.0  # lower clouds are fog, or a height in km [m]
 LOWEST_SUN = 85.0  # zenith angle beyond which shadows have no end [degree]
 LEAST = 0.1  # optical thickness from which a cell counts as cloud; sensors miss thinner clouds [1]
 DEEPEST_GROUND = 500.0  # ground below the altitude of the atmosphere that the margin of relief allows for [m]
@@ -94,6 +95,11 @@ def cloud_field(
     ------
     ValueError
         If cover, thickness, length, height, drift, time or seed is out of range, or the base is above the top.
+
+    Warns
+    -----
+    UserWarning
+        If the height is less than 50 m, which may be in km.
 
     References
     ----------
@@ -175,6 +181,10 @@ def _base_and_top(height):
     _check_range("top", top, 0, HIGHEST_CLOUD, " m above the ground")
     if base > top:
         raise ValueError(f"the base of clouds must not be above their top, got {base:g} and {top:g} m: swap them")
+    if top < _LOWEST_TOP:
+        warn(
+            f"clouds {base:g} to {top:g} m above the ground are taken as fog: if the height is in km, multiply it by 1000"
+        )
     return base, top
 
 
@@ -304,6 +314,9 @@ def _checked(clouds, scene):
             "fifesim.cloud_field"
         )
     for name, quantity in quantities.items():
+        if clouds[name].dtype.kind not in "iuf":
+            example = f"clouds.assign({name}=1500.0)"
+            raise ValueError(f"{name} of clouds must hold numbers, got {clouds[name].dtype}: type {example}")
         cf.check_units(clouds[name], quantity)
     fields = (clouds[name].astype(float, copy=False) for name in quantities)
     return [with_crs_of(each.transpose("y", "x"), scene) if each.ndim else each for each in fields]

@@ -308,7 +308,8 @@ def _offset(dem_grid, grid):
     except ValueError:
         raise ValueError(
             f"the dem has other cells ({grids.extent(dem_grid)}, {dem_grid.affine.a:g} m) than the raster "
-            f"({grids.extent(grid)}, {grid.affine.a:g} m): bring it onto the raster's grid first"
+            f"({grids.extent(grid)}, {grid.affine.a:g} m): give fifesim.fine_dem(dem, raster.odc.geobox) for smaller "
+            f"cells, dem.fifesim.aggregate({grid.affine.a:g}) for larger ones, or dem.rio.reproject_match(raster)"
         ) from None
     beyond = rows + grid.shape.y > dem_grid.shape.y or columns + grid.shape.x > dem_grid.shape.x
     if rows < 0 or columns < 0 or beyond:

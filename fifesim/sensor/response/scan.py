@@ -16,6 +16,7 @@ from scipy.sparse import csr_array
 
 from fifesim.base.arguments import check_fields
 from fifesim.base.arrays import compiled, jitable
+from fifesim.base.geometry import check_place
 
 # Mean radius of the earth [m].
 EARTH_RADIUS = 6.371e6
@@ -55,10 +56,11 @@ class Track:
 
     def __post_init__(self):
         check_fields(self)
-        if not -90 < self.latitude < 90:
+        check_place(self.latitude, self.longitude)
+        if abs(self.latitude) == 90:
             raise ValueError(f"the latitude of a track must be in (-90, 90) degrees, got {self.latitude}")
-        if not np.all(np.isfinite([self.longitude, self.heading])):
-            raise ValueError(f"longitude and heading must be finite degrees, got {self.longitude} and {self.heading}")
+        if not np.isfinite(self.heading):
+            raise ValueError(f"heading must be finite degrees, got {self.heading}")
 
     @classmethod
     def from_inclination(
@@ -105,6 +107,7 @@ class Track:
         >>> round(Track.from_inclination(39.0, -96.5, 98.2, 705e3).heading, 1)
         193.6
         """
+        check_place(latitude, longitude)
         cos_i, cos_phi = np.cos(np.radians(inclination)), np.cos(np.radians(latitude))
         if cos_phi <= abs(cos_i):
             raise ValueError(f"an orbit of inclination {inclination:g} degrees does not reach latitude {latitude:g}")

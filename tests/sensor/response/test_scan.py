@@ -94,7 +94,9 @@ def test_ground_track_heading_includes_earth_rotation():
 def test_invalid_tracks_raise():
     for call, said in (
         (lambda: Track(90.0, 0.0, 0.0), "latitude"),
-        (lambda: Track(0.0, np.nan, 0.0), "finite"),
+        (lambda: Track(0.0, np.nan, 0.0), r"longitude must be in \[-180, 360\] degrees, got nan"),
+        (lambda: Track(0.0, 0.0, np.nan), "heading must be finite"),
+        (lambda: Track.from_inclination(-96.0, 39.0, 98.2, 705e3), "latitude must be in .*got -96.*swap"),
         (lambda: Track.from_inclination(85.0, 0.0, 98.2, 705e3), "does not reach latitude 85"),
     ):
         with pytest.raises(ValueError, match=said):
