@@ -149,7 +149,7 @@ def check_place(latitude, longitude):
         wrong = ~((values >= lowest) & (values <= highest))
         if wrong.any():
             raise ValueError(
-                f"{name} must be in [{lowest}, {highest}] degrees, got {values[wrong][0]:g}: latitude comes first, then "
+                f"{name} must be in [{lowest}, {highest}] degrees, got {values[wrong][0]:g}: latitude is first, then "
                 "longitude; swap them?"
             )
 

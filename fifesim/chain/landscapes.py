@@ -187,7 +187,7 @@ def land_of(scene):
     if not isinstance(scene, xr.Dataset):
         if others := scene.attrs.get("landscape"):
             warn(
-                f"{scene.name or 'the raster'} is the leaf area of a landscape with {others}, which this call leaves out: "
+                f"{scene.name or 'the raster'} is leaf area of a landscape with {others}, which this call leaves out: "
                 "call the method of the Dataset, such as land.fifesim.surface_reflectance(instrument), or, if only "
                 "leaf area is to vary, remove .attrs['landscape']"
             )

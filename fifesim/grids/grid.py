@@ -212,8 +212,8 @@ def grid_at(crs: CRSLike, west: float, north: float, width: float, height: float
     projection.warn_of_degrees(west, north)
     if min(down, across) < _FINEST or (max(width, height) < _NARROWEST and max(abs(west), abs(north)) < _FARTHEST_KM):
         warn(
-            f"west={west:g}, north={north:g}, width={width:g}, height={height:g} and cell={across:g} are used as metres "
-            "but look like km: if they are, multiply them by 1000"
+            f"west={west:g}, north={north:g}, width={width:g}, height={height:g} and cell={across:g} are used as "
+            "metres but look like km: if they are, multiply them by 1000"
         )
     shape = whole_shape((height, width), (down, across), "type these, or a cell that divides the size")
     return _checked(shape, (across, 0.0, west, 0.0, -down, north), projection.horizontal(crs))

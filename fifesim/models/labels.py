@@ -276,7 +276,7 @@ def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time)
         weather = fife_weather()
         if not is_fife(area):
             warn(
-                f"the weather over {area.name or 'the raster'} is unknown: using the assumed June day of the FIFE site, "
+                f"the weather over {area.name or 'the raster'} is unknown: using an assumed June day of the FIFE site, "
                 f"{weather.temperature:g} K, {weather.shortwave:g} W m-2 and {weather.day_length:g} h; give "
                 "weather=fifesim.Weather(...)"
             )

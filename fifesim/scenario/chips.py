@@ -11,6 +11,7 @@ import xarray as xr
 
 from fifesim.base.lattice import generator
 from fifesim.grids import grid as grids
+from fifesim.grids.sites import made_on_site
 from fifesim.ground.landscape.autoregression import FIELD_TILE
 from fifesim.scenario.distributions import points
 from fifesim.scenario.scenario import NamedKey, in_text
@@ -83,9 +84,11 @@ class Chips:
         west, north = self.corners[chip].tolist()
         drawn |= {("grid", "west"): west, ("grid", "north"): north}
         try:
-            return self.study.scenario_with(drawn)
+            scenario = self.study.scenario_with(drawn)
         except ValueError as error:
             raise ValueError(f"chip {chip}: {error}") from None
+        scenario._made_on = made_on_site(self.study.scenario.geobox())
+        return scenario
 
     def table(self):
         """Drawn values and locations of the chips, dims (chip,), by full key name."""

@@ -136,12 +136,14 @@ def ground_scene(scenario, grid, chunks=None, dem=None):
     """Ground of a scenario: a Dataset with ``lai`` [m2 m-2], ``cover`` and varying properties."""
     land, own = scenario.ground, scenario.landscape
     if not own.is_one():
-        return _landscape(scenario, grid, chunks, dem)
-    if land.lai_file:
-        lai = lai_window(land.lai_file, grid, chunks=chunks)
+        scene = _landscape(scenario, grid, chunks, dem)
+    elif land.lai_file:
+        scene = lai_window(land.lai_file, grid, chunks=chunks).to_dataset(name="lai")
     else:
         lai = lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
-    return lai.to_dataset(name="lai")
+        scene = lai.to_dataset(name="lai")
+    scene["lai"].attrs |= scenario._made_on
+    return scene
 
 
 def _landscape(scenario, grid, chunks, dem):
@@ -172,7 +174,7 @@ def _landscape(scenario, grid, chunks, dem):
 def warn_of_canopy(scenario):
     """Warn if the default tallgrass optics of FIFE are used for an LAI map or another site."""
     own = scenario.ground.lai_file
-    if own or not on_fife_site(scenario.geobox()):
+    if own or not (scenario._made_on or on_fife_site(scenario.geobox())):
         name, classes = Path(own).name if own else "the scene", _classes(scenario)
         # Drawn properties are represented by their means.
         cells = {name: each.mean for name, each in drawn_properties(scenario).items()}

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from odc.geo.geobox import GeoBox
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from fifesim.atmosphere import six_s
 from fifesim.atmosphere.engines import check_zenith
@@ -203,6 +203,8 @@ class Scenario(Keys):
     """
 
     _in_words: ClassVar[str] = "a fifesim.Scenario, as fifesim.read_scenario gives it"
+    # Attributes of a chip beside the site, whose landscape continues that of a study on the site.
+    _made_on: dict = PrivateAttr(default_factory=dict)
 
     ground: Ground = Ground()
     classes: dict[str, CoverStand] = Field({})

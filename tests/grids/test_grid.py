@@ -188,7 +188,7 @@ def test_offset_of_two_grids_is_in_whole_cells():
         (shifted, f": bring one onto the other with {match}"),
         (
             fifesim.fife_site(20),
-            rf": bring the finer one with \.fifesim\.aggregate\(30\), or one onto the other with {match}",
+            rf"the finer one with \.fifesim\.aggregate\(30\), or one onto the other with {match}",
         ),
     ):
         with pytest.raises(ValueError, match=rf"different lattices.*{cure}$"):

@@ -1,7 +1,6 @@
 """The FIFE site and its sun position."""
 
 import datetime
-
 import warnings
 
 import numpy as np

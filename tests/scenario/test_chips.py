@@ -1,13 +1,17 @@
 """Chips: landscapes lie apart, draws follow the study, and each chip is a scenario."""
 
 import itertools
+import warnings
 
 import numpy as np
 import pytest
 
+from fifesim.grids.sites import on_fife_site
 from fifesim.ground.landscape.autoregression import FIELD_TILE
 from fifesim.scenario.chips import chips_of, first_cell_of_chip, ring_place
+from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.simulation import simulate
 from fifesim.scenario.studies import Study
 
 SMALL = {"grid": {"width": 180.0, "height": 180.0}, "terrain": {"dem": "flat"}}
@@ -134,3 +138,20 @@ def test_tile_includes_the_margins_of_its_chips():
     for row, column in places:
         assert (row - 24) // 1008 == (row + 356) // 1008 and (column - 24) // 1008 == (column + 356) // 1008
     assert len({(row // 1008, column // 1008) for row, column in places}) == 2
+
+
+@pytest.mark.parametrize("cover", ["none", "pastures"])
+def test_chips_beside_the_site_have_the_vegetation_of_their_study(cover):
+    """Landscapes of a study on the site begin west of it; a study elsewhere asks for its leaves."""
+    keys = {"grid": {"width": 600.0, "height": 600.0}, "terrain": {"dem": "flat"}, "landscape": {"cover": cover}}
+    chip = chips_of(Study(parse_scenario(keys), {"visibility": {"uniform": [10, 60]}}, landscapes=3), 6).scenario(4)
+    assert not on_fife_site(chip.geobox())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        warn_of_canopy(chip)
+        simulate(chip.complete(), complete=True)
+    keys["grid"] |= {"west": 600000.0, "north": 4300000.0}
+    keys |= {"geometry": {"sza": 30.0, "saa": 150.0}, "atmosphere": {"altitude": 0.3}}
+    chip = chips_of(Study(parse_scenario(keys), {"visibility": {"uniform": [10, 60]}}, landscapes=3), 6).scenario(4)
+    with pytest.warns(UserWarning, match="vegetation of the scene is unknown"):
+        warn_of_canopy(chip)

@@ -183,7 +183,8 @@ def _base_and_top(height):
         raise ValueError(f"the base of clouds must not be above their top, got {base:g} and {top:g} m: swap them")
     if top < _LOWEST_TOP:
         warn(
-            f"clouds {base:g} to {top:g} m above the ground are taken as fog: if the height is in km, multiply it by 1000"
+            f"clouds {base:g} to {top:g} m above the ground are taken as fog: if their height is in km, multiply it by "
+            "1000"
         )
     return base, top
 
