@@ -104,6 +104,7 @@ def air_bands_and_geometry(array, atmosphere, geometry, instrument, time=None, *
 
 def as_bands_of(raster, instrument, name):
     """Reflectance with bands named after an instrument, dims ([band], y, x)."""
+    _check_is_image(raster, name)
     array = incoming(raster, name)
     description = carried_instrument(array) if instrument is None else find_instrument(instrument)
     if description is None or "band" not in array.coords:
@@ -116,6 +117,12 @@ def as_bands_of(raster, instrument, name):
     names, centres = [band.name for band in bands], [band.wavelength for band in bands]
     along_band = cf.band_coordinates(band=names, wavelength=centres)
     return array.assign_coords({key: each if array["band"].ndim else each[0] for key, each in along_band.items()})
+
+
+def _check_is_image(raster, wanted):
+    """Raise ValueError for leaf area and other quantities that are no light; reflectance of both levels passes."""
+    if isinstance(raster, xr.DataArray):
+        cf.check_quantity(raster, wanted, "surface_reflectance", "toa_reflectance", "toa_radiance", "dn")
 
 
 def _responses(array, instrument):
@@ -242,6 +249,7 @@ def _is_recorded(image):
 
 def planetary_reflectance(image):
     """Reflectance of an image, converted from digital numbers or radiance, dims (band, y, x). [1]"""
+    _check_is_image(image, "toa_reflectance")
     reflectance = sensor.to_reflectance(image) if _is_recorded(image) else incoming(image, "toa_reflectance")
     check_wavelengths(reflectance)
     return reflectance

@@ -179,6 +179,8 @@ _SAME_UNITS = dict.fromkeys(("", "m2 m-2", "dimensionless", "unitless", "reflect
 _WORDS = {name: name for name in ("lai", "ndvi", "evi", "evi2", "savi", "msavi", "ndwi", "ndmi", "nirv", "fpar", "dem")}
 _WORDS |= {"fapar": "fpar", "elevation": "dem", "altitude": "dem", "reflectance": "surface_reflectance"}
 _WORDS |= {"radiance": "toa_radiance"} | dict.fromkeys(("quality", "qa", "qc", "flag", "flags", "mask"), "quality")
+# These names alone decide, where no standard name does.
+_KNOWN_BY_NAME = {"lai", "ndvi", "fpar", "dem"}
 _OTHER_UNITS = {"%", "percent", "m", "metre", "metres", "meter", "meters", "ft", "feet", "degree", "degrees", "k"}
 
 
@@ -187,6 +189,7 @@ _STEPS = {
     ("toa_bidirectional_reflectance", "surface_reflectance"): ".fifesim.to_surface(atmosphere) of it first",
     ("surface_bidirectional_reflectance", "toa_reflectance"): ".fifesim.to_toa(atmosphere) of it first",
     ("leaf_area_index", "surface_reflectance"): ".fifesim.surface_reflectance(instrument) of it first",
+    ("leaf_area_index", "toa_reflectance"): ".fifesim.surface_reflectance(instrument).fifesim.to_toa() of it first",
 }
 
 
@@ -219,22 +222,26 @@ def label(array, name, *, history, source=None, **provenance):
 
 def check_quantity(array, *names):
     """Raise ValueError for an array of another quantity; missing metadata are accepted."""
-    check_units(array, *names)
     if "gain" in array.coords and "dn" not in names:
         raise ValueError(
             f"{array.name or 'the array'} holds digital numbers, where {QUANTITIES[names[0]].long_name} is needed: "
             "convert it with .fifesim.to_reflectance()"
         )
-    stated = array.attrs.get("standard_name")
-    if stated not in _LONG_NAMES:
-        return
-    for name in names:
-        if QUANTITIES[name].standard_name == stated:
+    stated, key, cure = array.attrs.get("standard_name"), "standard_name", "remove .attrs['standard_name']"
+    wanted = [QUANTITIES[name].standard_name for name in names]
+    if stated not in _LONG_NAMES or stated in wanted:
+        check_units(array, *names)
+        # Names of reflectance do not tell its level.
+        found = _named(str(array.name)) & _KNOWN_BY_NAME
+        if stated in _LONG_NAMES or not found:
+            return
+        stated, key, cure = QUANTITIES[min(found)].standard_name, "name", f"type .rename({names[0]!r})"
+        if stated in wanted:
             return
     raise ValueError(
-        f"{array.name or 'the array'} is {_LONG_NAMES[stated]} by its standard_name, where "
+        f"{array.name or 'the array'} is {_LONG_NAMES[stated]} by its {key}, where "
         f"{QUANTITIES[names[0]].long_name} is needed: take {_STEPS.get((stated, names[0]), 'the step between')}, "
-        "or remove .attrs['standard_name'] if it is wrong"
+        f"or {cure} if it is wrong"
     )
 
 

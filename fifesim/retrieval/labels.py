@@ -21,12 +21,6 @@ _ANGLES = ("sza", "saa", "vza", "vaa")
 # Bands that differ by more than this belong to another instrument. [um]
 _SAME_BAND = 0.01
 
-_STANDARD_NAMES = {
-    "toa": "toa_bidirectional_reflectance",
-    "surface": "surface_bidirectional_reflectance",
-}
-_OTHER = {"toa": ".fifesim.to_toa()", "surface": ".fifesim.to_surface()"}
-
 _FLAG = {
     "standard_name": "status_flag",
     "long_name": "flag of the retrieval",
@@ -143,13 +137,7 @@ def _check_level(image, level):
         raise ValueError(
             "the image holds digital numbers: convert it with .fifesim.to_reflectance(), or apply its scale and offset"
         )
-    name, wanted = image.attrs.get("standard_name", ""), _STANDARD_NAMES[level]
-    if name and name != wanted:
-        where = {"toa": "at the top of the atmosphere", "surface": "of the surface"}[level]
-        raise ValueError(
-            f"the retrieval needs reflectance {where} ({wanted}), the image is {name}: convert it, for instance with "
-            f"{_OTHER[level]}"
-        )
+    cf.check_quantity(image, f"{level}_reflectance")
 
 
 def _selected(image, names, wavelengths, instrument):

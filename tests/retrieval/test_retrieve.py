@@ -273,7 +273,7 @@ def test_sl2p_maps_sentinel_2_reflectance(image):
     assert np.isnan(found.lai.values[0, 0]) and found.flag.values[0, 0] == -1 and found.flag.values[1, 1] == 0
     with pytest.raises(ValueError, match="lacks MSI5"):
         light.sel(band=["MSI3", "MSI4"]).fifesim.retrieve("sl2p")
-    with pytest.raises(ValueError, match="needs reflectance of the surface"):
+    with pytest.raises(ValueError, match="surface reflectance factor is needed"):
         light.assign_attrs(standard_name="toa_bidirectional_reflectance").fifesim.retrieve("sl2p")
 
 
@@ -292,7 +292,7 @@ def test_sl2p_maps_sentinel_2_reflectance(image):
         (
             lambda light: light[[0] * 8].assign_coords(band=SL2P_BANDS),
             {"retrieval": "sl2p"},
-            "needs reflectance of the surface",
+            "surface reflectance factor is needed",
         ),
         (lambda light: light.assign_coords(gain=1.0, offset=0.0), {}, "digital numbers"),
         (lambda light: (1e4 * light).fillna(0).astype("uint16"), {}, "digital numbers"),
