@@ -88,7 +88,12 @@ class _Accessor:
         if name in PUBLIC:
             kinds = " or ".join(f"an xarray.{kind}" for kind in PUBLIC[name].methods_of)
             what = f"a method of {kinds}" if kinds else "no method of a raster"
-            message = f"{name} is {what}, this is an xarray.{self.kind}; fifesim.{name} is the function"
+            function = f"fifesim.{name} is the function"
+            if kinds and self.kind == "DataTree":
+                function = f"call it at each node, such as tree[path].dataset[name].fifesim.{name}(...)"
+            elif "DataArray" in PUBLIC[name].methods_of:
+                function = f"call it on a variable, such as dataset[name].fifesim.{name}(...)"
+            message = f"{name} is {what}, this is an xarray.{self.kind}; {function}"
         else:
             suggestion = f"{nearest(name, self.methods)}print(raster.fifesim) lists them"
             message = f"fifesim has no method {name!r} of an xarray.{self.kind}: {suggestion}"

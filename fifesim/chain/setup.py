@@ -8,7 +8,7 @@ from typing import Literal
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.atmosphere.clouds.labels import cast_clouds
+from fifesim.atmosphere.clouds.labels import Clouds, cast_clouds
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import (
     Coupling,
@@ -87,7 +87,7 @@ class Setup:
     coupling: Coupling = "lambert"
     adjacency: bool = False
     surroundings: Surroundings | None = None
-    clouds: xr.Dataset | None = None
+    clouds: Clouds | None = None
     onto: GeoBox | None = None
     interval: Interval | None = None
     offset: Offset = (0.0, 0.0)

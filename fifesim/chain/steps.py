@@ -11,7 +11,7 @@ import xarray as xr
 from fifesim.analysis import index_labels
 from fifesim.atmosphere import engines
 from fifesim.atmosphere import labels as atmosphere_labels
-from fifesim.atmosphere.clouds.labels import with_clouds
+from fifesim.atmosphere.clouds.labels import Clouds, with_clouds
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import Coupling, Kind, Names, Surroundings, Time, described
 from fifesim.base.bands import Band
@@ -473,7 +473,7 @@ def to_toa(
     elevation: xr.DataArray | None = None,
     adjacency: bool = False,
     surroundings: Surroundings | None = None,
-    clouds: xr.Dataset | None = None,
+    clouds: Clouds | None = None,
     coupling: Coupling | None = None,
 ) -> xr.DataArray:
     """

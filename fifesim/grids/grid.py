@@ -251,10 +251,9 @@ def check_grid(grid):
         )
     a = grid.affine
     if a.b or a.d or a.a <= 0 or a.e >= 0:
-        raise ValueError(
-            f"the grid must be north up and not rotated, got the transform {tuple(a)[:6]}: "
-            "sort it with .sortby('y', ascending=False) or reproject it"
-        )
+        sorts = ".sortby('x')" * (a.a < 0) + ".sortby('y', ascending=False)" * (a.e > 0)
+        cure = "reproject it" if a.b or a.d else f"sort it with {sorts}"
+        raise ValueError(f"the grid must be north up and not rotated, got the transform {tuple(a)[:6]}: {cure}")
     projection.check_metres(grid.crs.proj, tuple(grid.boundingbox))
     return grid
 

@@ -140,7 +140,7 @@ def gpp(
     lai: RasterOrDataset,
     weather: Weather | None = None,
     *,
-    model: Literal["light-use", "photosynthesis", "farquhar"] = "light-use",
+    model: Literal["light-use", "MOD17", "photosynthesis", "farquhar"] = "light-use",
     fpar: xr.DataArray | None = None,
     canopy: Canopy | None = None,
     atmosphere: Atmosphere | None = None,
@@ -156,9 +156,9 @@ def gpp(
         Leaf area index, or a landscape with a variable ``lai``. [m2 m-2]
     weather : Weather, optional
         By default `fife_weather`, a day in June that is assumed, with a warning outside the FIFE site.
-    model : {"light-use", "photosynthesis", "farquhar"}, optional
-        Light use efficiency of MOD17, photosynthesis of leaves integrated over the canopy, or the biochemistry of
-        sunlit and shaded leaves.
+    model : {"light-use", "MOD17", "photosynthesis", "farquhar"}, optional
+        Light use efficiency of MOD17 (two names), photosynthesis of leaves integrated over the canopy, or the
+        biochemistry of sunlit and shaded leaves.
     fpar : xarray.DataArray, dims (y, x), optional
         For "light-use" only; by default the light that green leaves absorb,
         ``fpar(lai, method="energy", leaves="green")``.
@@ -270,7 +270,7 @@ def evapotranspiration(
 
 def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time):
     """Labelled result of a model, dims (y, x)."""
-    land, model = land_of(lai), LAND_MODELS[quantity][name]
+    land, model = land_of(lai), LAND_MODELS[quantity]["light-use" if name == "MOD17" else name]
     area = checked_scene(north_up(land.lai))
     if weather is None:
         weather = fife_weather()

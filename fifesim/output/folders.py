@@ -60,11 +60,14 @@ def _check_contents(folder, overwrite, resume):
     if begun and not resume:
         raise ValueError(
             f"the output folder {str(folder)!r} has an unfinished run: continue it with --resume, "
-            "start again with --overwrite, or use another folder with -o"
+            "start again with --overwrite, or use another folder with -o (in Python, resume=True and overwrite=True)"
         )
     if not begun and {path.name for path in folder.iterdir()} - {UNFINISHED}:
         held = "has nothing to resume and is not empty" if resume else "is not empty"
-        raise ValueError(f"the output folder {str(folder)!r} {held}: name another with -o, or add --overwrite")
+        raise ValueError(
+            f"the output folder {str(folder)!r} {held}: name another with -o, or add --overwrite (in Python, "
+            "overwrite=True)"
+        )
 
 
 @contextmanager

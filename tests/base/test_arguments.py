@@ -264,6 +264,7 @@ def names_argument(text, argument, kind):
         "composite": ("colours",),
         "image": ("colours are of several bands",),
         "scenario": ("study",),
+        "spectra": ("lai is leaf area index by its name",),
         "brown_leaf": ("leaf_optics", "leaf transmittance"),
     }.get(argument, ())
     words = argument.lower(), stem.lower(), "there is no file or folder", *others, *also

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -37,6 +37,11 @@ _MOST_LAYERS = 64  # of clouds at different heights
 
 COLUMNS = ("optical_thickness", "shadow_thickness", "overhead_thickness")
 """Variables of `cast_clouds` that `to_toa` reads: clouds toward the sensor, toward the sun and overhead."""
+
+
+Clouds: TypeAlias = Annotated[
+    xr.Dataset, Kind("an xarray.Dataset of clouds, as fifesim.cloud_field(grid, cover=0.3) gives it")
+]
 
 
 def cloud_field(
@@ -197,7 +202,7 @@ def _check_range(name, value, low, high, unit):
 @by_date
 def cast_clouds(
     scene: xr.DataArray,
-    clouds: xr.Dataset,
+    clouds: Clouds,
     *,
     dem: xr.DataArray | None = None,
     altitude: float | None = None,
