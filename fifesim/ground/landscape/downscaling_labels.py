@@ -183,8 +183,8 @@ def downscale(
     Warns
     -----
     UserWarning
-        If ``cv`` is a number, and the realised value differs by more than 5 % and more than three standard errors. A
-        lazy result is checked by chunk when it is computed.
+        If ``cv`` is given, and the realised value differs by more than 5 % and more than three standard errors. A lazy
+        result is checked by chunk when it is computed.
 
     Raises
     ------
@@ -238,11 +238,9 @@ def downscale(
     model = _model(float(arp), distribution, cv, lattice.ratio)
     reads = PixelReads(chunking.pointwise(check_map, pixels).transpose("y", "x").data, lattice)
 
-    number = None if callable(cv) else cv
-
     def kernel(rows, columns, known):
         made = _cells(model, seed, lattice, rows, columns, known)
-        _realised_variation(made, lattice, (rows.start, columns.start), number)
+        _realised_variation(made, lattice, (rows.start, columns.start), cv)
         return made
 
     lazy = chunks is not None or isinstance(reads.array, da.Array)
@@ -275,12 +273,23 @@ def _realised_variation(cells, lattice, first, wanted=None):
     found = float(np.sqrt(squares.mean()))
     # By the delta method: half the standard error of the mean of the squares, over the root of that mean.
     error = squares.std() / np.sqrt(squares.size) / (2 * found) if found else 0.0
-    if wanted and abs(found - wanted) > max(0.05 * wanted, 3 * error):
-        warn(
-            f"cv={wanted:g} was requested, but the realised value is {found:.3g}: at this arp, cells within a "
-            "pixel are too similar for the texture of the map; use a smaller arp, or accept the lower cv"
-        )
+    if wanted is not None:
+        asked = np.broadcast_to(wanted(means[means > 0]) if callable(wanted) else wanted, squares.shape)
+        _warn_of_variation(float(np.sqrt(np.mean(asked**2))), found, error)
     return found
+
+
+def _warn_of_variation(wanted, found, error):
+    """Warn if the realised variation deviates from the wanted one by more than 5 % and three standard errors."""
+    if abs(found - wanted) <= max(0.05 * wanted, 3 * error):
+        return
+    if found < wanted:
+        cure = (
+            f"the map is smoother than cells of this arp, use a smaller arp or a cv {wanted / found:.2f} times larger"
+        )
+    else:
+        cure = "pixels of the map differ more than such cells allow, use a larger cv"
+    warn(f"cv={wanted:.4g} was requested, but the realised value is {found:.3g}: {cure}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
 """Tests of leaf area maps downscaled to a scene: labels, bits in chunks and windows, pixels, and errors."""
 
+import re
 import warnings
 
 import dask.array as da
@@ -244,3 +245,18 @@ def test_grids_that_do_not_fit_are_refused_with_the_remedy(epsg, west, size, cel
     with pytest.raises(ValueError, match=message + r"[\s\S]*lai.odc.geobox.zoom_out\(1 / 3\) has 3 x 3 cells") as error:
         pixel_lattice(raster(PIXELS), grid)
     assert len(str(error.value)) <= 500
+
+
+@pytest.mark.parametrize("cv", [0.4, lambda mean: 0.4 + 0 * mean], ids=["number", "function"])
+def test_variation_of_a_map_that_is_smoother_than_its_cells(cv):
+    """A uniform map has no texture across pixels, so that cells vary less; the stated factor makes up for it."""
+    uniform = fifesim.lai_scene(fifesim.fife_site(10, window=((0, 60), (0, 60))), seed=7) * 0 + 2.0
+    grid = fifesim.fife_site(10 / 3, window=((0, 180), (0, 180)))
+    with pytest.warns(
+        UserWarning, match=r"cv=0\.4 was requested, .* is 0\.32.*smoother.*cv 1\.2\d times larger"
+    ) as said:
+        uniform.fifesim.downscale(grid, cv=cv, arp=0.24, seed=11)
+    factor = float(re.search(r"cv ([\d.]+) times", str(said[0].message)).group(1))
+    with pytest.warns(UserWarning, match="smoother"):
+        cells = uniform.fifesim.downscale(grid, cv=0.4 * factor, arp=0.24, seed=11)
+    assert cells.attrs["cv_within_pixels"] == pytest.approx(0.4, rel=0.02)
