@@ -45,8 +45,5 @@ def utc(time, name="time"):
         raise ValueError(f"{name} must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}")
     if not _YEARS[0] <= stamp.year < _YEARS[1]:
         allowed = f"{_YEARS[0]} to {_YEARS[1]}"
-        raise ValueError(
-            f"{name} must be a date and time of the years {allowed}, in which there are satellites, got "
-            f"{described(time)}: correct the year"
-        )
+        raise ValueError(f"{name} must be of the years {allowed}, in which there are satellites, got {described(time)}")
     return pd.DatetimeIndex([stamp.tz_localize("UTC") if stamp.tzinfo is None else stamp.tz_convert("UTC")])
