@@ -52,14 +52,13 @@ PUBLIC = _table()
 @cache
 def find(name):
     """Import a public name, and wrap it so that its arguments, or the names of its fields, are checked and opened."""
-    from fifesim.grids.inputs import opened  # imports slow libraries
-
     found = getattr(import_module(PUBLIC[name].module), name)
     if not isfunction(found):
         # Classes made by pydantic have their own messages.
         plain = is_dataclass(found) and not hasattr(found, "__pydantic_validator__")
         return spelled(found) if plain else found
-    function = checked(found, opened)
+    # Importing it is slow.
+    function = checked(found, import_module("fifesim.grids.inputs").opened)
     # Pickle looks a function up where it says that it lives.
     function.__module__, function.__qualname__ = "fifesim", name
     return function

@@ -240,7 +240,7 @@ def check_quantity(array, *names):
             return
     raise ValueError(
         f"{array.name or 'the array'} is {_LONG_NAMES[stated]} by its {key}, where "
-        f"{QUANTITIES[names[0]].long_name} is needed: take {_STEPS.get((stated, names[0]), 'the step between')}, "
+        f"{QUANTITIES[names[0]].long_name} is needed: take {_STEPS.get((stated, names[0]), 'the raster of that quantity')}, "
         f"or {cure} if it is wrong"
     )
 

@@ -43,7 +43,7 @@ def soil_line(bands):
     """
     table = files.table("ground_spectra.csv")
     wavelength, change = (each.to_numpy() for each in (table["wavelength"], table["soil_dry"] - table["soil_wet"]))
-    check_range(bands, wavelength)
+    check_soil_bands(bands, wavelength)
     return band_means(bands, wavelength, change) / np.interp(GREEN_WAVELENGTH, wavelength, change)
 
 
@@ -99,7 +99,7 @@ def check_span(values, lowest, meaning, such_as):
         raise ValueError(f"{name} must be in [{lowest:g}, 1], got {wrong:g}: {meaning}; give for instance {such_as}")
 
 
-def check_range(bands, wavelength):
+def check_soil_bands(bands, wavelength):
     """Raise ValueError for bands beyond the spectra of soils."""
     for band in bands:
         if band.limits[0] < wavelength[0] or band.limits[1] > wavelength[-1]:
@@ -140,7 +140,7 @@ def water_films(bands):
     """Optics of water films in bands."""
     water, absorbing = files.table("water_index.csv"), files.table("prospect_d.csv")
     wavelength, absorption = absorbing["wavelength"].to_numpy(), absorbing["water"].to_numpy()
-    check_range(bands, wavelength)
+    check_soil_bands(bands, wavelength)
     index = np.interp(wavelength, water["wavelength"], water["refractive_index"])
     upward = interface_transmissivity(index, 90.0) / index**2
     entrance = interface_transmissivity(SOIL_INDEX / index, 90.0) / interface_transmissivity(SOIL_INDEX, 90.0)

@@ -323,7 +323,7 @@ def _property(name, given, grid, chunks, allow_remote):
     if isinstance(given, Number):
         return cf.label(xr.DataArray(check(float(given))), name, history=f"landscape: {name} {given:g}")
     if isinstance(given, xr.DataArray):
-        found = raster_onto_grid(one_layer(given, name).rename(name), grid, chunks)
+        found = raster_onto_grid(one_layer(given.rename(name), name), grid, chunks)
     elif is_path(given):
         found = file_onto_grid(given, grid, chunks, allow_remote, quantity=name)
     else:

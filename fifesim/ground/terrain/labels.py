@@ -184,7 +184,7 @@ def wetness(dem: xr.DataArray, *, resolution: float | None = None) -> xr.DataArr
     """
     grid = elevation_grid(dem)
     places = sky_labels.places_of(grid, source_resolution(dem, resolution))
-    data = dem.transpose("y", "x").data
+    data = dem.transpose(..., "y", "x").data
     between = places.between((0, 0), tuple(grid.shape))
 
     def block(rows, columns, elevation, index):
@@ -277,7 +277,7 @@ def on_slopes(kernel, dem, horizon, geometry, reflectance=None, check=True, lead
     grid = elevation_grid(dem) if reflectance is None else grids.geobox(reflectance)
     level = None if reflectance is None else reflectance.data
     known = None if horizon is None else horizon.data
-    level, data, known = lazy_together(level, dem.transpose("y", "x").data, known)
+    level, data, known = lazy_together(level, dem.transpose(..., "y", "x").data, known)
     horizon = None if horizon is None else horizon.copy(data=known)
     of_block, reads = _light_on(grid, dem, data, horizon, geometry, check)
     of = data if level is None else level
@@ -288,7 +288,7 @@ def on_slopes(kernel, dem, horizon, geometry, reflectance=None, check=True, lead
 
 def light_on_slopes(dem, grid, geometry, horizon=None):
     """Elevation, sky, cell and geometry of the slopes of a grid for `slope_reflectance`, in memory."""
-    data = dem.transpose("y", "x").data
+    data = dem.transpose(..., "y", "x").data
     of_block, reads = _light_on(grid, dem, data, horizon, geometry, True)
     return chunking.windows(partial(of_block, lambda *light: light), reads, tuple(grid.shape))
 

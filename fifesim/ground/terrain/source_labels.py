@@ -252,7 +252,6 @@ def elevation_grid(dem):
     if dem.ndim != 2:
         raise ValueError(f"a dem has dimensions (y, x), got {dem.dims}: select one layer, such as .isel(band=0)")
     cf.check_quantity(dem, "dem")
-    cf.check_words("the dem", (dem.name, dem.attrs.get("long_name")), "dem")
     if dem.chunks is None:
         check_heights("the dem", dem.values)
     return grids.geobox(dem)
