@@ -83,7 +83,7 @@ def test_wrong_units_are_named_with_the_expected_units():
 def test_quantity_that_lacks_a_step_is_rejected_with_this_step(whole):
     """All have units of 1; only the standard name shows that a step was omitted."""
     red = whole["rho"].isel(band=0, drop=True)
-    with pytest.raises(ValueError, match=r"leaf area index is needed.*take the step between"):
+    with pytest.raises(ValueError, match=r"leaf area index is needed.*take the raster of that quantity"):
         red.fifesim.fpar()
     cure = r"take \.fifesim\.surface_reflectance\(instrument\) of it first"
     with pytest.raises(ValueError, match=f"leaf area index by its standard_name.*{cure}"):

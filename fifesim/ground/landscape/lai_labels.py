@@ -20,7 +20,7 @@ from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.inputs import FileOrRaster, one_layer, storage_of
-from fifesim.grids.opening import check_memory, file_of, sound_raster, words_of
+from fifesim.grids.opening import file_of, sound_raster, words_of
 from fifesim.grids.sites import made_on_site, one_or_several
 from fifesim.grids.warp import file_onto_grid, raster_onto_grid
 from fifesim.ground.canopy.leaf_area import check_map, check_source, warn_of_large
@@ -99,8 +99,6 @@ def lai_scene(
         cells(0, 0, (0, 0))
         lai = windows.tiles(cells, grid, chunks, tile=FIELD_TILE)
     else:
-        what = f"a periodic field of {grid.shape.y} x {grid.shape.x} cells"
-        check_memory(grid.shape.y * grid.shape.x, 8, what, "take method='streaming' with chunks='auto'")
         field = xr.DataArray(_periodic_cells(grid, density, arp, seed), dims=("y", "x"))
         lai = grids.place(field if chunks is None else field.chunk(chunks), grid)
     history = f"lai_scene: {method} autoregressive field, arp {arp:g}, seed {seed}"
