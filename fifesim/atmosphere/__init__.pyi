@@ -1,5 +1,8 @@
 """Where the public name of this folder lives, for editors and type checkers."""
 
+from fifesim.base.ranges import Range
+
 from .labels import spectrum as spectrum
 
 ENGINES: tuple[str, ...]
+RANGES: dict[str, Range]

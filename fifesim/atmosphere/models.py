@@ -14,7 +14,7 @@ from fifesim.atmosphere.aerosols import Aerosol, known_aerosol
 from fifesim.atmosphere.gases import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, Levels, column, profile_above
 from fifesim.base.arguments import PLAIN, AerosolMixture, Numbers, check_fields, described
 from fifesim.base.messages import closest
-from fifesim.base.ranges import check_range
+from fifesim.base.ranges import check_number
 
 # Band limits of the Thematic Mapper, as its designers state them. [um]
 _BANDS = ((0.45, 0.52), (0.52, 0.60), (0.63, 0.69), (0.76, 0.90), (1.55, 1.75), (2.08, 2.35))
@@ -320,5 +320,5 @@ def _checked(what, value):
     """Number in its range."""
     if not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
         raise TypeError(f"{what} must be a number in {RANGES[what].unit}, got {described(value)}: leave the unit out")
-    check_range(what, value, RANGES[what])
+    check_number(what, value, RANGES[what])
     return float(value)

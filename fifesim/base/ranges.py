@@ -30,7 +30,7 @@ def likely_units(name, value, known):
     return "; ".join([*filter(None, [known.note]), *found])
 
 
-def check_range(what, values, known):
+def check_number(what, values, known):
     """Raise ValueError for impossible numbers, and warn if their mean is unusual and not 0; NaN in arrays passes."""
     one, values = np.ndim(values) == 0, np.atleast_1d(np.asarray(values, float))
     wrong = (values < known.lowest) | (values > known.highest) | (one & np.isnan(values))

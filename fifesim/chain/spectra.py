@@ -10,7 +10,7 @@ from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import Names
 from fifesim.base.geometry import Geometry, warn_of_radians
 from fifesim.base.messages import nearest
-from fifesim.base.ranges import check_range
+from fifesim.base.ranges import check_number
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.description import TALLGRASS, Canopy, is_raster
@@ -284,7 +284,7 @@ def _check(values):
             allowed = f"[{low:g}, {high:g}{')' if name in ('sza', 'vza') else ']'}"
             raise ValueError(f"{name} must be in {allowed}, got {each[outside].flat[0]:g}")
     for name, known in NUMERIC_PROPERTIES.items():
-        check_range(name, values[name], known)
+        check_number(name, values[name], known)
     check_background(values["background"])
     check_crowns(values["lai"], values["crown_cover"])
     Leaf(**{content: values[name] for name, content in _LEAF.items() if name in values})

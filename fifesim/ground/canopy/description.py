@@ -10,7 +10,7 @@ import numpy as np
 from fifesim.base import arguments
 from fifesim.base.arguments import Array, FilePath, NumberOrArray
 from fifesim.base.messages import PARTS
-from fifesim.base.ranges import check_range
+from fifesim.base.ranges import check_number
 from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
 from fifesim.ground.canopy.optics import check_background
@@ -260,7 +260,7 @@ def _check(name, value, known):
         numbers = [value] if arguments.NUMBER.fits(value) and not is_raster(value) else []
         check_background(np.array(numbers, float))
     elif known.unit and not is_raster(value):
-        check_range(name, value, known)
+        check_number(name, value, known)
         if name == "hotspot" and 0 < value < LEAST_HOTSPOT:
             raise ValueError(f"hotspot must be 0, for no hot spot, or at least {LEAST_HOTSPOT:g}, got {value:g}")
     elif known.unit and value.dtype.kind not in "iuf":

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from fifesim.base.arguments import described
 from fifesim.base.caches import cached
 from fifesim.base.messages import closest
-from fifesim.base.ranges import Range, check_range
+from fifesim.base.ranges import Range, check_number
 
 RADIANS_PER_DEGREE = math.pi / 180  # unlike numpy.radians, it serves complex angles, for derivatives
 
@@ -198,7 +198,7 @@ _MEAN_INCLINATION = Range("degree", 1, 89, (5, 85), {"radians": math.degrees(1)}
 
 def _axis_ratio(mean):
     """Axis ratio of the ellipsoidal distribution with a mean inclination [degree]."""
-    check_range("campbell: mean", mean, _MEAN_INCLINATION)
+    check_number("campbell: mean", mean, _MEAN_INCLINATION)
 
     def excess(log_ratio):
         # The mean is the integral of one minus the cumulative distribution.

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from fifesim.base.ranges import check_range
+from fifesim.base.ranges import check_number
 from fifesim.grids import cf
 from fifesim.grids import chunks as chunking
 from fifesim.grids.chunks import by_band, layers_of
@@ -101,7 +101,7 @@ def soil_kernel(bands, lai, soil=None, moisture=None):
 
 def _brightened(dry, change, line):
     """Background of another brightness, with a warning if its change is large in the mean."""
-    check_range("soil", change, PROPERTIES["soil"])
+    check_number("soil", change, PROPERTIES["soil"])
     return brightened(dry, change, line)
 
 

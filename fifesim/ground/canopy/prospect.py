@@ -11,7 +11,7 @@ from fifesim.base import files
 from fifesim.base.arguments import Array, NumberOrArray, described
 from fifesim.base.arrays import as_rows, compiled, jitable
 from fifesim.base.caches import cached
-from fifesim.base.ranges import Range, check_range
+from fifesim.base.ranges import Range, check_number
 
 _PIGMENT = {"mg m-2": 0.1, "g m-2": 100.0, "mg cm-2": 1000.0}
 
@@ -93,7 +93,7 @@ class Leaf:
                 value = _number(name, value)
             # Lazy arrays are checked when they are computed.
             if isinstance(value, float | np.ndarray):
-                check_range(f"Leaf: {name}", value, known)
+                check_number(f"Leaf: {name}", value, known)
             object.__setattr__(self, name, value)
 
     def contents(self) -> list[NumberOrArray]:

@@ -32,7 +32,7 @@ from fifesim.sensor.description.instrument_file import (
     Scan,
     ScanZone,
 )
-from fifesim.sensor.description.plausibility import check_instrument_units
+from fifesim.sensor.description.plausibility import check_instrument_units, check_sampling
 from fifesim.sensor.description.spatial_response import ResponseName, with_response
 from fifesim.sensor.description.spectral_response import SpectralResponse
 
@@ -213,8 +213,8 @@ def _catalogue():
 
 @cached(128, "checked instruments")
 def _check(given):
-    """Check the units of an instrument that was made in Python, once."""
-    check_instrument_units(given)
+    """Check the units of altitude, pixels and intervals of an instrument that was made in Python, once."""
+    check_sampling(given)
 
 
 @cached(32, "own instrument files")

@@ -46,10 +46,9 @@ _SAMPLED = 0.05
 
 def check_instrument_units(instrument):
     """Raise ValueError for numbers in a wrong unit, or a response that does not cover its band."""
-    _check_sampling(instrument, instrument.interval, instrument.gsd, "")
+    check_sampling(instrument)
     for number, band in enumerate(instrument.bands, 1):
         key = f"bands.{number}."
-        _check_sampling(instrument, band.interval or instrument.interval, instrument.pixel(band), key)
         try:
             _check_response(band)
             _check_radiance(band)
@@ -64,6 +63,13 @@ def check_instrument_units(instrument):
         )
     if instrument.scan is not None:
         _check_scan(instrument)
+
+
+def check_sampling(instrument):
+    """Raise ValueError for an altitude, pixels or intervals in a wrong unit."""
+    _check_sampling(instrument, instrument.interval, instrument.gsd, "")
+    for number, band in enumerate(instrument.bands, 1):
+        _check_sampling(instrument, band.interval or instrument.interval, instrument.pixel(band), f"bands.{number}.")
 
 
 def _check_sampling(instrument, interval, gsd, key):

@@ -10,7 +10,7 @@ import numpy as np
 
 from fifesim.base.arguments import MAPPING, Kind, Names, Numbers, check_fields
 from fifesim.base.lattice import generator
-from fifesim.base.ranges import Range, check_range
+from fifesim.base.ranges import Range, check_number
 
 # Kinds of noise that can be requested by name.
 KINDS = ("shot", "thermal", "fixed-pattern")
@@ -81,7 +81,7 @@ class NoiseModel:
                 raise ValueError(f"{name} must not be negative, got {value}")
         if self.detectors < 1:
             raise ValueError(f"detectors must be at least 1, got {self.detectors}")
-        check_range("gain_spread", self.gain_spread, _GAIN_SPREAD)
+        check_number("gain_spread", self.gain_spread, _GAIN_SPREAD)
 
     @classmethod
     def from_snr(cls, radiance: Numbers, snr: Numbers, shot_share: float | None = None, **fixed_pattern: Any) -> Self:
