@@ -1,11 +1,14 @@
 """Files: safe opening of the user's files, and the tables of the data folder."""
 
+import errno
 import os
 import re
 import reprlib
 import stat
+import tempfile
 import tomllib
 import warnings
+from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
@@ -85,6 +88,46 @@ def read_toml(path):
         raise ValueError(f"{name} nests its tables too deeply: a key lies in a section, section.key") from None
     except ValueError as error:
         raise ValueError(in_a_line(f"{name} is not valid TOML: {error}")) from None
+
+
+def check_place(path):
+    """Raise OSError if no file can be written at a path."""
+    path = Path(path)
+    if path.is_dir():
+        raise IsADirectoryError(f"{in_a_line(path, 150)} is a folder: give the name of a file in it")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(
+            f"there is no folder {in_a_line(path.parent, 150)!r} to write {in_a_line(path.name)} into"
+        )
+    if not os.access(path.parent, os.W_OK):
+        raise PermissionError(f"files cannot be written into {in_a_line(path.parent, 150)!r}: give another folder")
+
+
+@contextmanager
+def whole_file(path):
+    """Context with the path of a new file in a private folder, which becomes the file if there is no error."""
+    path = Path(path)
+    check_place(path)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+        new = Path(folder) / f"whole{path.suffix}"
+        yield new
+        flush(new)
+        os.replace(new, path)
+        flush(path.parent)
+
+
+def flush(*paths):
+    """Write files, and the entries of folders, to the disk, so that they survive a power cut."""
+    for path in paths if os.name == "posix" else ():
+        number = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(number)
+        except OSError as error:
+            # Some network disks do not flush folders.
+            if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+                raise
+        finally:
+            os.close(number)
 
 
 def shown(value):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import base64
 import math
-import os
-import tempfile
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +12,7 @@ import numpy as np
 from markupsafe import Markup
 
 from fifesim.base.arguments import FilePath
-from fifesim.base.files import check_suffix
+from fifesim.base.files import check_suffix, whole_file
 from fifesim.experiments.explorer_settings import LINE_NUMBERS, outcomes_of, sweep_of
 from fifesim.experiments.scatter.shares import CURVATURE
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES
@@ -312,11 +310,8 @@ def explore(scenario: Scenario | None = None, path: FilePath = "explore.html", *
     sweep = sweep_of(scenario)
     html = explorer_page(sweep, outcomes_of(sweep, lambda settings: steps(settings, "simulating")))
     path.parent.mkdir(parents=True, exist_ok=True)
-    # The file appears under its final name only when it is complete.
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
-        whole = Path(folder) / path.name
-        whole.write_text(html, encoding="utf-8")
-        os.replace(whole, path)
+    with whole_file(path) as new:
+        new.write_text(html, encoding="utf-8")
     return path
 
 

@@ -6,9 +6,7 @@ import errno
 import json
 import os
 import shutil
-import tempfile
 from collections.abc import Mapping
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -24,7 +22,7 @@ from rioxarray.raster_writer import RasterioWriter
 
 from fifesim.base.arguments import Chunks, FilePath
 from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, nearest_band
-from fifesim.base.files import check_suffix, in_a_line
+from fifesim.base.files import check_place, check_suffix, in_a_line, whole_file
 from fifesim.base.geometry import ANGLES
 from fifesim.base.messages import warn
 from fifesim.grids import cf
@@ -203,8 +201,7 @@ def to_geotiff(
     (90, 90)
     """
     path = Path(path)
-    if path.is_dir():
-        raise IsADirectoryError(f"{in_a_line(path, 150)} is a folder: give the name of a file, such as image.tif")
+    check_place(path)
     check_suffix(path, "GeoTIFF", ".tif", ".tiff")
     if path.exists() and not overwrite:
         raise FileExistsError(
@@ -238,10 +235,13 @@ def to_geotiff(
             f"{path.name} lacks {', '.join(varying)}, which vary by cell, so another geometry would be "
             "used after reading it: give geometry= when you read it, or write a netCDF with .to_netcdf()"
         )
-    with _whole(path) as (streamed, finished), ErrorsOfGdal(f"cannot write {path}"):
+    with whole_file(path) as finished, ErrorsOfGdal(f"cannot write {path}"):
+        streamed = finished.with_name("streamed.tif")
         _stream(array, cells, layers, grid, streamed, raster, tags or {})
         rasterio.shutil.copy(streamed, finished, blocksize=_BLOCK, **_COG)
         _check_written(streamed, finished, cells)
+    # Remove statistics of the replaced file, which GDAL or a GIS would use for the new file.
+    path.with_name(f"{path.name}.aux.xml").unlink(missing_ok=True)
     return path
 
 
@@ -335,8 +335,6 @@ def _streamed_bytes(array):
 
 def _check_room(array, path):
     """Raise OSError if the disk is too full, for which GDAL prints many lines."""
-    if not path.parent.is_dir():
-        return
     # The stream, and at worst as much again with overviews.
     needed, free = _streamed_bytes(array) + 1.4 * array.nbytes, shutil.disk_usage(path.parent).free
     if free < needed:
@@ -353,19 +351,6 @@ def _check_written(streamed, finished, array):
             blocks = one.read(window=window), other.read(window=window)
             if not np.array_equal(*blocks, equal_nan=array.dtype.kind == "f"):
                 raise rasterio.errors.RasterioIOError("what was written is not what is read")
-
-
-@contextmanager
-def _whole(path):
-    """Context with temporary file names, the second of which becomes the file if there is no error."""
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"there is no folder {str(path.parent)!r} to write {path.name} into")
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
-        streamed, finished = Path(folder) / "streamed.tif", Path(folder) / "finished.tif"
-        yield streamed, finished
-        os.replace(finished, path)
-        # Remove statistics of the replaced file, which GDAL or a GIS would use for the new file.
-        path.with_name(f"{path.name}.aux.xml").unlink(missing_ok=True)
 
 
 def _stream(array, cells, layers, grid, path, described, further):

@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from filelock import FileLock, Timeout
 
 from fifesim.base.caches import cached
+from fifesim.base.files import flush
 
 _PACKAGES = (
     "fifesim", "numpy", "scipy", "xarray", "dask", "numba", "rasterio", "odc-geo", "pvlib", "pyrsr", "matplotlib",
@@ -158,6 +159,8 @@ def _empty(hidden):
 
 def _move_into_place(hidden, folder, names, stale):
     """Replace earlier results with new ones, the mark of completeness last; an error undoes all moves."""
+    # After a power cut, the mark must not stand for files that are not on the disk.
+    flush(*(path for name in names for path in (hidden / name, *(hidden / name).rglob("*"))))
     # The last name marks results as complete. The earlier mark is moved away first, so that a process that is killed
     # leaves files of one run only, without the mark.
     replaced = hidden / _REPLACED
@@ -168,8 +171,11 @@ def _move_into_place(hidden, folder, names, stale):
     moves = [(folder / name, replaced / name) for name in earlier if os.path.lexists(folder / name)]
     moves += [(hidden / name, folder / name) for name in names]
     try:
-        for source, target in moves:
+        for source, target in moves[:-1]:
             os.replace(source, target)
+        flush(folder)
+        os.replace(*moves[-1])
+        flush(folder)
     except BaseException:
         for source, target in reversed(moves):
             if os.path.lexists(target) and not os.path.lexists(source):

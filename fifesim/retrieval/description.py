@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
-import os
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from fifesim.base.arguments import FilePath
-from fifesim.base.files import check_regular, check_suffix, in_a_line
+from fifesim.base.files import check_suffix, in_a_line, read_bounded, whole_file
 from fifesim.retrieval import methods
+from fifesim.sensor.description.fields import Name, Positive, Share, errors_in_words
 
 RETRIEVED = {"lai": (0.0, 20.0), "fpar": (0.0, 1.0), "green_fpar": (0.0, 1.0)}
 """Quantities that a retrieval may estimate, and their physical ranges."""
 
-FORMAT = 1
+FORMAT = 2
 """Version of the file of a retrieval."""
+
+# Mark behind the NetCDF content of a file. The version and the SHA-256 of the content follow, separated by a space.
+_SEAL = b"\nfifesim retrieval "
+
+# Maximum size of a file. [byte]
+_LARGEST = 2**28
+
+_AGAIN = "train it again with fifesim.train(..., path=...)"
 
 # Angles may be this far outside of the training. [degree]
 ANGLE_MARGIN = 3.0
@@ -43,6 +52,31 @@ class Estimated(NamedTuple):
     """Bits, shape (n,)."""
     diagnostics: tuple[np.ndarray, ...] = ()
     """Layers of `Retrieval.diagnostics`, each of shape (n,)."""
+
+
+class _Description(BaseModel, extra="forbid", strict=True):
+    """Attributes of a retrieval in its file."""
+
+    method: Literal["line", "lookup", "quantiles", "optimal-estimation"]
+    level: Literal["toa", "surface"]
+    instrument: str
+    bands: Annotated[tuple[Name, ...], Field(min_length=1)]
+    wavelengths: tuple[Positive, ...]
+    quantities: Annotated[tuple[Literal["lai", "fpar", "green_fpar"], ...], Field(min_length=1)]
+    levels: Annotated[tuple[Share, ...], Field(min_length=1)]
+    prior: str
+    seed: int
+
+    @model_validator(mode="after")
+    def _agree(self):
+        if len(self.wavelengths) != len(self.bands):
+            raise ValueError(f"{len(self.bands)} bands have {len(self.wavelengths)} wavelengths")
+        for names in (self.bands, self.quantities):
+            if len(set(names)) < len(names):
+                raise ValueError(f"names are there twice: {', '.join(names)}")
+        if sorted(set(self.levels)) != list(self.levels):
+            raise ValueError(f"levels must increase, got {self.levels}")
+        return self
 
 
 @dataclass(frozen=True)
@@ -149,6 +183,9 @@ class Retrieval:
             np.clip(end, *allowed[..., None], out=end)
         return Estimated(median, sd, low, high, flag, diagnostics)
 
+    def __eq__(self, other):
+        return isinstance(other, Retrieval) and self._dataset().identical(other._dataset())
+
     def to_netcdf(self, path: FilePath) -> None:
         """
         Write the retrieval to a NetCDF file.
@@ -156,25 +193,32 @@ class Retrieval:
         Parameters
         ----------
         path : str or path
-            Its name ends in ``.nc``. An existing file is replaced when the new one is complete.
+            Its name ends in ``.nc``. An existing file is replaced when the new one is complete. The NetCDF content is
+            followed by its SHA-256 checksum, which `fifesim.read_retrieval` compares.
+
+        Raises
+        ------
+        ValueError
+            If the name ends as another kind of file.
+        OSError
+            If the file cannot be written.
         """
-        check_suffix(path := Path(path), "NetCDF file", ".nc", ".nc4")
-        found = xr.Dataset(attrs={"fifesim_retrieval": self.version, "method": self.method, "level": self.level})
-        found.attrs |= {"instrument": self.instrument, "prior": self.prior, "seed": self.seed}
-        found.attrs |= {"bands": " ".join(self.bands), "quantities": " ".join(self.quantities)}
-        found.attrs |= {"wavelengths": np.array(self.wavelengths), "levels": np.array(self.levels)}
+        check_suffix(Path(path), "NetCDF file", ".nc", ".nc4")
+        content = bytes(self._dataset().to_netcdf(engine="netcdf4"))
+        with whole_file(path) as new:
+            new.write_bytes(content + _SEAL + f"{self.version} {hashlib.sha256(content).hexdigest()}".encode())
+
+    def _dataset(self):
+        """Attributes, tables and scores of the retrieval as they are in its file."""
+        known = {name: getattr(self, name) for name in _Description.model_fields} | {"seed": int(self.seed)}
+        found = xr.Dataset(attrs={"fifesim_retrieval": _Description(**known).model_dump_json()})
         for name, values in self.tables.items():
             values = np.asarray(values, float)
             found[f"table_{name}"] = tuple(f"{name}_{axis}" for axis in range(values.ndim)), values
         if self.score is not None:
             for name, scores in self.score.drop_vars("quantity").data_vars.items():
                 found[f"score_{name}"] = scores
-        partial_path = path.with_name(f".{path.name}.partial")
-        try:
-            found.to_netcdf(partial_path)
-            os.replace(partial_path, path)
-        finally:
-            partial_path.unlink(missing_ok=True)
+        return found
 
 
 def read_retrieval(path: FilePath) -> Retrieval:
@@ -193,7 +237,7 @@ def read_retrieval(path: FilePath) -> Retrieval:
     Raises
     ------
     ValueError
-        If the file is missing, is not a retrieval, or has a newer format.
+        If the file is missing, is not a retrieval, has another format, or has changed since it was written.
 
     Examples
     --------
@@ -202,35 +246,43 @@ def read_retrieval(path: FilePath) -> Retrieval:
     """
     name = in_a_line(str(path), 200)
     try:
-        check_regular(path)
-        with xr.open_dataset(path) as file:
-            found = file.load()
+        content = read_bounded(path, _LARGEST, "a retrieval")
     except FileNotFoundError:
         raise ValueError(f"cannot read the retrieval {name}: there is no such file") from None
     except (OSError, ValueError) as error:
         raise ValueError(f"cannot read the retrieval {name}: {in_a_line(error, 150)}") from None
-    own = found.attrs
-    if "fifesim_retrieval" not in own:
-        raise ValueError(f"{name} is not a retrieval: write one with fifesim.train(..., path=...)")
-    if int(own["fifesim_retrieval"]) != FORMAT:
-        raise ValueError(
-            f"{name} has the format {own['fifesim_retrieval']} of a retrieval, this fifesim reads format {FORMAT}: "
-            "train it again"
-        )
-    names = [str(name).partition("_") for name in found.data_vars]
-    tables = {name: found[f"table_{name}"].values for kind, _, name in names if kind == "table"}
-    scores = {name: found[f"score_{name}"] for kind, _, name in names if kind == "score"}
-    quantities = tuple(own["quantities"].split())
-    return Retrieval(
-        method=own["method"],
-        level=own["level"],
-        instrument=own["instrument"],
-        bands=tuple(own["bands"].split()),
-        wavelengths=tuple(np.atleast_1d(own["wavelengths"]).tolist()),
-        quantities=quantities,
-        levels=tuple(np.atleast_1d(own["levels"]).tolist()),
-        prior=own["prior"],
-        seed=int(own["seed"]),
-        tables=tables,
-        score=xr.Dataset(scores).assign_coords(quantity=list(quantities)) if scores else None,
-    )
+    # NetCDF's library may not return from a damaged file, so that the checksum comes first.
+    content, seal, text = content.rpartition(_SEAL)
+    version, _, checksum = text.partition(b" ")
+    if not seal:
+        raise ValueError(f"{name} is not a retrieval of this fifesim, or its end is missing: {_AGAIN}")
+    if version != str(FORMAT).encode():
+        of = in_a_line(version.decode("ascii", "replace"), 20)
+        raise ValueError(f"{name} has the format {of} of a retrieval, this fifesim reads format {FORMAT}: {_AGAIN}")
+    if checksum != hashlib.sha256(content).hexdigest().encode():
+        raise ValueError(f"{name} has changed since it was written, its checksum differs: {_AGAIN}")
+    try:
+        with xr.open_dataset(content, engine="netcdf4") as file:
+            if file.nbytes > len(content):
+                raise ValueError(f"it declares {file.nbytes} bytes of numbers in {len(content)} bytes")
+            return _restored(file.load())
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        words = errors_in_words(error, ()) if isinstance(error, ValidationError) else in_a_line(error, 150)
+        raise ValueError(f"{name} is not a valid retrieval, {words}: {_AGAIN}") from None
+
+
+def _restored(file):
+    """Retrieval of the content of a file, whose attributes, tables and scores are checked."""
+    known = _Description.model_validate_json(file.attrs["fifesim_retrieval"])
+    parts = {"table": {}, "score": {}}
+    for name, values in file.data_vars.items():
+        kind, _, rest = str(name).partition("_")
+        parts[kind][rest] = values
+    tables = {name: values.values for name, values in parts["table"].items()}
+    sizes = {"quantity": len(known.quantities), "level": len(known.levels)}
+    methods.check_tables(known.method, tables, len(known.bands), *sizes.values())
+    scores = xr.Dataset(parts["score"])
+    if any(scores.sizes.get(axis, size) != size for axis, size in sizes.items()):
+        raise ValueError(f"scores have dimensions {dict(scores.sizes)}")
+    scores = scores.assign_coords(quantity=list(known.quantities)) if scores else None
+    return Retrieval(**dict(known), tables=tables, score=scores)

@@ -14,6 +14,7 @@ from fifesim.analysis.score_labels import score
 from fifesim.atmosphere.aerosols import aerosol_optical_thickness
 from fifesim.base.arguments import FilePath, Kind, Names, described
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
+from fifesim.base.files import check_place
 from fifesim.chain.driver import Driver
 from fifesim.output.chips.store import chip_arrays, layout_of
 from fifesim.retrieval import methods
@@ -94,6 +95,8 @@ def train(
     ValueError
         If the dataset lacks bands, quantities, its study or one of the parts train, validation and test, or has no
         valid pixel; or if optimal estimation or uniform pixels are requested for a landscape of several classes.
+    OSError
+        If the file cannot be written into the folder of ``path``; found before the training.
 
     See Also
     --------
@@ -110,6 +113,9 @@ def train(
     """
     names = (quantities,) if isinstance(quantities, str) else tuple(quantities)
     _check(names, levels)
+    if path is not None:
+        # Before the training, which would be lost.
+        check_place(path)
     dataset = (
         source
         if isinstance(source, xr.Dataset)

@@ -1,8 +1,10 @@
 """Training on a study, and retrieval from images: intervals, flags, files and error messages."""
 
+import hashlib
 from dataclasses import replace
 from functools import cache, partial
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -115,7 +117,9 @@ def test_training_is_reproducible_to_the_bit(chips):
 def test_retrieval_is_restored_from_its_file(retrieval, light, tmp_path):
     retrieval.to_netcdf(tmp_path / "mine.nc")
     again = fifesim.read_retrieval(tmp_path / "mine.nc")
-    assert replace(again, tables={}, score=None) == replace(retrieval, tables={}, score=None)
+    assert again == retrieval and again != replace(
+        retrieval, tables=retrieval.tables | {"stretch": np.full((2, 3), 2.0)}
+    )
     assert again.score.coverage.values == pytest.approx(retrieval.score.coverage.values)
     assert light.fifesim.retrieve(again).identical(light.fifesim.retrieve(retrieval))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.nc"]
@@ -342,8 +346,77 @@ def test_corrected_chips_are_trained_at_the_surface_without_a_study(chips):
 def test_files_without_a_retrieval_are_rejected(tmp_path, trained):
     xr.Dataset({"a": 1.0}).to_netcdf(tmp_path / "other.nc")
     (tmp_path / "text.nc").write_text("no")
-    replace(trained("line"), version=2).to_netcdf(tmp_path / "newer.nc")
-    messages = {"none": "no such file", "other": "is not a retrieval", "text": "cannot read", "newer": "the format 2"}
+    replace(trained("line"), version=3).to_netcdf(tmp_path / "newer.nc")
+    messages = {"none": "no such file", "other": "is not a ret", "text": "is not a ret", "newer": "the format 3"}
     for name, message in messages.items():
         with pytest.raises(ValueError, match=message):
             fifesim.read_retrieval(tmp_path / f"{name}.nc")
+
+
+def sealed(content, path):
+    """Write the content of a file with a valid checksum."""
+    path.write_bytes(content + f"\nfifesim retrieval 2 {hashlib.sha256(content).hexdigest()}".encode())
+
+
+def test_changed_bytes_of_a_file_are_rejected(tmp_path, retrieval):
+    """Any change of content, checksum or length; netCDF's library does not return from some damaged files."""
+    path, random = tmp_path / "mine.nc", np.random.default_rng(5)
+    retrieval.to_netcdf(path)
+    whole = path.read_bytes()
+    places = [*random.integers(0, len(whole), 40).tolist(), *range(len(whole) - 90, len(whole))]
+    damaged = [whole[:at] + bytes([whole[at] ^ 1 << int(random.integers(8))]) + whole[at + 1 :] for at in places]
+    for content in (*damaged, whole[:-1], whole + b"0", whole[: len(whole) // 2], b""):
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match=r"mine.nc.*train it again") as caught:
+            fifesim.read_retrieval(path)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda file: file.drop_vars("table_stretch"), "table stretch is missing"),
+        (lambda file: file.assign(table_more=1.0), "table more is unknown"),
+        (lambda file: file.assign(table_stretch=file.table_stretch.T), r"shape \(3, 2\), not \(2, 3\)"),
+        (lambda file: file.assign(table_stretch=file.table_stretch.astype(int)), "the type int"),
+        (lambda file: file.assign(table_bias0=file.table_bias0 * np.inf), "bias0 has values that are not finite"),
+        (lambda file: file.assign(table_scale=-file.table_scale), "scale has values"),
+        (lambda file: file.assign(table_prior_range=file.table_prior_range * 1e300), "prior_range has values"),
+        (lambda file: file.assign(table_angle_range=file.table_angle_range[::-1] + [[1.0], [0]]), "an upper end below"),
+        (lambda file: file.isel(level=[0]), "scores have dimensions"),
+        (lambda file: file.assign_attrs(fifesim_retrieval="{}"), "the key method is missing"),
+        (lambda file: file.assign_attrs(fifesim_retrieval=file.fifesim_retrieval.replace("fpar", "sky")), "'sky'"),
+        (lambda file: file.drop_attrs(deep=False), "fifesim_retrieval"),
+        (lambda file: file.rename(table_scale="scale"), "scale"),
+    ],
+)
+def test_files_with_impossible_content_are_rejected(tmp_path, trained, change, said):
+    file = change(trained("quantiles")._dataset())
+    sealed(bytes(file.to_netcdf(engine="netcdf4")), tmp_path / "mine.nc")
+    with pytest.raises(ValueError, match=rf"mine.nc is not a valid retrieval.*{said}.*train it again"):
+        fifesim.read_retrieval(tmp_path / "mine.nc")
+
+
+def test_declared_size_is_checked_before_it_is_read(tmp_path):
+    with netCDF4.Dataset(tmp_path / "large.nc", "w") as file:
+        file.createDimension("many", 10**12)
+        file.createVariable("table_stretch", "f8", ("many",), chunksizes=(10**6,))
+    sealed((tmp_path / "large.nc").read_bytes(), tmp_path / "large.nc")
+    with pytest.raises(ValueError, match=r"large.nc.*declares 8000000000000 bytes"):
+        fifesim.read_retrieval(tmp_path / "large.nc")
+
+
+def test_unusable_path_is_found_before_the_training(tmp_path, chips, monkeypatch):
+    monkeypatch.setattr(methods, "fit_line", None)
+    for path, said in ((tmp_path / "none" / "r.nc", "there is no folder"), (tmp_path, "is a folder")):
+        with pytest.raises(OSError, match=said):
+            fifesim.train(chips, "line", path=path)
+
+
+def test_links_in_the_folder_of_a_file_are_not_followed(tmp_path, trained):
+    (tmp_path / "victim").write_text("mine")
+    for name in (".r.nc.partial", "r.nc"):
+        (tmp_path / name).symlink_to("victim")
+    trained("line").to_netcdf(tmp_path / "r.nc")
+    assert (tmp_path / "victim").read_text() == "mine" and not (tmp_path / "r.nc").is_symlink()
+    assert fifesim.read_retrieval(tmp_path / "r.nc") == trained("line")
