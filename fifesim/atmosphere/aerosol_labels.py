@@ -11,7 +11,7 @@ import xarray as xr
 from fifesim.atmosphere import aerosols, mixtures
 from fifesim.atmosphere.aerosols import Aerosol, phase_of_moments
 from fifesim.base.arguments import AerosolMixture, FilePath
-from fifesim.base.files import read_csv
+from fifesim.base.files import in_a_line, read_csv
 
 # Other spellings of each name, by Eradiate, libRadtran and AERONET.
 _NAMES = {
@@ -154,21 +154,36 @@ def aerosol_tables(aerosol: AerosolMixture) -> xr.Dataset:
         "angle": ("angle", tables[0].angle, {"long_name": "scattering angle", "units": "degree"}),
         "wavelength": ("wavelength", np.exp(tables[0].log_wavelength).round(12), {"units": "um"}),
     }
-    return xr.Dataset(values, coords, {"title": str(aerosol)})
+    found = xr.Dataset(values, coords, {"title": str(aerosol)})
+    for each in ("wavelength", "angle", *values):
+        # A file keeps checksums, with which netCDF's library finds damaged numbers.
+        found[each].encoding["fletcher32"] = True
+    return found
 
 
 def _opened(path):
     """Dataset of a file, and the name of the file."""
     path = Path(path)
-    readers = {".nc": xr.load_dataset, ".csv": _read_csv}
+    readers = {".nc": _read_netcdf, ".csv": _read_csv}
     if path.suffix.lower() not in readers:
         raise ValueError(f"aerosol must be a Dataset or a file .nc or .csv, got {str(path)!r}: give one of these")
     if not path.is_file():
         raise ValueError(f"aerosol file {str(path)!r} does not exist: give its path")
+    return readers[path.suffix.lower()](path), path.stem
+
+
+# Size of the largest tables in memory. [byte]
+_LARGEST = 10**8
+
+
+def _read_netcdf(path):
     try:
-        return readers[path.suffix.lower()](path), path.stem
-    except OSError as error:
-        raise ValueError(f"aerosol file {str(path)!r} cannot be read: {error}") from None
+        with xr.open_dataset(path) as file:
+            if file.nbytes > _LARGEST:
+                raise ValueError(f"it declares {file.nbytes} bytes of numbers, at most {_LARGEST} are read")
+            return file.load()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise ValueError(f"aerosol file {str(path)!r} cannot be read: {in_a_line(error, 250)}") from None
 
 
 def _read_csv(path):

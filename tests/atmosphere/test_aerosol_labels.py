@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pandas as pd
 import pytest
@@ -176,3 +177,18 @@ def test_user_aerosol_passes_through_the_chain(tables):
     assert "aerosol=continental#" in found.attrs["atmosphere"]
     ground = (100 + 50 * lai).drop_attrs(deep=False).assign_attrs(units="m")
     np.testing.assert_allclose(*(each.fifesim.to_toa(elevation=ground) for each in (rho, same)), rtol=1e-10)
+
+
+def test_damaged_tables_and_declared_sizes_are_found_in_a_file(tmp_path):
+    """The flipped bit would give another, plausible phase function."""
+    fifesim.aerosol_tables("urban").to_netcdf(tmp_path / "mine.nc")
+    whole = (tmp_path / "mine.nc").read_bytes()
+    numbers = fifesim.aerosol_tables("urban").phase.values.tobytes()[800:824]
+    at = whole.index(numbers)
+    (tmp_path / "damaged.nc").write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+    with netCDF4.Dataset(tmp_path / "large.nc", "w") as file:
+        file.createDimension("wavelength", 10**9)
+        file.createVariable("extinction", "f8", ("wavelength",), chunksizes=(10**6,))
+    for name, said in (("damaged", "HDF error"), ("large", "declares 8000000000 bytes")):
+        with pytest.raises(ValueError, match=rf"{name}.nc' cannot be read.*{said}"):
+            fifesim.read_aerosol(tmp_path / f"{name}.nc")
