@@ -107,7 +107,7 @@ def simulate_command(
         from fifesim.output.workers import cluster
         from fifesim.scenario.scenario import read_scenario
 
-    finished = check_folder(output, overwrite, resume, names_of(scene))
+    check_folder(output, overwrite, resume, names_of(scene))
     if paper and scenario:
         raise ValueError("--paper cannot be combined with a scenario file: give one of them")
     found = scenario_to_resume(output) if resume and scenario is None and not paper else None
@@ -118,7 +118,7 @@ def simulate_command(
         return
     found.complete()
     with kept(output), cluster(workers, scheduler) as client:
-        files = simulate_to_folder(
+        files, finished = simulate_to_folder(
             found, output, overwrite=overwrite, resume=resume,
             scene=scene, threads=threads, client=client, as_json=as_json,
         )  # fmt: skip

@@ -346,7 +346,7 @@ def test_warning_is_one_line(invoke, small, monkeypatch):
 
     def told(*arguments, **options):
         warn("the sun is taken for that of June\x1b[31m")
-        return []
+        return [], False
 
     monkeypatch.setattr("fifesim.output.run_folder.simulate_to_folder", told)
     result = invoke("simulate", small)

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from fifesim.grids.opening import archive_of, raster_file
@@ -116,17 +117,17 @@ def begin(unfinished, identity):
         os.replace(unfinished / f"{name}.partial", unfinished / name)
 
 
-def kept_state(unfinished):
-    """State of an unfinished run, empty if the file is missing or invalid."""
+def kept_json(path):
+    """Object in a JSON file of a run, empty if the file is missing or invalid."""
     try:
-        state = json.loads((unfinished / STATE).read_text(encoding="utf-8"))
+        state = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return {}
     return state if isinstance(state, dict) else {}
 
 
 def _check_same(unfinished, identity):
-    kept, state = kept_state(unfinished), json.loads(identity[STATE])
+    kept, state = kept_json(unfinished / STATE), json.loads(identity[STATE])
     try:
         begun = (unfinished / BEGUN).read_text(encoding="utf-8")
         same = {key: kept[key] == state[key] for key in state}
@@ -168,9 +169,13 @@ def check_inputs(before, now):
         )
 
 
-def check_finished(path, old, new, inputs):
-    """Raise ValueError if a finished run is not the requested one."""
+def check_finished(path, old, new, inputs, item=None):
+    """Raise ValueError if a finished run, with its STAC item if it has one, is not the requested one."""
     cure = "name another folder with -o, or run it again with --overwrite"
+    with suppress(AttributeError, KeyError, TypeError):
+        before, here = item["properties"]["processing:software"], versions()
+        if odd := [f"{name} {before.get(name)}" for name in sorted(here) if before.get(name) != here[name]]:
+            raise ValueError(f"{path.parent} has a finished run of other package versions, {', '.join(odd)}: {cure}")
     if old != new:
         raise ValueError(f"{path.parent} has a finished run of another scenario, with {_other_lines(old, new)}: {cure}")
     written = path.stat().st_mtime_ns

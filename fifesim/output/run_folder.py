@@ -16,7 +16,7 @@ from dask.utils import format_bytes, format_time
 
 from fifesim.analysis.regression_labels import matched, regress
 from fifesim.atmosphere import engines
-from fifesim.base.messages import LOG
+from fifesim.base.messages import LOG, warn
 from fifesim.chain.steps import ndvi
 from fifesim.grids import grid as grids
 from fifesim.grids.chunks import found_client
@@ -70,7 +70,7 @@ def simulate_to_folder(
     as_json=False,
     home=None,
 ):
-    """Simulate a scenario into a folder: image and truth, their styles, pictures, scenario and a STAC item."""
+    """Simulate a scenario into a folder; return its files, and whether they were there already."""
     # Blocks are saved as they are finished, and files appear when all are complete. Memory does not grow with the
     # scene.
     folder, names = Path(folder), names_of(scene)
@@ -78,9 +78,10 @@ def simulate_to_folder(
     warn_of_canopy(scenario)
     complete = scenario.complete()
     if finished:
-        old = write_scenario(read_scenario(folder / identity.SCENARIO).complete())
-        identity.check_finished(folder / identity.SCENARIO, old, write_scenario(complete), identity.inputs_of(complete))
-        return [folder / name for name in names]
+        if not (changed := _changed_files(complete, folder, names)):
+            return [folder / name for name in names], True
+        warn(f"{', '.join(changed)} of the finished run changed since they were written: the run is made again")
+        overwrite, resume = True, False
     workers.check_size(complete, folder)
     state = identity.state_of(identity.inputs_of(complete), write_scenario(complete), scene=bool(scene))
     stale = () if scene else (SCENE,)
@@ -102,12 +103,28 @@ def simulate_to_folder(
             _write_files(complete, tree, found, unfinished, folder if home is None else home)
         identity.check_inputs(json.loads(state[identity.STATE])["inputs"], identity.inputs_of(complete))
     LOG.info("wrote %s into %s", ", ".join(names), folder)
-    return [folder / name for name in names]
+    return [folder / name for name in names], False
 
 
 def names_of(scene):
     """Names of the files of a run, the last of which marks it as complete."""
-    return FILES + (SCENE,) * scene
+    return (*FILES[:-1], *(SCENE,) * scene, FILES[-1])
+
+
+def _changed_files(scenario, folder, names):
+    """Names of the files of a finished run that are not as they were written; ValueError if it is another run."""
+    item, path = identity.kept_json(folder / names[-1]), folder / identity.SCENARIO
+    changed = stac.changed_files(item, folder, names)
+    if path.name in changed:
+        raise ValueError(
+            f"{path} changed since it was written, so the run is unknown: name another folder with -o, or make it "
+            "again with its scenario and --overwrite"
+        )
+    old = write_scenario(read_scenario(path).complete())
+    identity.check_finished(path, old, write_scenario(scenario), identity.inputs_of(scenario), item)
+    if not changed and item != json.loads(json.dumps(stac.item(scenario, folder, report.headline(scenario)))):
+        return names[-1:]
+    return changed
 
 
 def _compute(found, lai, folder, client, threads, as_json):

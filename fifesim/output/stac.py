@@ -20,14 +20,16 @@ VERSION = "1.1.0"
 # odc-stac finds names of bands only in eo:bands, which version 2 of its extension forbids.
 _EXTENSIONS = [
     f"https://stac-extensions.github.io/{name}/schema.json"
-    for name in ("projection/v2.0.0", "eo/v1.1.0", "raster/v2.0.0", "view/v1.0.0", "processing/v1.2.0")
+    for name in ("projection/v2.0.0", "eo/v1.1.0", "raster/v2.0.0", "view/v1.0.0", "processing/v1.2.0", "file/v2.1.0")
 ]
 _COG = "image/tiff; application=geotiff; profile=cloud-optimized"
 
 # Files of a folder in the order of the item: key, title, media type and roles.
 _ASSETS = {
     "image.tif": ("image", "Digital numbers of the image", _COG, ["data"]),
+    "image.qml": ("image-style", "Style of the image for QGIS", "application/xml", ["metadata"]),
     "truth.tif": ("truth", "True means of ground properties over the pixels", _COG, ["data"]),
+    "truth.qml": ("truth-style", "Style of the true means for QGIS", "application/xml", ["metadata"]),
     "scene.tif": ("scene", "Ground cells", _COG, ["data"]),
     "scene.zarr": ("scene", "Ground cells", "application/vnd+zarr", ["data"]),
     "quicklook.png": ("thumbnail", "Scene and image", "image/png", ["thumbnail"]),
@@ -150,7 +152,7 @@ def _crs(source):
 
 
 def _asset(path, title, kind, roles):
-    asset = {"href": f"./{path.name}", "title": title, "type": kind, "roles": roles}
+    asset = {"href": f"./{path.name}", "title": title, "type": kind, "roles": roles} | _stored(path)
     if kind != _COG:
         return asset
     with rasterio.open(path) as source:
@@ -170,6 +172,36 @@ def _asset(path, title, kind, roles):
                 {key.removeprefix("eo:"): value for key, value in band.items() if key in _EO_FIELDS} for band in bands
             ],
         }
+
+
+# Prefix of a multihash: SHA-256 of 32 bytes.
+_SHA_256 = "1220"
+
+
+def _stored(path):
+    """Size [byte] and SHA-256 of a file, or of the names and contents of all files of a folder in their order."""
+    files = [path] if path.is_file() else sorted(each for each in path.rglob("*") if each.is_file())
+    digest = hashlib.sha256()
+    for each in files:
+        digest.update(b"" if each == path else each.relative_to(path).as_posix().encode())
+        with each.open("rb") as file:
+            hashlib.file_digest(file, lambda: digest)
+    return {
+        "file:size": sum(each.stat().st_size for each in files),
+        "file:checksum": f"{_SHA_256}{digest.hexdigest()}",
+    }
+
+
+def changed_files(kept, folder, names):
+    """Names of files that differ in size or checksum from an item, which is the last of them and may be invalid."""
+    *names, own = names
+    try:
+        stored = {
+            asset["href"]: {key: asset[key] for key in asset if "file:" in key} for asset in kept["assets"].values()
+        }
+    except (AttributeError, KeyError, TypeError):
+        return [own]
+    return [name for name in names if stored.get(f"./{name}") != _stored(folder / name)]
 
 
 def _band(source, number, coords):

@@ -154,7 +154,7 @@ def test_report_of_a_map_calls_nothing_synthetic(tmp_path):
 
 
 def test_uniform_map_has_a_report_without_regression(tmp_path):
-    files = simulate_to_folder(parse_scenario(write_lai_map(tmp_path / "lai.tif", 2.0)), tmp_path / "out")
+    files, _ = simulate_to_folder(parse_scenario(write_lai_map(tmp_path / "lai.tif", 2.0)), tmp_path / "out")
     assert all(path.stat().st_size > 0 for path in files)
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "Leaf area and FPAR from NDVI" not in page and re.search("R² of .*none, all", page, re.DOTALL)
@@ -196,11 +196,57 @@ def test_resuming_a_finished_run_computes_nothing(folder, tmp_path, monkeypatch)
     shutil.copytree(folder, tmp_path / "out")
     monkeypatch.setattr(run_folder, "simulate", None)
     scenario = parse_scenario(SMALL)
-    assert simulate_to_folder(scenario, tmp_path / "out", resume=True) == [tmp_path / "out" / name for name in FILES]
+    files = [tmp_path / "out" / name for name in FILES]
+    assert simulate_to_folder(scenario, tmp_path / "out", resume=True) == (files, True)
     with pytest.raises(ValueError, match=r"of another scenario, with arp = 0\.24, seed = 3: name another.*--overwrite"):
         simulate_to_folder(parse_scenario({**SMALL, "ground": {}}), tmp_path / "out", resume=True)
     with pytest.raises(ValueError, match="nothing to resume"):
         simulate_to_folder(scenario, tmp_path / "out", resume=True, scene=True)
+
+
+def test_changed_files_of_a_finished_run_are_made_again(tmp_path, run_without_pictures):
+    """Lost by a power cut, replaced, or one bit of them changed; also a file of the store of cells."""
+    scenario, out = parse_scenario(SMALL), tmp_path / "out"
+
+    def run(**options):
+        return run_without_pictures(scenario, out, scene=True, **options)
+
+    def contents():
+        return {path.relative_to(out): path.read_bytes() for path in out.rglob("*") if path.is_file()}
+
+    def flip(path, at):
+        content = bytearray(path.read_bytes())
+        content[at] ^= 1
+        path.write_bytes(content)
+
+    def replace_with_folder(path):
+        path.unlink()
+        path.mkdir()
+
+    run()
+    before = contents()
+    item = out / "item.json"
+    for name, damage in (
+        ("image.tif", lambda: (out / "image.tif").write_bytes(b"")),
+        ("truth.qml", lambda: flip(out / "truth.qml", 5)),
+        ("scene.zarr", lambda: flip(out / "scene.zarr" / "lai" / "0.0", -1)),
+        ("item.json", lambda: item.write_text(item.read_text().replace('"gsd": 30.0', '"gsd": 30.1'))),
+        ("item.json", lambda: item.write_text("[1")),
+        ("item.json", lambda: replace_with_folder(item)),
+    ):
+        damage()
+        with pytest.warns(UserWarning, match=rf"^{name} of the finished run changed.*made again"):
+            assert not run(resume=True)[1]
+        assert contents() == before
+    assert run(resume=True)[1]
+    other = item.read_text().replace('"numba": "', '"numba": "9')
+    for path, text, said in (
+        (item, other, r"other package versions, numba 9\d.*--overwrite"),
+        (out / "scenario.toml", (out / "scenario.toml").read_text().replace("seed = 3", "seed = 4"), "run is unknown"),
+    ):
+        path.write_text(text)
+        with pytest.raises(ValueError, match=said):
+            run(resume=True)
 
 
 def test_finished_run_with_a_newer_input_is_not_resumed(tmp_path, run_without_pictures):

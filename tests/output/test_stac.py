@@ -1,5 +1,6 @@
 """STAC items and collections are valid and agree with the files."""
 
+import hashlib
 import json
 
 import numpy as np
@@ -25,7 +26,8 @@ def test_an_item_is_valid(item, pystac):
     """Validation uses the core schemas bundled with pystac; extension schemas are online only."""
     pytest.importorskip("jsonschema")
     assert {asset["href"][2:] for asset in item["assets"].values()} == {
-        "image.tif", "truth.tif", "scene.zarr", "quicklook.png", "report.html", "scenario.toml",
+        "image.tif", "image.qml", "truth.tif", "truth.qml", "scene.zarr", "quicklook.png", "report.html",
+        "scenario.toml",
     }  # fmt: skip
     core = pystac.Item.from_dict(item | {"stac_extensions": []})
     (schema,) = core.validate()
@@ -48,9 +50,22 @@ def test_extensions_of_an_item_are_readable_and_declared(item, small_run, pystac
     assert view.sun_azimuth == pytest.approx(float(tags["saa"]), abs=1e-8)
     # Azimuth from the nadir point of the sensor, which lies in the east, to the scene.
     assert view.azimuth == 280.0
-    for prefix, name in (("proj", "projection"), ("eo", "eo"), ("raster", "raster"), ("processing", "processing")):
+    names = {"proj": "projection"} | {name: name for name in ("eo", "raster", "processing", "file")}
+    for prefix, name in names.items():
         assert f'"{prefix}:' in json.dumps(item) and any(f"/{name}/v" in each for each in item["stac_extensions"])
     assert found.properties["instruments"] == ["tm"] and found.datetime.isoformat() == "1987-06-06T16:35:00+00:00"
+
+
+def test_size_and_checksum_of_each_file_are_in_the_item(item, small_run):
+    """A multihash: 12 for SHA-256, and its length of 32 bytes."""
+    for asset in item["assets"].values():
+        path = small_run / asset["href"]
+        if path.is_file():
+            content = path.read_bytes()
+            assert asset["file:size"] == len(content)
+            assert asset["file:checksum"] == f"1220{hashlib.sha256(content).hexdigest()}"
+        else:
+            assert asset["file:size"] == sum(each.stat().st_size for each in path.rglob("*") if each.is_file())
 
 
 def test_off_nadir_is_the_angle_at_the_satellite(item):

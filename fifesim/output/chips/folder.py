@@ -163,7 +163,7 @@ def study_to_resume(folder):
     """Study of an unfinished or finished run, and its number of chips; None if there is no run."""
     folder = Path(folder)
     if (folder / UNFINISHED / BEGUN).is_file():
-        count = identity.kept_state(folder / UNFINISHED).get("chips")
+        count = identity.kept_json(folder / UNFINISHED / identity.STATE).get("chips")
         return read_study(folder / UNFINISHED / BEGUN), count if isinstance(count, int) else None
     if all((folder / name).is_file() for name in (STUDY, store.ROOT)):
         return read_study(folder / STUDY), store.chips_in(folder)
