@@ -1,17 +1,93 @@
 """Compilation of kernels, and their arguments as arrays."""
 
+import hashlib
+import io
+import os
+from contextlib import contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numba
 import numpy as np
 import pandas as pd
+from numba.core.caching import IndexDataCacheFile
 from numba.extending import register_jitable
 
-# Divided as numpy does: a check of each divisor for 0 would keep a loop from taking several cells at once. Allocate
-# arrays, reshape and sort outside of kernels: numba compiles these operations anew for each kernel.
-compiled: Any = partial(numba.njit, nogil=True, cache=True, error_model="numpy", no_cfunc_wrapper=True)
-"""Decorator of a kernel, which is compiled for each type of its arguments when it is first called."""
+from fifesim.base.messages import warn
+
+
+class _CheckedFiles(IndexDataCacheFile):
+    """Files of a compiled kernel that end with a SHA-256, because numba runs what it reads."""
+
+    def _tried(self, function, *given):
+        try:
+            return function(*given)
+        except OSError as error:
+            _warn_of_cache(self._cache_path, error.strerror)
+
+    def load(self, key):
+        """Load a compiled kernel, None if there is none that is intact."""
+        return self._tried(super().load, key)
+
+    def save(self, key, data):
+        """Save a compiled kernel if the disk takes it."""
+        self._tried(super().save, key, data)
+
+    def _load_index(self):
+        self._remove_if_damaged(self._index_path)
+        return super()._load_index()
+
+    def _load_data(self, name):
+        self._remove_if_damaged(self._data_path(name))
+        return super()._load_data(name)
+
+    def _remove_if_damaged(self, path):
+        with suppress(FileNotFoundError):
+            content = Path(path).read_bytes()
+            if hashlib.sha256(content[:-32]).digest() != content[-32:]:
+                _warn_of_cache(self._cache_path, "damaged files are removed")
+                os.unlink(path)
+
+    @contextmanager
+    def _open_for_write(self, filepath):
+        content = io.BytesIO()
+        with super()._open_for_write(filepath) as file:
+            yield content
+            file.write(content.getvalue() + hashlib.sha256(content.getvalue()).digest())
+
+
+_warned: set[str] = set()
+
+
+def _warn_of_cache(folder, reason):
+    """Warn once for each reason that kernels cannot be loaded or saved."""
+    if reason not in _warned:
+        _warned.add(reason)
+        warn(
+            f"compiled kernels in {folder} cannot be used ({reason}), so that kernels are compiled again, which takes "
+            "up to a minute: name another folder in the variable NUMBA_CACHE_DIR if it persists"
+        )
+
+
+def compiled(function: Any = None, **options: Any) -> Any:
+    """Decorator of a kernel, which is compiled for each type of its arguments when it is first called."""
+    if function is None:
+        return partial(compiled, **options)
+    # Divided as numpy does: a check of each divisor for 0 would keep a loop from taking several cells at once. Allocate
+    # arrays, reshape and sort outside of kernels: numba compiles these operations anew for each kernel.
+    options |= {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    try:
+        kernel = numba.njit(function, cache=True, **options)
+    except RuntimeError:
+        _warn_of_cache(Path(__file__).parents[1], "no folder can be written")
+        return numba.njit(function, **options)
+    # Without compilation, a kernel is a plain function.
+    if cache := getattr(kernel, "_cache", None):
+        name, stamp = f"{cache._impl.filename_base}.sha256", cache._impl.locator.get_source_stamp()
+        cache._cache_file = _CheckedFiles(cache.cache_path, name, stamp)
+    return kernel
+
 
 jitable: Any = register_jitable(no_cfunc_wrapper=True)
 """Decorator of a function that kernels call too, compiled as a part of them."""

@@ -8,9 +8,9 @@ import dask.array as da
 import numpy as np
 import xarray as xr
 from dask.graph_manipulation import bind
-from numba import vectorize
 from scipy.sparse.csgraph import connected_components
 
+from fifesim.base.arrays import compiled, read_only
 from fifesim.base.footprints import AxisOperator, Boxcar, axis_operator, regularize
 from fifesim.grids import chunks, windows
 from fifesim.grids import grid as grids
@@ -143,15 +143,18 @@ def _links(data, weights, edges, numbers, in_turn=False):
 def _add(weights, values, total=None):
     """Add weighted values along their first axis to sums in order, so that the bits do not depend on chunks."""
     sums = np.zeros((len(weights), *values.shape[1:])) if total is None else total.copy()
+    kind = np.float32 if values.dtype == np.float32 else float
     for row, number in np.argwhere(weights):
-        _add_product(sums[row], values[number], weights[row, number], out=sums[row, ...])
+        own = read_only(np.asarray(values[number], kind)).reshape(-1)
+        _add_product(sums[row, ...].reshape(-1), own, weights[row, number])
     return sums
 
 
-@vectorize(["float64(float64, float32, float64)", "float64(float64, float64, float64)"], cache=True)
-def _add_product(total, value, weight):
+@compiled
+def _add_product(total, values, weight):
     """Multiply and add in one pass and in double precision, without memory for products."""
-    return total + weight * value
+    for at in range(total.size):
+        total[at] += weight * values[at]
 
 
 def areas(pixels):

@@ -88,6 +88,13 @@ class Commands(TyperGroup):
         except (OSError, MemoryError, RuntimeError, ImportError) as error:
             exit_with_error(error or "out of memory", Exit.FAILURE)
 
+    def invoke(self, context):
+        """Run a command. Click takes the error of a file that ends early for Ctrl-D."""
+        try:
+            return super().invoke(context)
+        except EOFError as error:
+            raise OSError(f"a file ends early: {error or 'no details'}") from error
+
 
 def _be_quiet(context: typer.Context, wanted: bool):
     if wanted:
