@@ -341,6 +341,15 @@ def test_ctrl_c_exits_with_130_and_one_line(invoke, tmp_path, monkeypatch, comma
     assert "interrupted; nothing was written" in result.stderr and "Traceback" not in result.stderr
 
 
+def test_file_that_ends_early_is_not_taken_for_ctrl_c(invoke, small, monkeypatch):
+    def short(*arguments, **options):
+        raise EOFError("Ran out of input")
+
+    monkeypatch.setattr("fifesim.output.run_folder.simulate_to_folder", short)
+    result = invoke("simulate", small)
+    assert result.exit_code == 1 and result.stderr == "fifesim: a file ends early: Ran out of input\n"
+
+
 def test_warning_is_one_line(invoke, small, monkeypatch):
     """The warning has no source line and no control characters."""
 

@@ -6,7 +6,7 @@ import socket
 import pytest
 
 from fifesim.base import files
-from fifesim.base.files import check_regular, in_a_line, read_toml, shown
+from fifesim.base.files import check_regular, in_a_line, read_toml, shown, whole_file
 
 
 def test_only_regular_files_are_opened(tmp_path, monkeypatch):
@@ -87,3 +87,19 @@ def test_tables_are_modifiable_copies():
 def test_missing_table_is_named():
     with pytest.raises(FileNotFoundError, match=r"'no_such\.csv'"):
         files.path("no_such.csv")
+
+
+def test_file_is_replaced_by_a_complete_one_only(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    with pytest.raises(RuntimeError), whole_file(path) as new:
+        new.write_text("half")
+        raise RuntimeError
+    assert path.read_text() == "old"
+    with whole_file(path) as new:
+        assert new.suffix == ".txt" and not any(new.parent.iterdir())
+        new.write_text("new")
+    assert path.read_text() == "new" and list(tmp_path.iterdir()) == [path]
+    for wrong, error in ((tmp_path, IsADirectoryError), (tmp_path / "none" / "a.txt", FileNotFoundError)):
+        with pytest.raises(error), whole_file(wrong):
+            pass

@@ -88,6 +88,19 @@ def test_run_killed_between_moves_leaves_no_mix_of_two_runs(tmp_path, monkeypatc
     assert all_files(out) == NEW and not (out / UNFINISHED).exists()
 
 
+def test_results_are_on_the_disk_before_their_mark(tmp_path, monkeypatch):
+    done, flush, replace = [], os.fsync, os.replace
+    monkeypatch.setattr(
+        os, "fsync", lambda number: (done.append(os.readlink(f"/proc/self/fd/{number}")), flush(number))
+    )
+    monkeypatch.setattr(os, "replace", lambda source, target: (done.append(target.name), replace(source, target)))
+    write_new_run(tmp_path / "out")
+    hidden = tmp_path / "out" / UNFINISHED
+    *before, folder, mark, _ = done
+    assert folder == str(tmp_path / "out") and mark == "mark"
+    assert {str(hidden / name) for name in ("store", "store/part", "one.txt", "mark")} == set(before[:4])
+
+
 @pytest.mark.parametrize(("number", "error"), [(1, OSError), (4, KeyboardInterrupt), (8, OSError)])
 def test_error_between_moves_restores_the_old_results(tmp_path, monkeypatch, number, error):
     out = tmp_path / "out"
