@@ -51,7 +51,8 @@ def scenario_to_resume(folder):
 
 def state_of(inputs, begun, **options):
     """Properties that must agree for the blocks of two runs to fit together, as texts of files by name."""
-    return {STATE: json.dumps({"versions": versions(), "inputs": with_checksums(inputs), **options}), BEGUN: begun}
+    known = {"versions": versions(), "inputs": with_checksums(inputs), "scenario": _digest(begun)}
+    return {STATE: json.dumps(known | options), BEGUN: begun}
 
 
 def inputs_of(scenario):
@@ -142,6 +143,7 @@ def _check_same(unfinished, identity):
     reasons = {
         "versions": "was started with other package versions: start again with --overwrite",
         "inputs": "was started with an input file that has changed: start again with --overwrite",
+        "scenario": f"has a file {BEGUN} that changed since it was written: start again with --overwrite",
         "scene": "was started with another setting of --scene: use the same",
         "chips": f"was started with {kept.get('chips')} chips: use the same number",
     }
@@ -153,6 +155,11 @@ def _check_same(unfinished, identity):
 def _keys(text):
     """Lines of a TOML text without comments."""
     return [line.strip() for line in text.splitlines() if not line.startswith("#")]
+
+
+def _digest(text):
+    """Checksum of a TOML text without comments."""
+    return hashlib.blake2b("\n".join(_keys(text)).encode()).hexdigest()
 
 
 def _other_lines(old, new):

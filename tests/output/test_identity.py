@@ -169,6 +169,15 @@ def test_comments_of_a_scenario_do_not_prevent_resuming(tmp_path):
         run_identity.begin(tmp_path, make_identity(turned))
 
 
+def test_changed_scenario_of_an_unfinished_run_is_not_resumed(tmp_path):
+    """Without SCENARIO, the requested scenario is read from the changed file and agrees with it."""
+    run_identity.begin(tmp_path, make_identity(parse_scenario(SMALL).complete()))
+    other = make_identity(parse_scenario(SMALL | {"ground": {"seed": 4}}).complete())
+    (tmp_path / BEGUN).write_text(other[BEGUN])
+    with pytest.raises(run_identity.NotThisRun, match=rf"has a file {BEGUN} that changed.*--overwrite"):
+        run_identity.begin(tmp_path, other)
+
+
 def test_paths_in_tags_are_relative_to_the_image(tmp_path):
     """An image then reveals no folder names, and it can be moved together with its inputs."""
     data = tmp_path / "data" / "hills.tif"
