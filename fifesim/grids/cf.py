@@ -238,9 +238,10 @@ def check_quantity(array, *names):
         stated, key, cure = QUANTITIES[min(found)].standard_name, "name", f"type .rename({names[0]!r})"
         if stated in wanted:
             return
+    step = _STEPS.get((stated, names[0]), "the raster of that quantity")
     raise ValueError(
         f"{array.name or 'the array'} is {_LONG_NAMES[stated]} by its {key}, where "
-        f"{QUANTITIES[names[0]].long_name} is needed: take {_STEPS.get((stated, names[0]), 'the raster of that quantity')}, "
+        f"{QUANTITIES[names[0]].long_name} is needed: take {step}, "
         f"or {cure} if it is wrong"
     )
 

@@ -280,3 +280,23 @@ def test_adding_a_property_takes_two_lines(tmp_path):
     copied = os.environ | {"PYTHONPATH": str(tmp_path)}
     run = subprocess.run(command, cwd=tmp_path, env=copied, capture_output=True, text=True, check=False)
     assert run.returncode == 0 and run.stdout.startswith("....."), run.stdout[-2000:]
+
+
+def test_canopies_are_equal_by_value():
+    """Also with rasters and leaves; a field with the default value differs from a missing one."""
+    raster = {
+        "brown": RASTER,
+        "leaf_optics": fifesim.Leaf(water=RASTER / 10),
+        "background": {"TM3": RASTER, "TM4": 0.2},
+    }
+    copied = {
+        "brown": RASTER.copy(),
+        "leaf_optics": fifesim.Leaf(water=RASTER / 10),
+        "background": dict(raster["background"]),
+    }
+    assert Canopy() == TALLGRASS and hash(Canopy()) == hash(TALLGRASS)
+    assert Canopy(**raster) == Canopy(**copied) and hash(Canopy(**raster)) == hash(Canopy(**copied))
+    assert Canopy(brown=0.5) == Canopy(brown=np.float64(0.5)) != Canopy(brown=0.4)
+    for name, other in (("brown", RASTER / 2), ("leaf_optics", fifesim.Leaf()), ("background", {"TM3": RASTER / 2})):
+        assert Canopy(**raster) != Canopy(**copied | {name: other})
+    assert Canopy(brown=0.0) != Canopy() and Canopy() != 1
