@@ -6,7 +6,11 @@ from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
 
+import numpy as np
 import pytest
+import rasterio
+from affine import Affine
+from pyproj import Transformer
 
 import fifesim
 from fifesim.accessor import PUBLIC
@@ -30,6 +34,22 @@ def python_blocks(path):
     return [block for block, _ in _BLOCK.findall(path.read_text(encoding="utf-8"))]
 
 
+def write_modis_lai(path):
+    """Write LAI in the form of MCD15A3H around the FIFE site, with water and a strip of fill values."""
+    cell = 1111950.519766523 / 2400
+    rows, columns = np.indices((80, 100))
+    counts = 25 + 10 * np.sin(rows / 5) + 8 * np.cos(columns / 7)
+    counts[38:42, 45:50], counts[:5] = 254, 255
+    place = Affine(cell, 0, -20015109.355798 + 25160 * cell, 0, -cell, 10007554.677899 - 12190 * cell)
+    profile = {"driver": "GTiff", "width": 100, "height": 80, "count": 1, "dtype": "uint8", "nodata": 255}
+    with rasterio.open(path, "w", crs="+proj=sinu +R=6371007.181 +units=m", transform=place, **profile) as sink:
+        sink.write(counts.astype(np.uint8), 1)
+        sink.scales, sink.descriptions = [0.1], ["Lai_500m"]
+
+
+# Files that a reader of a page has.
+FILES = {"docs/howto/my_map.md": ("lai_500m.tif", write_modis_lai)}
+
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md")), *sorted((DOCS / "howto").glob("*.md"))]
 
 
@@ -38,12 +58,41 @@ def test_code_of_a_page_runs(page, tmp_path, monkeypatch):
     """Blocks run in order in one namespace."""
     monkeypatch.chdir(tmp_path)
     names = {}
+    if page in FILES:
+        name, write = FILES[page]
+        write(name)
     for block, printed in _BLOCK.findall((ROOT / page).read_text(encoding="utf-8")):
         told = StringIO()
         with redirect_stdout(told):
             exec(compile(block, page, "exec"), names)
         # The output shown on the page is the printed output.
         assert not printed or told.getvalue().split() == printed.split()
+
+
+def test_page_of_modis_masks_fill_values_and_finds_the_place(tmp_path, monkeypatch):
+    """Latitude on the sphere is geodetic: the value is read at y = R latitude, x = R longitude cos(latitude)."""
+    monkeypatch.chdir(tmp_path)
+    write_modis_lai("lai_500m.tif")
+    names = {}
+    blocks = python_blocks(DOCS / "howto" / "my_map.md")
+    for block in [blocks[0], *(block for block in blocks if "modis" in block)]:
+        exec(compile(block, "my_map.md", "exec"), names)
+    smooth, image = names["smooth"], names["image"]
+    assert float(smooth.max()) < 4.31 and 0.001 < float(smooth.isnull().mean()) < 0.05
+    assert float(abs(names["fine"].fifesim.aggregate(480) - names["pixels"]).max()) < 1e-12
+    assert image.dims == ("band", "y", "x") and int((image > 0).sum()) > 5000
+    with rasterio.open("lai_500m.tif") as source:
+        affine, counts = source.transform, source.read(1)
+    row, column = 250, 100
+    place = float(smooth.x[column]), float(smooth.y[row])
+    longitude, latitude = np.radians(Transformer.from_crs(26914, 4326, always_xy=True).transform(*place))
+    u, v = ~affine * (6371007.181 * longitude * np.cos(latitude), 6371007.181 * latitude)
+    left, top = int(u - 0.5), int(v - 0.5)
+    corners = 0.1 * counts[top : top + 2, left : left + 2]
+    a, b = u - 0.5 - left, v - 0.5 - top
+    expected = np.array([1 - b, b]) @ corners @ np.array([1 - a, a])
+    # LAI changes by 0.2 per cell of the map, and GDAL smooths sheared maps as if they moved by 0.02 cells.
+    assert float(smooth[row, column]) == pytest.approx(expected, abs=5e-3)
 
 
 def test_scenario_and_instrument_of_the_pages_are_valid(tmp_path):

@@ -18,7 +18,7 @@ from fifesim.grids import grid as grids
 from fifesim.grids.chunks import apart
 from fifesim.grids.directions import Directions, from_grid_north
 from fifesim.grids.grid import as_carried, centres_of, with_crs_of
-from fifesim.grids.inputs import Horizon
+from fifesim.grids.inputs import Horizon, one_layer
 from fifesim.grids.windows import gather, lazy_together
 from fifesim.ground.terrain import horizon as horizons
 from fifesim.ground.terrain import sky_labels
@@ -273,7 +273,7 @@ def labelled_slopes(data, level, light, history, name="surface_reflectance"):
 
 def on_slopes(kernel, dem, horizon, geometry, reflectance=None, check=True, leading=()):
     """Array of a kernel on slopes, lazy where an input is."""
-    dem = dem if reflectance is None else with_crs_of(dem, reflectance)
+    dem = one_layer(dem if reflectance is None else with_crs_of(dem, reflectance), "dem")
     grid = elevation_grid(dem) if reflectance is None else grids.geobox(reflectance)
     level = None if reflectance is None else reflectance.data
     known = None if horizon is None else horizon.data
@@ -288,7 +288,8 @@ def on_slopes(kernel, dem, horizon, geometry, reflectance=None, check=True, lead
 
 def light_on_slopes(dem, grid, geometry, horizon=None):
     """Elevation, sky, cell and geometry of the slopes of a grid for `slope_reflectance`, in memory."""
-    data = dem.transpose(..., "y", "x").data
+    dem = one_layer(dem, "dem")
+    data = dem.transpose("y", "x").data
     of_block, reads = _light_on(grid, dem, data, horizon, geometry, True)
     return chunking.windows(partial(of_block, lambda *light: light), reads, tuple(grid.shape))
 
