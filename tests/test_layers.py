@@ -120,7 +120,7 @@ def test_top_folder_is_small_and_has_the_known_folders():
 
 # Parts of a stage in import order; "" are the files directly in the stage folder.
 PARTS = {
-    "ground": ({"canopy"}, {"terrain"}, {"landscape"}),
+    "ground": ({""}, {"canopy"}, {"terrain"}, {"landscape"}),
     "sensor": ({"response"}, {"description"}, {""}, {"products"}),
 }
 

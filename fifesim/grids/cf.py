@@ -251,7 +251,7 @@ def check_words(raster, texts, name, units=""):
     for text in texts:
         if not isinstance(text, str):
             continue
-        found = _named(text)
+        found = named(text)
         if (found and name not in found) or found & {"quality"}:
             raise ValueError(
                 f"{raster} is named {text!r}, where {QUANTITIES[name].long_name} is needed: take the raster or band of "
@@ -265,21 +265,7 @@ def check_words(raster, texts, name, units=""):
         )
 
 
-def band_of(raster, bands, name):
-    """Index of the band whose texts name a quantity; a single band needs none."""
-    texts = [[text for text in texts if isinstance(text, str)] for texts in bands]
-    exactly = [index for index, each in enumerate(texts) if name in map(str.lower, each)]
-    in_words = [index for index, each in enumerate(texts) if set().union(*map(_named, each)) == {name}]
-    for found in (range(len(texts)), exactly, in_words):
-        if len(found) == 1:
-            return found[0]
-    raise ValueError(
-        f"{raster} has {len(texts)} bands, and not exactly one is described as {QUANTITIES[name].long_name}: select "
-        "the band, for instance with rioxarray.open_rasterio(path).sel(band=2), or gdal_translate -b 2 of a file"
-    )
-
-
-def _named(text):
+def named(text):
     """Quantities that a text names."""
     words = re.findall("[a-z]+[0-9]?", text.lower().replace("_", " ").replace("leaf area", "lai"))
     return {*map(_WORDS.get, words)} - {None}

@@ -169,21 +169,6 @@ def storage(raster):
     return {**raster.attrs, **raster.encoding} if raster.dtype.kind in "iu" else raster.attrs
 
 
-def one_layer(raster, quantity):
-    """Layer of an array that holds a quantity, with the dimensions y and x only."""
-    name = str(raster.name or "the raster")
-    if "band" in raster.dims:
-        words, names = raster.attrs.get("long_name"), raster["band"].values
-        words = words if np.shape(words) == np.shape(names) else names
-        raster = raster.isel(band=cf.band_of(name, np.array(words, object)[:, None], quantity), drop=True)
-    if raster.ndim != 2:
-        raise ValueError(
-            f"{name} has dimensions {raster.dims}, where {cf.QUANTITIES[quantity].long_name} has y and x: select one "
-            "layer, such as .isel(time=0)"
-        )
-    return raster
-
-
 # Range of reflectance factors; glint, snow and slopes in low sun stay within. [1]
 LOWEST, HIGHEST = -0.5, 5.0
 
@@ -198,7 +183,7 @@ def incoming(raster, name):
     if "gain" in array.coords:
         return array
     _check_stored(array, name)
-    array = in_micrometres(_named(north_up(array)))
+    array = in_micrometres(with_band_names(north_up(array)))
     if "atmosphere" in array.attrs and array.dtype.kind == "f":
         if array.chunks is None and array.dims[-2:] in (("y", "x"), ("line", "sample")):
             check_scale(array.values)
@@ -281,7 +266,7 @@ def _called(band):
     return long_name if numbered and isinstance(long_name, str) and long_name else str(band.name)
 
 
-def _named(array):
+def with_band_names(array):
     """Name bands by ``long_name`` if the coordinate has only numbers, which count the names from 1."""
     names = array.attrs.get("long_name")
     if "band" not in array.coords or array["band"].dtype.kind not in "iu" or isinstance(names, str) or not names:

@@ -5,7 +5,7 @@ import re
 import warnings
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from xml.etree import ElementTree
 
@@ -18,14 +18,11 @@ import rasterio
 import rasterio.errors
 import rioxarray
 import xarray as xr
-from pyproj.aoi import AreaOfInterest
-from pyproj.database import query_utm_crs_info
-from rasterio.enums import ColorInterp
 from rasterio.windows import Window
 
 from fifesim.base.files import check_regular, in_a_line, shown
-from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
+from fifesim.grids import projection
 from fifesim.grids.projection import lies_in_words
 
 # [byte]
@@ -304,21 +301,6 @@ def sound_raster(file):
         yield source, horizontal_crs(source, file.name)
 
 
-def file_of(quantity, path, allow_remote=False):
-    """Checked raster file, with the number of the band that holds a quantity."""
-    file = raster_file(path, allow_remote)
-    with sound_raster(file) as (source, _):
-        numbers = [each for each in source.indexes if source.colorinterp[each - 1] != ColorInterp.alpha]
-        index = cf.band_of(file.name, [words_of(source, each) for each in numbers], quantity)
-    return replace(file, band=numbers[index])
-
-
-def words_of(source, band):
-    """Texts that describe a band of an open file."""
-    tags = source.tags(band)
-    return source.descriptions[band - 1], *(tags.get(key) for key in ("NETCDF_VARNAME", "long_name", "standard_name"))
-
-
 def check_raster(source, name, *, north_up=False):
     """Raise ValueError for a raster whose cells are not real numbers, or have no position."""
     if not source.count:
@@ -396,10 +378,10 @@ def covering_grid(path, cell, pixel, crs=None):
     if crs is not None:
         crs = pyproj.CRS.from_user_input(projection.horizontal(crs))
     else:
-        crs = _utm(own, *to_degrees.transform(x.mean(), y.mean())) if elsewhere else own
+        middle = to_degrees.transform(x.mean(), y.mean())
+        crs = pyproj.CRS(projection.undistorted(*middle, own.datum.name)) if elsewhere else own
     if crs != own:
-        pipeline, _ = projection.operation(own, crs, area)
-        x, y = projection.carry(pipeline, own, crs, x, y)
+        x, y = projection.carry(projection.operation(own, crs, area), own, crs, x, y)
         if not np.isfinite([x, y]).all():
             raise ValueError(f"{projection.name_of(crs)} does not reach {file.name}: it spans {lies}")
         projection.check_metres(crs, (x.min(), y.min(), x.max(), y.max()))
@@ -409,10 +391,3 @@ def covering_grid(path, cell, pixel, crs=None):
     width, height = (np.ceil(size / cell - 1e-6) * cell for size in (width, height))
     name = f"EPSG:{crs.to_epsg()}" if crs.to_epsg() else crs.to_wkt()
     return grids.grid_at(name, float(west), float(north), float(width), float(height), cell)
-
-
-def _utm(crs, longitude, latitude):
-    """UTM zone of a place, in NAD83 if this is the datum of a CRS, else in WGS 84."""
-    datum = "NAD83" if crs.datum is not None and crs.datum.name == "North American Datum 1983" else "WGS 84"
-    place = AreaOfInterest(longitude, latitude, longitude, latitude)
-    return pyproj.CRS.from_epsg(query_utm_crs_info(datum_name=datum, area_of_interest=place)[0].code)

@@ -41,35 +41,33 @@ _SCALE_WARNED = 0.01
 _RETURNS = 1.0
 
 
-# Datums whose latitude and longitude are used as if on WGS 84, by name, and the error of this use. [m]
-_LIKE_WGS84 = {
-    r"(d )?(world geodetic system (of )?|wgs ?)(19)?84( ensemble)?": 0.0,
-    r"(d )?(european terrestrial reference system (of )?|etrs ?)(19)?89( ensemble)?": 1.0,
-    r"(d )?(north american (datum )?(of )?|nad ?)(19)?83": 4.0,
-}
-# Radii of spheres for the Earth, and the accuracy of a shift to WGS 84 that a CRS states. [m]
-_EARTH, _STATED = (6.35e6, 6.38e6), 5.0
+# Datums whose latitude and longitude are used as if on WGS 84, from which they differ by 2 m at most.
+_LIKE_WGS84 = re.compile(
+    "(d )?((world geodetic system (of )?|wgs ?)(19)?84|(european terrestrial reference system (of )?|etrs ?)(19)?89"
+    "|(north american (datum )?(of )?|nad ?)(19)?83)( ensemble)?"
+)
+# Radii of spheres for the Earth. [m]
+_EARTH = 6.35e6, 6.38e6
 
 
 def operation(source, target, area=None):
-    """PROJ pipeline between two CRSs, None if they are the same, and its accuracy [m]."""
+    """PROJ pipeline of known accuracy between two CRSs, None if they are the same."""
     # Without a direct operation the route through WGS 84 is taken if both of its steps are known. A change of datum by
     # identity of latitude and longitude (PROJ's "ballpark") is used for datums that agree with WGS 84 and for spheres
     # only: between NAD27 and NAD83 it is 30 m off in Kansas.
     source, target = pyproj.CRS.from_user_input(source), pyproj.CRS.from_user_input(target)
     if source.equals(target, ignore_axis_order=True):
-        return None, 0.0
+        return None
     if stated := [crs for crs in (source, target) if '"semi_major"' in crs.to_wkt()]:
         raise ValueError(
             f"{name_of(stated[0])} states a radius (semi_major) that PROJ does not use, so that places are 20 km off: "
             "state the sphere with gdal_edit.py -a_srs '+proj=sinu +R=6371007.181 +units=m' FILE, or .rio.write_crs"
         )
     if direct := _best(source, target, area):
-        return _pipeline(direct), float(direct.accuracy)
+        return _pipeline(direct)
     steps = _by_wgs84(source, area), _by_wgs84(target, area, back=True)
     if all(steps):
-        (first, one), (second, other) = steps
-        return _pipeline(first, second), float(one + other)
+        return _pipeline(*steps)
     raise ValueError(
         f"no operation of known accuracy leads from {name_of(source)} to {name_of(target)}: PROJ would only assume "
         "that both datums agree ('ballpark'), which can be off by 100 m. Name the datum of the data in its CRS "
@@ -79,22 +77,15 @@ def operation(source, target, area=None):
 
 
 def _by_wgs84(crs, area, *, back=False):
-    """Step from a CRS to WGS 84, or back, and its accuracy [m], None if its datum is unknown."""
-    wgs84 = pyproj.CRS.from_epsg(4326)
-    ends = (wgs84, crs) if back else (crs, wgs84)
-    if known := _best(*ends, area):
-        return known, known.accuracy
-    base = crs.source_crs if crs.is_bound else crs
+    """Step from a CRS to WGS 84, or back, None if its datum is unknown."""
+    base, ends = crs.source_crs if crs.is_bound else crs, (4326, crs) if back else (crs, 4326)
+    shift, ellipsoid = crs.is_bound and crs.coordinate_operation.towgs84, base.ellipsoid
     # Maps on a sphere are made with geodetic latitude (MODIS, VIIRS, EASE-Grid), which a geocentric shift would change.
-    sphere = base.ellipsoid.inverse_flattening == 0
-    if crs.is_bound and crs.coordinate_operation.towgs84:
-        accuracy = None if sphere else _STATED
-    elif sphere:
-        accuracy = 0.0 if _EARTH[0] < base.ellipsoid.semi_major_metre < _EARTH[1] else None
+    if ellipsoid.inverse_flattening == 0:
+        known = not shift and _EARTH[0] < ellipsoid.semi_major_metre < _EARTH[1]
     else:
-        name = base.datum.name.replace("_", " ").lower()
-        accuracy = next((error for words, error in _LIKE_WGS84.items() if re.fullmatch(words, name)), None)
-    return None if accuracy is None else (_transformers(*ends, area, ballpark=True)[0], accuracy)
+        known = shift or _LIKE_WGS84.fullmatch(base.datum.name.replace("_", " ").lower())
+    return _best(*ends, area) or (_transformers(*ends, area, ballpark=True)[0] if known else None)
 
 
 def carry(pipeline, source, target, x, y):
@@ -176,7 +167,7 @@ def check_metres(crs, bounds):
         if abs(scale - 1) > _SCALE_BOUND:
             raise ValueError(
                 f"the scale of {name} is {scale:.3f} at longitude {longitude:.2f}, latitude {latitude:.2f}: a metre of "
-                f"a grid may be {_SCALE_BOUND:.1%} off; use another CRS, such as {_undistorted(longitude, latitude)}"
+                f"a grid may be {_SCALE_BOUND:.1%} off; use another CRS, such as {undistorted(longitude, latitude)}"
             )
         found.append((scale, longitude, latitude))
     scale, longitude, latitude = max(found, key=lambda each: abs(each[0] - 1))
@@ -190,7 +181,7 @@ def _warn_of_scale(name, scale, longitude, latitude):
     warn(
         f"the scale of {name} is {scale:.2f} near longitude {longitude}, latitude {latitude}: a cell of 30 m is "
         f"{30 / scale:.1f} m on the ground, where slopes, footprints and distances are taken as if it were 30 m; "
-        f"{_undistorted(longitude, latitude)} is within 1 %"
+        f"{undistorted(longitude, latitude)} is within 1 %"
     )
 
 
@@ -216,11 +207,14 @@ def _reach(crs):
     return f", {west:.0f} to {east:.0f} E and {south:.0f} to {north:.0f} N" if np.isfinite(west + north) else ""
 
 
-def _undistorted(longitude, latitude):
+def undistorted(longitude, latitude, datum="WGS 84"):
     """EPSG code of the UTM zone of a place, or of the stereographic projection of its pole."""
     if not -80 <= latitude <= 84:
         return "EPSG:5041" if latitude > 0 else "EPSG:5042"
-    return f"EPSG:{32601 + int((longitude + 180) // 6) % 60 + (0 if latitude >= 0 else 100)}"
+    zone = int((longitude + 180) // 6) % 60
+    if datum == "North American Datum 1983" and zone < 23 and latitude >= 0:
+        return f"EPSG:{26901 + zone}"
+    return f"EPSG:{32601 + zone + (0 if latitude >= 0 else 100)}"
 
 
 @cached(128, "names of CRSs")
@@ -233,8 +227,7 @@ def name_of(crs):
 
 def degrees(grid):
     """West, south, east and north bounds of a grid in degrees, in any datum, to select a regional operation."""
-    to_degrees = pyproj.Transformer.from_crs(grid.crs.to_wkt(), 4326, always_xy=True)
-    return to_degrees.transform_bounds(*grid.boundingbox.bbox)
+    return transformer(grid.crs.to_wkt(), 4326).transform_bounds(*grid.boundingbox.bbox)
 
 
 def convergence(grid):

@@ -146,7 +146,7 @@ def _places(image, grid):
         )
     across, up = (np.asarray(image[name].transpose(*DIMS), float) for name in names)
     target = grid.crs.to_wkt()
-    pipeline, _ = projection.operation(crs, target, projection.degrees(grid))
+    pipeline = projection.operation(crs, target, projection.degrees(grid))
     return projection.carry(pipeline, crs, target, across, up)
 
 

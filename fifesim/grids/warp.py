@@ -24,7 +24,7 @@ from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids import projection, windows
 from fifesim.grids.grid import regular_geobox
-from fifesim.grids.opening import file_of, sound_raster
+from fifesim.grids.opening import sound_raster
 from fifesim.grids.projection import lies_in_words
 
 # Cells are made in fixed tiles of this size, so that the warper's rounding is the same under any chunking.
@@ -55,12 +55,11 @@ _SOURCE_MARGIN = 4
 _MOST_SAMPLES = 64
 
 
-def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, quantity="lai", classes=False, check=None):
-    """Band of a raster file that holds a quantity, on a grid, dims (y, x), NaN for no data."""
+def file_onto_grid(file, grid, chunks=None, *, classes=False, check=None):
+    """Band of a checked raster file on a grid, dims (y, x), NaN for no data."""
     # Bilinear interpolation to cells up to the size of the file cells, averages for larger cells; a file on the same
     # grid is read directly.
     grids.check_grid(grid)
-    file = file_of(quantity, path, allow_remote)
     with sound_raster(file) as (source, crs):
         pipeline, back = _operations(source, crs, grid, file.name)
     # A changed file is a different file for the cache.
@@ -106,14 +105,6 @@ class _ArraySource:
     band: int = 1
     scales: tuple = (1.0,)
     offsets: tuple = (0.0,)
-
-    @property
-    def width(self):
-        return self.shape[1]
-
-    @property
-    def height(self):
-        return self.shape[0]
 
     def read(self, band, window, masked):
         top, left = int(window.row_off - self.first[0]), int(window.col_off - self.first[1])
@@ -162,7 +153,7 @@ def _array_source(raster):
 def _operations(source, crs, grid, name):
     """Coordinate operations from a source to a grid and back; a source that does not overlap raises ValueError."""
     area, target = projection.degrees(grid), grid.crs.to_wkt()
-    (pipeline, _), (back, _) = projection.operation(crs, target, area), projection.operation(target, crs, area)
+    pipeline, back = projection.operation(crs, target, area), projection.operation(target, crs, area)
     if _source_window(source, crs, grid, back) is None:
         lies = lies_in_words(source.transform, source.shape, crs)
         raise ValueError(
@@ -188,8 +179,8 @@ def _source_window(source, crs, grid, back):
     if not np.isfinite([rows, columns]).all():
         return None
     around = _SOURCE_MARGIN
-    top, bottom = max(int(np.min(rows)) - around, 0), min(int(np.max(rows)) + around + 1, source.height)
-    left, right = max(int(np.min(columns)) - around, 0), min(int(np.max(columns)) + around + 1, source.width)
+    top, bottom = max(int(np.min(rows)) - around, 0), min(int(np.max(rows)) + around + 1, source.shape[0])
+    left, right = max(int(np.min(columns)) - around, 0), min(int(np.max(columns)) + around + 1, source.shape[1])
     return rasterio.windows.Window(left, top, right - left, bottom - top) if bottom > top and right > left else None
 
 

@@ -292,6 +292,7 @@ def test_nodata_value_outside_the_dtype_is_ignored(tmp_path):
 
 IN_DEGREES = Affine(0.0002, 0, -96.6, 0, -0.0002, 39.12)
 IN_METRES = Affine(10, 0, 709003, 0, -10, 4332001)
+MODIS, ON_SPHERE = "+proj=sinu +R=6371007.181 +units=m", Affine(10, 0, -8334000, 0, -10, 4343000)
 
 
 @pytest.mark.parametrize(
@@ -302,6 +303,9 @@ IN_METRES = Affine(10, 0, 709003, 0, -10, 4332001)
         (IN_METRES, 26914, "EPSG:26914", 26914),
         (IN_METRES, 26914, "EPSG:5070", 5070),
         (IN_DEGREES, 4326, "EPSG:32615", 32615),
+        (IN_DEGREES, 4269, None, 26914),
+        (ON_SPHERE, MODIS, None, 32614),
+        (ON_SPHERE, MODIS, "EPSG:26914", 26914),
     ],
 )
 def test_covering_grid_covers_the_file_in_whole_pixels(tmp_path, affine, own, asked, epsg):

@@ -94,7 +94,7 @@ def test_latitude_and_longitude_are_enough():
     """This works for any swath; here NAD83 and WGS 84 differ by a metre."""
     image = swath()
     longitude, latitude = projection.carry(
-        projection.operation("EPSG:26914", "EPSG:4326")[0], "EPSG:26914", "EPSG:4326", image["x"], image["y"]
+        projection.operation("EPSG:26914", "EPSG:4326"), "EPSG:26914", "EPSG:4326", image["x"], image["y"]
     )
     dims = ("line", "sample")
     other = image.drop_vars(["x", "y", "spatial_ref"])

@@ -20,7 +20,7 @@ from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.classes import NO_CLASS, check_codes, numbers_of
 from fifesim.grids.directions import Directions
-from fifesim.grids.inputs import FileOrRaster, one_layer, unpacked
+from fifesim.grids.inputs import FileOrRaster, unpacked
 from fifesim.grids.sites import is_fife, made_on_site
 from fifesim.grids.warp import file_onto_grid, raster_onto_grid
 from fifesim.ground.canopy.leaf_area import check_share
@@ -31,6 +31,7 @@ from fifesim.ground.landscape.classes import CoverClass, Field, class_table, fif
 from fifesim.ground.landscape.cover import Patches, patch_classes
 from fifesim.ground.landscape.field_labels import drawn_fields
 from fifesim.ground.landscape.lai_labels import lai_window
+from fifesim.ground.layer_labels import file_of, one_layer
 
 # Chunk size for "auto" is a multiple of this. [cell]
 _TILE = 1008
@@ -64,7 +65,7 @@ def cover_map(path_or_raster, grid, table, chunks=None, *, allow_remote=False):
         found = raster_onto_grid(unpacked(one_layer(path_or_raster, "cover")), grid, chunks, classes=True)
     else:
         name = in_a_line(Path(path_or_raster).name, 150)
-        found = file_onto_grid(path_or_raster, grid, chunks, allow_remote, quantity="cover", classes=True)
+        found = file_onto_grid(file_of("cover", path_or_raster, allow_remote), grid, chunks, classes=True)
     codes = tuple(each.code for each in table)
     cover = grids.place(chunking.pointwise(check_codes, found, dtype=np.int16, table=codes), grid)
     if cover.chunks is None and not (cover.values != NO_CLASS).any():
@@ -325,7 +326,7 @@ def _property(name, given, grid, chunks, allow_remote):
     if isinstance(given, xr.DataArray):
         found = raster_onto_grid(one_layer(given.rename(name), name), grid, chunks)
     elif is_path(given):
-        found = file_onto_grid(given, grid, chunks, allow_remote, quantity=name)
+        found = file_onto_grid(file_of(name, given, allow_remote), grid, chunks)
     else:
         raise TypeError(
             f"{name} must be a number, a fifesim.Field, the path of a raster or an xarray.DataArray, got "

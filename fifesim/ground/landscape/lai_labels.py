@@ -19,13 +19,14 @@ from fifesim.base.times import utc
 from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
-from fifesim.grids.inputs import FileOrRaster, one_layer, storage_of
-from fifesim.grids.opening import file_of, sound_raster, words_of
+from fifesim.grids.inputs import FileOrRaster, storage_of
+from fifesim.grids.opening import sound_raster
 from fifesim.grids.sites import made_on_site, one_or_several
 from fifesim.grids.warp import file_onto_grid, raster_onto_grid
 from fifesim.ground.canopy.leaf_area import check_map, check_source, warn_of_large
 from fifesim.ground.landscape.autoregression import FIELD_TILE, check_arp, periodic_field, streaming_field
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
+from fifesim.ground.layer_labels import file_of, one_layer, words_of
 
 _REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
 
@@ -261,8 +262,9 @@ def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
         found = raster_onto_grid(layer, grid, chunks, check=check_source)
     else:
         name = in_a_line(Path(path_or_raster).name, 150)
-        _check_band(path_or_raster, name, allow_remote)
-        found = file_onto_grid(path_or_raster, grid, chunks, allow_remote, check=check_source)
+        file = file_of("lai", path_or_raster, allow_remote)
+        _check_band(file, name)
+        found = file_onto_grid(file, grid, chunks, check=check_source)
     lai = chunking.pointwise(_plausible, found)
     return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
 
@@ -274,9 +276,8 @@ def _check_array(raster):
     _check_metadata(name, words, raster.attrs.get("units"), not scaled)
 
 
-def _check_band(path, name, allow_remote):
+def _check_band(file, name):
     """Check the band of a file as `_check_array` does."""
-    file = file_of("lai", path, allow_remote)
     with sound_raster(file) as (source, _):
         band = file.band - 1
         scaled = (source.scales[band], source.offsets[band]) != (1.0, 0.0)

@@ -20,8 +20,8 @@ from fifesim.base.messages import warn
 from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import regular_geobox
-from fifesim.grids.inputs import one_layer
-from fifesim.grids.opening import ErrorsOfGdal, RasterFile, file_of
+from fifesim.grids.opening import ErrorsOfGdal, RasterFile
+from fifesim.ground.layer_labels import file_of, one_layer
 from fifesim.ground.terrain import spline
 from fifesim.ground.terrain.slope import metres_per_unit
 
@@ -187,7 +187,7 @@ class Placement:
 
 def placement(source, grid):
     """Position of a grid in a source, by a coordinate operation of known accuracy."""
-    return Placement(source, grid, projection.operation(grid.crs.to_wkt(), source.crs, projection.degrees(grid))[0])
+    return Placement(source, grid, projection.operation(grid.crs.to_wkt(), source.crs, projection.degrees(grid)))
 
 
 def _chebyshev(values):

@@ -78,7 +78,7 @@ def test_change_of_datum_from_nad27_to_nad83(path):
     # The transformation is accurate to 11 m. On slopes of 0.36 at most, 1 cm of height is 3 cm of position.
     old = fifesim.grid_at("EPSG:26714", WEST + 30, NORTH - 210, 500, 500, 10.0)
     dem = fifesim.fine_dem(path, old)
-    pipeline, _ = projection.operation("EPSG:26714", CRS, projection.degrees(old))
+    pipeline = projection.operation("EPSG:26714", CRS, projection.degrees(old))
     x, y = projection.carry(pipeline, "EPSG:26714", CRS, *np.meshgrid(dem["x"], dem["y"]))
     np.testing.assert_allclose(dem, surface(x, y), rtol=0, atol=1e-3 * AMPLITUDE)
 
