@@ -111,6 +111,8 @@ class Retrieval:
 
     Examples
     --------
+    Ten landscapes keep this example short; `fifesim.train` warns of them.
+
     >>> import fifesim
     >>> chip = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
     >>> study = fifesim.Study(chip, {"visibility": {"uniform": [10, 60]}}, landscapes=10)

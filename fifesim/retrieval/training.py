@@ -15,6 +15,7 @@ from fifesim.atmosphere.aerosols import aerosol_optical_thickness
 from fifesim.base.arguments import FilePath, Kind, Names, described
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
 from fifesim.base.files import check_place
+from fifesim.base.messages import warn
 from fifesim.chain.driver import Driver
 from fifesim.output.chips.store import chip_arrays, layout_of
 from fifesim.retrieval import methods
@@ -32,6 +33,8 @@ StudyOrDataset = Annotated[
 ]
 
 _LEVELS = (0.5, 0.8, 0.95)
+# Number of landscapes in a part below which `train` warns.
+_FEW_LANDSCAPES = 10
 
 
 def train(
@@ -90,6 +93,11 @@ def train(
     -------
     retrieval : Retrieval
 
+    Warns
+    -----
+    UserWarning
+        If a part has fewer than 10 landscapes, as in the example below.
+
     Raises
     ------
     ValueError
@@ -104,6 +112,8 @@ def train(
 
     Examples
     --------
+    Ten landscapes keep this example short; `fifesim.train` warns of them.
+
     >>> import fifesim
     >>> chip = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
     >>> study = fifesim.Study(chip, {"visibility": {"uniform": [10, 60]}}, landscapes=10)
@@ -215,6 +225,15 @@ def _check_dataset(dataset, names):
         raise ValueError(
             f"source has no chips of {', '.join(sorted(missing))}: a retrieval is fitted on train, its intervals "
             "are set on validation and it is scored on test; make more chips or landscapes"
+        )
+    split, landscape = dataset["split"].values, dataset["landscape"].values
+    counts = {part: np.unique(landscape[split == part]).size for part in ("train", "validation", "test")}
+    if min(counts.values()) < _FEW_LANDSCAPES:
+        found = ", ".join(f"{part} {count}" for part, count in counts.items())
+        warn(
+            f"the chips are of few landscapes ({found}): pixels of one landscape depend on each other, so that errors "
+            f"and intervals are uncertain; use at least {_FEW_LANDSCAPES} landscapes in each part, such as "
+            "Study(..., landscapes=40, split={'train': 0.5, 'validation': 0.25, 'test': 0.25})"
         )
 
 

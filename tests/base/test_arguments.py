@@ -146,7 +146,8 @@ def valid_calls(tmp_path_factory):
     samples = fifesim.sense_swath(avhrr, "AVHRR", min_valid=0.1, quantise=False)
     many = fifesim.Study(tiny, {"visibility": {"uniform": [10, 60]}}, landscapes=3)
     chips = fifesim.dataset(many, folder / "training.zarr", 3)
-    retrieval = fifesim.train(chips, "line", path=folder / "line.nc")
+    with pytest.warns(UserWarning, match=r"few landscapes \(train 1, validation 1, test 1\)"):
+        retrieval = fifesim.train(chips, "line", path=folder / "line.nc")
     # Arguments shared by name; below, the others by function.
     shared = {
         "grid": grid, "lai": lai, "dem": dem, "reflectance": rho, "toa": rho, "image": image, "ndvi": ndvi,

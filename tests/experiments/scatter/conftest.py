@@ -32,4 +32,5 @@ def retrieval():
     """Line of LAI on reflectance, trained with ten chips."""
     chip = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
     study = fifesim.Study(chip, {"visibility": {"uniform": [20, 60]}}, landscapes=10)
-    return fifesim.train(study, "line", chips=10)
+    with pytest.warns(UserWarning, match=r"few landscapes \(train 8, validation 1, test 1\)"):
+        return fifesim.train(study, "line", chips=10)
