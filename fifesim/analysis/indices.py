@@ -23,14 +23,14 @@ def normalized_difference(nir, red):
     Returns
     -------
     ndvi : array, shape of the broadcast inputs
-        NaN where the reflectances add up to zero. [1]
+        From -1 to 1; NaN where a reflectance is negative, or both are zero. [1]
 
     References
     ----------
     [Rouse1974]_; the criterion of [Friedl1995]_, Eq. 2, is `fifesim.analysis.scaling.linearity_correlation`
     """
     nir, red = np.asarray(nir, float), np.asarray(red, float)
-    return _ratio(nir - red, nir + red)
+    return np.where(np.minimum(nir, red) < 0, np.nan, _ratio(nir - red, nir + red))
 
 
 def normalized_difference_std(nir, red, nir_std, red_std):
@@ -53,14 +53,15 @@ def normalized_difference_std(nir, red, nir_std, red_std):
     Returns
     -------
     std : array, shape of the broadcast inputs
-        NaN where the reflectances add up to zero. [1]
+        NaN where NDVI is NaN. [1]
 
     References
     ----------
     [JCGM2008]_, 5.1.2
     """
     nir, red = np.asarray(nir, float), np.asarray(red, float)
-    return _ratio(2 * np.hypot(red * nir_std, nir * red_std), (nir + red) ** 2)
+    std = _ratio(2 * np.hypot(red * nir_std, nir * red_std), (nir + red) ** 2)
+    return np.where(np.minimum(nir, red) < 0, np.nan, std)
 
 
 def enhanced(nir, red, blue):

@@ -219,20 +219,34 @@ def micrometres(wavelength):
 
 
 def check_reflectance(values):
-    """Raise ValueError for impossible reflectance."""
-    wrong = (values < LOWEST) | (values > HIGHEST)
-    if np.any(wrong):
-        raise ValueError(
-            f"reflectance of {values[wrong].flat[0]:g}: it is a fraction, and {LOWEST:g} to {HIGHEST:g} is allowed. "
-            "Mask no data with .where(raster != nodata), multiply scaled values by their scale (0.01 for percent, "
-            "0.0001 where 1 is written 10000), and calibrate digital numbers with fifesim.calibrate"
-        )
-    if values.size and np.mean(values > 1) > 0.5:
+    """Raise ValueError for impossible reflectance, and warn if most of a block or band is implausible."""
+    # A quarter of the time of comparisons with the limits.
+    ends = [each.reduce(values, axis=None) for each in (np.fmin, np.fmax)] if values.size else [0.0, 0.0]
+    for end in ends:
+        if end < LOWEST or end > HIGHEST:
+            raise ValueError(
+                f"reflectance of {end:g}: it is a fraction, and {LOWEST:g} to {HIGHEST:g} is allowed. Mask no data "
+                "with .where(raster != nodata), multiply scaled values by their scale (0.01 for percent, 0.0001 where "
+                "1 is written 10000), and calibrate digital numbers with fifesim.calibrate"
+            )
+    of_band = tuple(range(max(values.ndim - 2, 0), values.ndim))
+    # Snow, glint and white slopes exceed 1.5 in parts of a scene, and dark water is slightly negative.
+    if ends[1] > 1 and (_are_most(values > 1, values) or _are_most(values > 1.5, values, of_band)):
         warn(
-            "most values of a block are reflectances above 1, which is implausible: if they are percent, divide by "
-            "100; if they are scaled, multiply them by their scale"
+            "most values of a block are reflectances above 1, or of a band above 1.5, which is implausible: if they "
+            "are percent, divide by 100; if they are scaled, multiply them by their scale"
+        )
+    if ends[0] < -0.01 and _are_most(values < -0.01, values, of_band):
+        warn(
+            f"most values of a band are negative reflectances, down to {ends[0]:g}: check that its offset "
+            "(add_offset, such as -0.1 of Sentinel-2) and scale (scale_factor) are right and applied once"
         )
     return values
+
+
+def _are_most(found, values, axis=None):
+    """Whether more than half of the known values, or of those of a band, are found."""
+    return np.any(2 * np.count_nonzero(found, axis) > np.count_nonzero(~np.isnan(values), axis))
 
 
 def check_scale(values):

@@ -35,6 +35,9 @@ def test_formulas_agree_with_the_catalogue(name):
 def test_undefined_index_is_missing_and_integers_do_not_overflow():
     assert np.isnan(indices.enhanced(0.5, 0.0, 0.2)) and np.isnan(indices.modified_soil_adjusted(0.5, -0.3))
     assert np.isnan(normalized_difference([0.0, 0.1, 0.1], [0.0, -0.1, np.nan])).all()
+    # An index beyond 1, and one of two negative reflectances, which is within.
+    assert np.isnan(normalized_difference([0.3, -0.1, -0.1], [-0.02, 0.2, -0.2])).all()
+    assert np.isnan(normalized_difference_std(0.3, -0.02, 0.01, 0.01))
     np.testing.assert_array_equal(normalized_difference([0.5, 0.0], [0.0, 0.5]), [1.0, -1.0])
     ndvi = normalized_difference(np.array([1000, 65000], "uint16"), np.array([2000, 65000], "uint16"))
     np.testing.assert_allclose(ndvi, [-1 / 3, 0.0], rtol=1e-12)

@@ -93,6 +93,37 @@ def test_dark_scene_in_percent_gives_a_warning():
         check_reflectance(np.append(np.full(60, 0.2), np.full(40, 1.2)))
 
 
+def test_bands_ten_times_too_large_give_a_warning():
+    """Red 0.5 and near infrared 3.0; snow, a glint and white slopes toward a low sun do not."""
+    grass = np.stack([np.full((6, 6), 0.5), np.full((6, 6), 3.0), np.full((6, 6), 0.4)])
+    with pytest.warns(UserWarning, match=r"of a band above 1\.5.*their scale"):
+        check_reflectance(grass)
+    snow = np.stack([np.full((6, 6), 0.95), np.full((6, 6), 0.9)])
+    slopes = np.where(np.arange(36).reshape(6, 6) % 5 < 2, 2.4, 0.5)[None]
+    glint = np.append(np.full(60, 0.03), np.full(40, 2.0)).reshape(1, 10, 10)
+    cloudy = np.where(np.arange(100).reshape(1, 10, 10) < 90, np.nan, 3.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for values in (snow, slopes, glint, np.float64(0.4)):
+            check_reflectance(np.asarray(values))
+    # Missing values are not counted.
+    with pytest.warns(UserWarning, match="above 1"):
+        check_reflectance(cloudy)
+
+
+def test_band_that_is_mostly_negative_gives_a_warning(fractions):
+    """An offset applied twice makes the red negative; dark water is slightly negative."""
+    with pytest.warns(UserWarning, match=r"negative reflectances, down to -0\.05.*offset.*scale.*applied once"):
+        check_reflectance(np.stack([np.full((4, 4), -0.05), np.full((4, 4), 0.3)]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_reflectance(np.full((1, 4, 4), -0.004))
+        check_reflectance(np.array([-0.2, -0.2, 0.1, 0.1]))
+    lazy = (0 * fractions - 0.05).chunk().fifesim.to_toa(AIR, time=TIME, instrument="MSI")
+    with pytest.warns(UserWarning, match="negative reflectances"):
+        lazy.compute()
+
+
 def test_remedy_suggests_nodata_only_if_it_is_missing(fractions):
     whole = (fractions * 10000).astype("int16")
     with pytest.raises(ValueError, match=r"scale_factor=0\.0001\), as.*; calibrate"):
