@@ -9,8 +9,10 @@ import xarray as xr
 
 from fifesim.analysis import indices
 from fifesim.analysis.indices import date_of_maximum, date_of_median, values_of_date
+from fifesim.analysis.regression_labels import sound_cells
 from fifesim.base.bands import BLUE, COMMON_NAMES, GREEN, NEAR_INFRARED, RED, SHORTWAVE_INFRARED, nearest_band
 from fifesim.base.geometry import ANGLES
+from fifesim.base.messages import warn
 from fifesim.grids import cf, chunks, swaths
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import with_crs_of
@@ -161,9 +163,18 @@ def composite(
             f"a composite is made of images along time, got dimensions {images.dims}: join dates with "
             "xarray.concat([...], dim='time')"
         )
+    if "time" in images.coords:
+        times, counts = np.unique(images["time"].values, return_counts=True)
+        if (counts > 1).any():
+            warn(
+                f"the images have {times[counts > 1][0]} {counts.max()} times, so that a median or mean counts it more "
+                "than once: keep one image of each date with .drop_duplicates('time')"
+            )
+    images = sound_cells(images)
     grid = grids.geobox(images.isel(time=0))
     if clear is not None:
         clear = _checked(clear, images, "clear")
+        clear = xr.apply_ufunc(_checked_mask, clear, dask="parallelized", output_dtypes=[clear.dtype])
         images = images.where(clear.drop_vars(list(clear.coords)) == 1)
     plain = images.drop_vars(list(images.coords))
     if method == "mean-of-clear":
@@ -183,9 +194,22 @@ def composite(
     kept = {name: value for name, value in images.coords.items() if not {"time", "y", "x"} & set(value.dims)}
     out = grids.place(out.assign_coords(kept), grid).assign_coords(about)
     history = f"composite: {method} of {images.sizes['time']} dates"
-    out.attrs = dict(images.attrs) | {"composite": method, "references": _REFERENCE}
+    # The number of saturated pixels may be of one date only.
+    kept = {name: value for name, value in images.attrs.items() if name != "saturated_pixels"}
+    out.attrs = kept | {"composite": method, "references": _REFERENCE}
     out.attrs["history"] = "\n".join(filter(None, [images.attrs.get("history", ""), history]))
     return out.rename(images.name)
+
+
+def _checked_mask(clear):
+    """Check that a mask has no other values than 0, 1 and NaN."""
+    other = (clear != 0) & (clear != 1) & (clear == clear)
+    if np.any(other):
+        raise ValueError(
+            f"clear is 1 where an image is clear and 0 elsewhere, got {clear[other].flat[0]:g}: give a comparison, "
+            "such as share > 0.5"
+        )
+    return clear
 
 
 def _index(images):

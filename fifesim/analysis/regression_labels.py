@@ -47,18 +47,27 @@ def matched(y, x, pair="coordinates"):
 def sound_cells(array):
     """Check that the cells of a raster are physical values; a lazy raster is checked when it computes."""
     # A digital number of 0 is no data and would count as dark ground.
-    if "gain" in array.coords:
+    if cf.is_counts(array):
         raise ValueError(
             f"{array.name or 'the array'} holds digital numbers, whose 0 is no data: convert it with "
             ".fifesim.to_reflectance() or .fifesim.to_radiance() first"
         )
     if array.dtype.kind != "f" or not array.size:
         return array
-    return array.copy(data=array.data.map_blocks(_no_fill, dtype=array.dtype) if array.chunks else _no_fill(array.data))
+    check = partial(_sound, name=_range_name(array))
+    return array.copy(data=array.data.map_blocks(check, dtype=array.dtype) if array.chunks else check(array.data))
 
 
-def _no_fill(values):
-    """Check that neither the smallest nor the largest value of a block is a fill value."""
+def _range_name(array):
+    """Name of the quantity of a raster, by its standard name or name, if it has a range; else None."""
+    stated = array.attrs.get("standard_name")
+    named = [name for name, each in cf.QUANTITIES.items() if stated and each.standard_name == stated] or [array.name]
+    known = cf.QUANTITIES.get(named[0])
+    return named[0] if known is not None and None not in (known.lowest, known.highest) else None
+
+
+def _sound(values, name=None):
+    """Check that neither the smallest nor the largest value of a block is a fill value or in another unit."""
     if not values.size:
         return values
     ends = values.min(), values.max()
@@ -71,15 +80,30 @@ def _no_fill(values):
                 f"a value of {end:g} marks missing data and would count as a measurement: set it to NaN, such as "
                 f"raster.where(raster != {end:g})"
             )
+    if name is not None:
+        known = cf.QUANTITIES[name]
+        # Estimates and noise may leave the range, but not by its width.
+        width = known.highest - known.lowest
+        if ends[0] < known.lowest - width or ends[1] > known.highest + width:
+            raise ValueError(
+                f"{name} from {ends[0]:g} to {ends[1]:g}, where {known.lowest:g} to {known.highest:g} is possible: "
+                "multiply it by its scale (0.01 for percent), or rename it if it is another quantity"
+            )
     return values
 
 
 def check_same_quantity(one, other, names):
-    """Raise ValueError if two rasters are different quantities, by standard names."""
+    """Raise ValueError if two rasters are different quantities, by standard names, or have different units."""
     says = [array.attrs.get("standard_name") for array in (one, other)]
     if None not in says and says[0] != says[1]:
         raise ValueError(
             f"{names[0]} and {names[1]} must be the same quantity, got {says[0]} and {says[1]}: give both of one"
+        )
+    units = [cf.units_of(array, "") for array in (one, other) if "units" in array.attrs]
+    if len(set(units)) > 1:
+        raise ValueError(
+            f"{names[0]} and {names[1]} must have the same units, got {units[0]!r} and {units[1]!r}: convert one, then "
+            "set .attrs['units']"
         )
 
 

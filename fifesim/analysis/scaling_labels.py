@@ -17,7 +17,7 @@ from fifesim.base.footprints import Boxcar, Spread
 from fifesim.grids import cf, chunks
 from fifesim.grids import grid as grids
 from fifesim.grids.dates import by_date
-from fifesim.grids.inputs import AnyDimensions
+from fifesim.grids.inputs import AnyDimensions, incoming
 from fifesim.grids.reductions import areas, extremes, operators, regularized, sums_by_block
 
 
@@ -219,7 +219,7 @@ def ndvi_linearity(reflectance: xr.DataArray) -> float:
     >>> round(rho.fifesim.ndvi_linearity(), 2)
     0.64
     """
-    red, nir = red_and_nir(reflectance)
+    red, nir = red_and_nir(incoming(reflectance, "surface_reflectance"))
     fit = regress(nir - red, 1.0 / (nir + red), pair="index")
     return math.copysign(math.sqrt(fit.r2), fit.slope)
 

@@ -287,6 +287,13 @@ def _bin(values, edges):
     return np.where((number >= 0) & (number < edges.size - 1), number, np.nan)
 
 
+def _of_normal(function, value, sd, truth):
+    """Score of a normal distribution, whose standard deviation is checked."""
+    if np.any(sd < 0):
+        raise ValueError(f"sd must not be negative, got {np.nanmin(sd):g}: it is a standard deviation")
+    return function(value, sd, truth)
+
+
 def _pixel_scores(given, truth):
     """Values of each pixel that are summed, by name, and the levels of the intervals."""
     value, values = given["value"], {}
@@ -304,8 +311,8 @@ def _pixel_scores(given, truth):
     else:
         values["error"] = value - truth
         if "sd" in given:
-            values["crps"] = each_pixel(scores.normal_crps, value, given["sd"], truth)
-            values["pit"] = each_pixel(scores.normal_pit, value, given["sd"], truth)
+            values["crps"] = each_pixel(partial(_of_normal, scores.normal_crps), value, given["sd"], truth)
+            values["pit"] = each_pixel(partial(_of_normal, scores.normal_pit), value, given["sd"], truth)
     levels = np.atleast_1d(given["low"]["level"].values) if "low" in given else np.array([])
     if np.any((levels <= 0) | (levels >= 1)):
         raise ValueError(f"level must be between 0 and 1, got {levels.tolist()}: 0.95 holds 95 % of true values")

@@ -134,6 +134,11 @@ def test_images_are_composited_by_their_ndvi_or_a_given_index(stack):
     np.testing.assert_array_equal(kept["date"], fifesim.composite(stack)["date"])
 
 
+def test_equal_dates_in_a_composite_give_a_warning(stack):
+    with pytest.warns(UserWarning, match=r"have 1987-.* 2 times.*drop_duplicates\('time'\)"):
+        fifesim.composite(stack.isel(time=[0, 1, 1]), "median")
+
+
 def swapped(ndvi):
     return ndvi.isel(time=[1, 0, 2])
 
