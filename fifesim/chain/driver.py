@@ -137,9 +137,10 @@ class Driver:
         return calibration.radiance_to_dn(radiance, gain, offset, self.scale[2], *compression)
 
     def planetary(self, image):
-        """Planetary reflectance of digital numbers, or of radiance."""
-        radiance = calibration.dn_to_radiance(image, *self._scales) if image.dtype.kind == "u" else image
-        return calibration.radiance_to_reflectance(radiance, *self._sun)
+        """Planetary reflectance of digital numbers, NaN where they are saturated, or of radiance."""
+        if image.dtype.kind == "u":
+            image = calibration.dn_to_radiance(image, *self._scales, saturated=2 ** self.scale[2] - 1)
+        return calibration.radiance_to_reflectance(image, *self._sun)
 
     def ndvi(self, reflectance):
         """Normalized difference vegetation index, shape (...), of reflectance, shape (band, ...)."""

@@ -101,9 +101,7 @@ def noise_std(
     >>> round(float(std.mean()), 4)
     0.0078
     """
-    light, description, bands = sensor.by_bands(
-        sensor.to_radiance(image) if "gain" in image.coords else image, instrument
-    )
+    light, description, bands = sensor.by_bands(sensor.to_radiance(image) if cf.is_counts(image) else image, instrument)
     scales = _scales(image, len(bands))
     if quantity == "ndvi":
         known = light.assign_coords(wavelength=("band", [band.wavelength for band in bands]))
@@ -128,12 +126,13 @@ def noise_std(
         std = chunks.pointwise(normalized_difference_std, *pairs)
     kinds = " ".join(dict.fromkeys(kind for _, each in models for kind in each))
     history = f"noise_std: {quantity}, {description.name}, {kinds or 'no noise'}"
-    return cf.label(swaths.placed_as(std, image), _QUANTITIES[quantity], source=image, history=history)
+    found = sensor.saturated_pixels(image)
+    return cf.label(swaths.placed_as(std, image), _QUANTITIES[quantity], source=image, history=history, **found)
 
 
 def _scales(image, count):
     """Gain, offset and compression of the digital numbers of each band, None where an image has none."""
-    if "gain" not in image.coords:
+    if not cf.is_counts(image):
         return [None] * count
     known = [np.atleast_1d(image[name]) if name in image.coords else np.zeros(count) for name in _SCALE]
     return list(zip(*known, strict=True))

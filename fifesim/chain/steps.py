@@ -40,6 +40,7 @@ from fifesim.sensor.instrument_labels import (
     carried_instrument,
     check_wavelengths,
     given_instrument,
+    is_radiance,
     matching_bands,
     warn_of_others,
 )
@@ -239,12 +240,13 @@ def _index(image, name):
         return index_labels.reflectance_index(planetary_reflectance(image), name)
     reflectance, history = sensor.planetary(image)
     check_wavelengths(reflectance)
-    return index_labels.reflectance_index(reflectance, name, source=image, history=history)
+    found = index_labels.reflectance_index(reflectance, name, source=image, history=history)
+    return found.assign_attrs(reflectance.attrs)
 
 
 def _is_recorded(image):
     """Whether an image holds digital numbers or radiance."""
-    return "gain" in image.coords or image.attrs.get("units") == cf.QUANTITIES["toa_radiance"].units
+    return cf.is_counts(image) or is_radiance(image)
 
 
 def planetary_reflectance(image):

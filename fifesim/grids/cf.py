@@ -165,7 +165,7 @@ TIME_ATTRIBUTES = {"standard_name": "time", "long_name": "time, UTC"}
 # Attributes copied from inputs to results; all other attributes are replaced.
 PROVENANCE = (
     "site", "rng_seed", "arp", "lai_distribution", "method", "leaf_angles", "background", "soil", "moisture",
-    "atmosphere", "instrument", "instrument_description", "recorded_by", "composite",
+    "atmosphere", "instrument", "instrument_description", "recorded_by", "composite", "saturated_pixels",
     "references",
 )  # fmt: skip
 
@@ -222,7 +222,7 @@ def label(array, name, *, history, source=None, **provenance):
 
 def check_quantity(array, *names):
     """Raise ValueError for an array of another quantity; missing metadata are accepted."""
-    if "gain" in array.coords and "dn" not in names:
+    if is_counts(array) and "dn" not in names:
         raise ValueError(
             f"{array.name or 'the array'} holds digital numbers, where {QUANTITIES[names[0]].long_name} is needed: "
             "convert it with .fifesim.to_reflectance()"
@@ -232,7 +232,7 @@ def check_quantity(array, *names):
     if stated not in _LONG_NAMES or stated in wanted:
         check_units(array, *names)
         # Names of reflectance do not tell its level.
-        found = _named(str(array.name)) & _KNOWN_BY_NAME
+        found = named(str(array.name)) & _KNOWN_BY_NAME
         if stated in _LONG_NAMES or not found:
             return
         stated, key, cure = QUANTITIES[min(found)].standard_name, "name", f"type .rename({names[0]!r})"
@@ -244,6 +244,12 @@ def check_quantity(array, *names):
         f"{QUANTITIES[names[0]].long_name} is needed: take {step}, "
         f"or {cure} if it is wrong"
     )
+
+
+def is_counts(array):
+    """Whether an array holds digital numbers: by its standard name, its name, and the coordinates of a calibration."""
+    other = array.attrs.get("standard_name") in _LONG_NAMES or (array.name != "dn" and array.name in QUANTITIES)
+    return "gain" in array.coords and not other
 
 
 def check_words(raster, texts, name, units=""):
@@ -271,15 +277,19 @@ def named(text):
     return {*map(_WORDS.get, words)} - {None}
 
 
+def units_of(array, default):
+    """Units of an array in CF spelling."""
+    units = array.attrs.get("units", default)
+    # rioxarray lists the units of the bands.
+    units = str(units[0] if isinstance(units, tuple | list) and len(set(units)) == 1 else units).strip()
+    return _SAME_UNITS.get(units, units)
+
+
 def check_units(array, *names):
     """Raise ValueError for an array with other units than any of some quantities; missing units are accepted."""
-    units = array.attrs.get("units", QUANTITIES[names[0]].units)
-    # rioxarray lists the units of the bands.
-    units = units[0] if isinstance(units, tuple | list) and len(set(units)) == 1 else units
-    units = str(units).strip()
-    for name in names:
-        if QUANTITIES[name].units in (units, _SAME_UNITS.get(units)):
-            return
+    units = units_of(array, QUANTITIES[names[0]].units)
+    if units in {QUANTITIES[name].units for name in names}:
+        return
     wanted = " or ".join(dict.fromkeys(repr(QUANTITIES[name].units) for name in names))
     raise ValueError(
         f"{array.name or 'the array'} has units {units!r}, {names[0]} needs {wanted}: "

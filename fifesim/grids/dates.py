@@ -54,6 +54,8 @@ def joined(dates):
         return xr.DataTree.from_dict({path: raster.to_dataset() for path, raster in rasters.items()})
     bare = [date.drop_vars(set(date.coords) - set(date.dims)) for date in dates]
     raster = xr.concat(bare, dim="time", join="override", combine_attrs="override").transpose("time", ...)
+    if saturated := sum(date.attrs.get("saturated_pixels", 0) for date in dates):
+        raster.attrs["saturated_pixels"] = saturated
     for name in ("time", *(name for name in first.coords if name not in (*first.dims, "time"))):
         known, *others = variables = [date.coords[name].variable for date in dates]
         # Coordinates by cell are assumed to differ, because comparing would compute them.

@@ -213,7 +213,9 @@ def to_geotiff(
         own = [name for name in _OF_A_BAND if name in raster.coords]
         raster = raster.assign_coords({name: raster.coords[name].expand_dims("band") for name in own})
     array = _stacked(opened(raster)) if isinstance(raster, xr.Dataset) else raster
-    if "gain" not in array.coords:
+    if not cf.is_counts(array):
+        # Reflectance of a dataset carries the calibration of the digital numbers next to it.
+        array = array.drop_vars(["gain", "offset", "compression"], errors="ignore")
         # A scale of fractions raises an error; a scale from the encoding is kept in the tag.
         unpacked(array)
         array = array.assign_attrs({key: value for key, value in storage(array).items() if key in STORAGE})

@@ -61,7 +61,7 @@ def opened(value):
     """Argument of a public function whose rasters have values in their unit, and NaN for no data."""
     # Packing is applied here alone, for all public functions. Images and codes stay whole numbers.
     if isinstance(value, xr.DataArray):
-        return value if "gain" in value.coords or _CODES & value.attrs.keys() else unpacked(value)
+        return value if cf.is_counts(value) or _CODES & value.attrs.keys() else unpacked(value)
     if isinstance(value, xr.Dataset):
         # The attributes of a variable have precedence over those of the Dataset.
         shared = {key: value.attrs[key] for key in STORAGE if key in value.attrs}
@@ -118,7 +118,7 @@ def storage_of(raster):
 
 def scale_and_offset(raster):
     """Scale and offset from stored values to their unit, 1 and 0 by default; along band where they differ."""
-    if "gain" in raster.coords:
+    if cf.is_counts(raster):
         # A GIS has no square-root scale.
         return (1.0, 0.0) if "compression" in raster.coords else (raster.coords["gain"], raster.coords["offset"])
     stored = storage(raster)
@@ -180,7 +180,7 @@ def incoming(raster, name):
     """User-supplied raster in the form of the stages, dims ([band], y, x), lazy where it was."""
     # Reflectance beyond -0.5 to 5 raises ValueError when it is computed. Rows of rasters from fifesim are sampled.
     array = _bands_as_one(raster, name)
-    if "gain" in array.coords:
+    if cf.is_counts(array):
         return array
     _check_stored(array, name)
     array = in_micrometres(with_band_names(north_up(array)))

@@ -223,16 +223,21 @@ def relief_map(dem, title):
 
 def image_map(dn, title, stretch, frame=None):
     """Map of an image in false colours: near infrared, red and green as red, green and blue."""
-    reflectance = to_reflectance(dn)
+    reflectance = _shown_reflectance(dn)
     layers = [stretched(reflectance.sel(band=name).values, low, high) for name, low, high in stretch]
     pixels = _bytes(np.nan_to_num(np.dstack(layers)))
     return _map(dn, pixels, (dn != 0).all("band").values, title, None, frame)
 
 
+def _shown_reflectance(dn):
+    """Reflectance of digital numbers for pictures, where saturated pixels have the largest reflectance. [1]"""
+    return to_reflectance(dn.assign_attrs(saturated=0))
+
+
 def stretch_of(dn):
     """Bands for red, green and blue, with reflectances shown dark and bright; one band in grey if one is missing."""
     names = false_colour_names(dn) or [str(dn["band"].values[-1])] * 3
-    reflectance, spans = to_reflectance(dn.sel(band=list(dict.fromkeys(names)))), []
+    reflectance, spans = _shown_reflectance(dn.sel(band=list(dict.fromkeys(names)))), []
     for name in names:
         dark, bright = dark_and_bright(reflectance.sel(band=name))
         spans.append((name, dark, max(bright, dark + 1e-6)))

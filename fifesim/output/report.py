@@ -426,6 +426,7 @@ def _summary(scenario, image, truth, reasons):
         ("Blur", blur_in_words(own.description, own.bands)),
         ("Noise", noise_in_words(own.description, own.bands, own.noise)),
         ("Origin of the description", origins_in_words(own.description, own.bands)),
+        *_saturation(own.description, pixels),
         ("Sun", f"zenith {float(pixels['sza']):.1f} degrees, azimuth {float(pixels['saa']):.1f} degrees from north"),
     ]
     for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:
@@ -433,6 +434,14 @@ def _summary(scenario, image, truth, reasons):
         mean, deviation = (fixed(float(each), 3) for each in (values.mean(), values.std()))
         rows.append((label, f"mean {mean}, standard deviation {deviation}"))
     return rows + [(f"R² of {_label(name)} on NDVI", f"none, {why}") for name, why in reasons.items()]
+
+
+def _saturation(description, pixels):
+    """Table row on saturated pixels, none if there are none."""
+    saturated = (pixels >= 2**description.bits - 1).any("band")
+    count, share = int(saturated.sum()), 100 * float(saturated.mean())
+    text = f"{count} ({share:.2g} %), which have no NDVI: their radiance is above the range of the instrument"
+    return [("Saturated pixels", text)] if count else []
 
 
 def _ground(terrain):

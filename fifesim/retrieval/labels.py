@@ -78,6 +78,8 @@ def retrieve(image: xr.DataArray, retrieval: RetrievalLike, intervals: Sequence[
 
     Examples
     --------
+    Ten landscapes keep this example short; `fifesim.train` warns of them.
+
     >>> import fifesim
     >>> chip = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
     >>> study = fifesim.Study(chip, {"visibility": {"uniform": [10, 60]}}, landscapes=10)
@@ -133,7 +135,7 @@ def _levels(retrieval, intervals):
 
 def _check_level(image, level):
     """Raise ValueError for digital numbers, radiance or reflectance of the other level."""
-    if "gain" in image.coords or image.dtype.kind in "iu":
+    if cf.is_counts(image) or image.dtype.kind in "iu":
         raise ValueError(
             "the image holds digital numbers: convert it with .fifesim.to_reflectance(), or apply its scale and offset"
         )

@@ -117,13 +117,13 @@ def _image(scene):
 def _labelled_image(scene):
     """Image of a scene with its coordinates."""
     image, driver = _image(scene), scene.driver
-    gain, offset, _ = driver.scale
+    gain, offset, bits = driver.scale
     along = {"band": [band.name for band in driver.bands], "wavelength": [band.wavelength for band in driver.bands]}
     along |= {"gain": gain, "offset": offset}
     along |= {"compression": driver.compression} if driver.compression.any() else {}
     along |= {"solar_irradiance": driver.irradiance}
     own = attributes_of(driver.instrument) | {"atmosphere": driver.air.text, "recorded_by": driver.instrument.name}
-    fill = {"dn": {"_FillValue": image["dn"].dtype.type(0)}}
+    fill = {"dn": {"_FillValue": image["dn"].dtype.type(0), "saturated": 2**bits - 1}}
     variables = {
         name: xr.Variable(("band", "y", "x")[-each.ndim :], each, cf.attributes(name) | own | fill.get(name, {}))
         for name, each in image.items()

@@ -91,18 +91,43 @@ def radiance_kernel(image):
     if units == cf.QUANTITIES["toa_radiance"].units:
         raise ValueError(f"the image has the calibration of digital numbers and units {units!r}: {_CALIBRATE_FIRST}")
     cf.check_units(image, "dn")
-    fill = image.attrs.get("_FillValue", image.encoding.get("_FillValue"))
-    # The fill value has the type in which the image was recorded.
-    recorded = fill.dtype if isinstance(fill, np.generic) and fill.dtype.kind == "u" else None
-    if image.dtype.kind == "u" and recorded in (None, image.dtype):
-        return dn_to_radiance
-    largest = int(np.iinfo(np.uint16 if recorded is None else recorded).max)
-    return partial(_checked_radiance, largest)
+    known, saturated = _recorded_type(image), saturated_number(image)
+    if image.dtype.kind == "u" and known == image.dtype:
+        return partial(dn_to_radiance, saturated=saturated)
+    return partial(_checked_radiance, int(np.iinfo(known or np.uint16).max), saturated)
 
 
-def _checked_radiance(largest, dn, *scale):
+def _checked_radiance(largest, saturated, dn, *scale):
     check_counts(dn, largest, _CALIBRATE_FIRST)
-    return dn_to_radiance(dn, *scale)
+    return dn_to_radiance(dn, *scale, saturated=saturated)
+
+
+def _recorded_type(image):
+    """Type in which digital numbers were recorded, which is the type of their fill value; None if unknown."""
+    fill = image.attrs.get("_FillValue", image.encoding.get("_FillValue"))
+    if isinstance(fill, np.generic) and fill.dtype.kind == "u":
+        return fill.dtype
+    return image.dtype if image.dtype.kind == "u" else None
+
+
+def saturated_number(image):
+    """Digital number of saturated pixels: as stated, else the largest number of the type; 0 if there is none."""
+    known = _recorded_type(image)
+    return int(image.attrs.get("saturated", 0 if known is None else np.iinfo(known).max))
+
+
+def saturated_pixels(image):
+    """Number of pixels of an image with a saturated band, as `number_of_pixels`."""
+    number = saturated_number(image) if cf.is_counts(image) else 0
+    return number_of_pixels(image.variable >= number) if number else {}
+
+
+def number_of_pixels(saturated):
+    """Number of pixels with a saturated band, as attributes; none for a lazy image, or if no pixel is saturated."""
+    if saturated.chunks is not None:
+        return {}
+    count = int(saturated.any([name for name in saturated.dims if name == "band"]).sum())
+    return {"saturated_pixels": count} if count else {}
 
 
 def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0), given=None):
@@ -232,7 +257,8 @@ def sense(
     Returns
     -------
     image : xarray.DataArray of unsigned integers, dims (band, y, x)
-        Digital numbers from 1; 0 is no data. ``gain``, ``offset``, ``wavelength`` and ``solar_irradiance`` are
+        Digital numbers from 1; 0 is no data, and the attribute ``saturated`` the largest number, which later steps
+        treat as no data. ``gain``, ``offset``, ``wavelength`` and ``solar_irradiance`` are
         coordinates along band, and ``compression`` if a band has a square-root scale. With ``quantise=False``, radiance
         with ``wavelength`` and ``solar_irradiance``. For bands of several resolutions, an `xarray.DataTree` with one
         node per resolution, such as ``/10m``, which has ``dn`` or ``toa_radiance``. [1 or W m-2 sr-1 um-1]
@@ -304,7 +330,8 @@ def sensed(
         image = grids.place(image, pixels, carried)
         image.data = held(image.data)
         history = _history(description, interval, offset, gain_drift, noise, seed, quantise, scaling)
-        return labelled(image, toa, description, history)
+        bits = description.bits if scaling == "detector" else description.product.bits
+        return labelled(image, toa, description, history, 2**bits - 1)
 
     if len(groups) == 1:
         return image_of(toa, bands)
@@ -328,13 +355,13 @@ def by_bands(toa, instrument):
     return toa, description, bands
 
 
-def labelled(image, toa, description, history):
-    """Image with labels: digital numbers if it holds integers, else radiance."""
+def labelled(image, toa, description, history, saturated=0):
+    """Image with labels: digital numbers, with the number of saturated pixels, if it holds integers, else radiance."""
     name = "dn" if image.dtype.kind == "u" else "toa_radiance"
     own = attributes_of(description) | {"recorded_by": description.name}
     image = cf.label(image, name, source=toa, history=history, **own)
     if name == "dn":
-        image.attrs["_FillValue"] = image.dtype.type(0)
+        image.attrs |= {"_FillValue": image.dtype.type(0), "saturated": int(saturated)}
     return image
 
 
@@ -371,8 +398,9 @@ def numbers_of_bands(given, bands, name):
 def drifted(radiance, bands, gain_drift):
     """Radiance as detectors record it whose response has drifted since the calibration. [W m-2 sr-1 um-1]"""
     factors = numbers_of_bands(gain_drift, bands, "gain_drift")
-    if not np.all(factors > 0):
-        raise ValueError(f"gain_drift must be a factor above 0, such as 0.98, got {factors.min():g}")
+    if not np.all((factors >= 0.1) & (factors <= 10)):
+        wrong = factors[(factors < 0.1) | (factors > 10)][0]
+        raise ValueError(f"gain_drift must be a factor from 0.1 to 10, got {wrong:g}: 0.98 is a loss of 2 percent")
     if np.all(factors == 1):
         return radiance
     factors = xr.Variable("band", factors)
@@ -392,7 +420,8 @@ def to_radiance(image: xr.DataArray) -> xr.DataArray:
     Returns
     -------
     radiance : xarray.DataArray, dims (band, y, x)
-        Radiance, within half a count; NaN for no data. [W m-2 sr-1 um-1]
+        Radiance, within half a count; NaN for no data and for saturated pixels, whose radiance is above the range. The
+        attribute ``saturated_pixels`` is their number, unless the image is lazy. [W m-2 sr-1 um-1]
 
     Raises
     ------
@@ -416,8 +445,8 @@ def to_radiance(image: xr.DataArray) -> xr.DataArray:
     """
     scale = _scale_of(image)
     out = chunks.pointwise(radiance_kernel(image), image, *scale)
-    out = swaths.placed_as(out.drop_vars(_SCALE, errors="ignore"), image)
-    return cf.label(out, "toa_radiance", source=image, history="to_radiance")
+    out, found = swaths.placed_as(out.drop_vars(_SCALE, errors="ignore"), image), saturated_pixels(image)
+    return cf.label(out, "toa_radiance", source=image, history="to_radiance", **found)
 
 
 def _scale_of(image):
@@ -444,7 +473,7 @@ def to_reflectance(image: xr.DataArray) -> xr.DataArray:
     Returns
     -------
     reflectance : xarray.DataArray, dims (band, y, x)
-        [1]
+        NaN for no data and for saturated pixels, as in `to_radiance`. [1]
 
     Raises
     ------
@@ -467,12 +496,12 @@ def to_reflectance(image: xr.DataArray) -> xr.DataArray:
     array([0.1 , 0.21])
     """
     out, history = planetary(image)
-    return cf.label(swaths.placed_as(out, image), "toa_reflectance", source=image, history=history)
+    return cf.label(swaths.placed_as(out, image), "toa_reflectance", source=image, history=history, **out.attrs)
 
 
 def planetary(image):
-    """Planetary reflectance of an image without attributes [1], and its history."""
-    counts = "gain" in image.coords
+    """Planetary reflectance of an image [1], whose attributes are the number of saturated pixels, and its history."""
+    counts = cf.is_counts(image)
     if not counts:
         cf.check_quantity(image, "toa_radiance")
     scale, radiance = (_scale_of(image), radiance_kernel(image)) if counts else ([], None)
@@ -483,7 +512,7 @@ def planetary(image):
     below = image.coords.variables["solar_irradiance"], directions.mu_s(geometry)
     distance = float(geometry.earth_sun_distance)
     out = chunks.pointwise(_reflectance_of, image, *below, *scale, radiance=radiance, earth_sun_distance=distance)
-    out.attrs = {}
+    out.attrs = saturated_pixels(image)
     history = "to_radiance\nto_reflectance" if counts else "to_reflectance"
     return out.drop_vars(_SCALE, errors="ignore"), history
 
@@ -492,21 +521,36 @@ def _reflectance_of(values, solar_irradiance, mu_s, *scale, radiance, earth_sun_
     """Reflectance of radiance, or of digital numbers by the kernel of their radiance. [1]"""
     light = values if radiance is None else radiance(values, *scale)
     out = calibration.radiance_to_reflectance(light, solar_irradiance, mu_s, earth_sun_distance)
-    # Half of a sample of the block must be possible.
-    sample = out[..., ::SAMPLED_ROWS, :]
-    wrong = (sample > HIGHEST) | (sample < LOWEST)
-    if 2 * np.count_nonzero(wrong) > sample.size:
-        raise ValueError(
-            f"gain, offset and solar_irradiance give a reflectance of {sample[wrong].flat[0]:g}: check that radiance "
-            "is in W m-2 sr-1 um-1, solar_irradiance in W m-2 um-1 and sza in degrees"
-        )
+    _check_units_of_radiance(out, "gain, offset and solar_irradiance give a reflectance")
     return out
+
+
+# Largest reflectance of a block that may be of radiance per nanometre; dark water has more in any band. [1]
+_DARK = 5e-4
+
+
+def _check_units_of_radiance(reflectance, what):
+    """Raise ValueError for impossible reflectance in half of a sample, and warn of a dark block."""
+    sample = reflectance[..., ::SAMPLED_ROWS, :]
+    wrong = (sample > HIGHEST) | (sample < LOWEST)
+    cure = "check that radiance is in W m-2 sr-1 um-1, solar_irradiance in W m-2 um-1 and sza in degrees"
+    if 2 * np.count_nonzero(wrong) > np.count_nonzero(~np.isnan(sample)):
+        raise ValueError(f"{what} of {sample[wrong].flat[0]:g}: {cure}")
+    largest = np.fmax.reduce(sample, axis=None) if sample.size else np.nan
+    if 0 < largest < _DARK:
+        warn(f"{what} of {largest:.2g} at most, as of radiance per nanometre: {cure}")
+
+
+def _in_units(radiance, solar_irradiance):
+    """Radiance that is plausible under an overhead sun. [W m-2 sr-1 um-1]"""
+    _check_units_of_radiance(np.pi * radiance / solar_irradiance, "radiance has an overhead reflectance")
+    return radiance
 
 
 def as_radiance(array, bands, geometry):
     """Radiance of a reflectance, after regularization, when fewer numbers remain. [W m-2 sr-1 um-1]"""
     if is_radiance(array):
-        return array
+        return chunks.pointwise(_in_units, array, xr.Variable("band", [band.solar_irradiance for band in bands]))
     light = xr.Variable("band", [band.solar_irradiance for band in bands]), directions.mu_s(geometry)
     distance = float(geometry.earth_sun_distance)
     return chunks.pointwise(calibration.reflectance_to_radiance, array, *light, earth_sun_distance=distance)

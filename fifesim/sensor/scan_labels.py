@@ -332,7 +332,7 @@ def sense_swath(
     image = grids.with_coordinates(image, along_band).assign_coords(coordinates)
     history = f"sense_swath: {description.name}, track {track.heading:.2f} degrees"
     image = directions.with_geometry(image, geometry, ("sza", "saa", "earth_sun_distance"))
-    image = labelled(image, toa, description, history)
+    image = labelled(image, toa, description, history, 2**description.bits - 1)
     image.encoding = {"grid_mapping": "spatial_ref"}
     return image
 

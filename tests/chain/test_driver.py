@@ -40,6 +40,15 @@ def test_steps_equal_the_labelled_steps_to_the_bit(lai, setup):
         np.testing.assert_array_equal(driver.fpar(lai.values, 0.94, leaves), expected)
 
 
+def test_saturated_counts_are_no_data_as_in_the_labelled_steps(lai, setup):
+    toa = reflectance_of(setup, lai).fifesim.to_toa()
+    image = fifesim.sense(toa.where(toa.x > toa.x[30], 0.9), "TM")
+    assert 0 < (image == 255).mean() < 1
+    expected = image.fifesim.to_reflectance()
+    np.testing.assert_array_equal(Driver(setup).planetary(image.values), expected)
+    np.testing.assert_array_equal(np.isnan(expected), (image == 255) | (image == 0))
+
+
 def test_slopes_equal_the_labelled_steps(lai, setup):
     dem = fifesim.flint_hills(GRID.pad(1), seed=2)
     setup = replace(setup, upwelling=False)

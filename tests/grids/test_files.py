@@ -139,6 +139,16 @@ def test_coordinates_omitted_from_a_geotiff_give_a_warning(image, tmp_path, name
         fifesim.to_geotiff(swath, tmp_path / "swath.tif")
 
 
+def test_reflectance_next_to_digital_numbers_is_written_without_their_calibration(whole, tmp_path):
+    """As in a dataset of chips, where the calibration is a coordinate of all variables."""
+    toa = whole["toa"].assign_coords(gain=("band", [0.5, 0.5]), offset=("band", [1.0, 1.0]))
+    again = fifesim.open_image(toa.fifesim.to_geotiff(tmp_path / "toa.tif"))
+    np.testing.assert_array_equal(again, toa)
+    assert "gain" not in again.coords
+    with rasterio.open(tmp_path / "toa.tif") as source:
+        assert source.scales == (1.0, 1.0)
+
+
 def test_objects_that_are_no_raster_are_rejected(image, lai, tmp_path):
     with pytest.raises(ValueError, match="no CRS"):
         fifesim.to_geotiff(lai.drop_vars("spatial_ref"), tmp_path / "lai.tif")

@@ -108,6 +108,16 @@ def test_cautions_name_the_omitted_effects(simulated_run):
     )
 
 
+def test_saturated_pixels_are_counted_in_the_summary(simulated_run):
+    """Only where there are some; a pixel counts once, in however many bands it is saturated."""
+    scenario, image, truth, _ = simulated_run
+    assert "Saturated pixels" not in dict(report._summary(scenario, image, truth, {}))
+    bright = image.copy(deep=True)
+    bright["dn"][:, 3, 4] = bright["dn"][0, 5, 6] = 255
+    text = dict(report._summary(scenario, bright, truth, {}))["Saturated pixels"]
+    assert text.startswith(f"2 ({200 / bright['ndvi'].size:.2g} %), which have no NDVI")
+
+
 PAPER = {"grid": {"width": 1110, "height": 1110}, "ground": {"distribution": "burned-grazed", "arp": 0.15}}
 PAPER |= {"sensor": {"response": "paper"}}
 

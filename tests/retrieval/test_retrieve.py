@@ -1,6 +1,7 @@
 """Training on a study, and retrieval from images: intervals, flags, files and error messages."""
 
 import hashlib
+import warnings
 from dataclasses import replace
 from functools import cache, partial
 
@@ -30,6 +31,10 @@ STUDY = fifesim.Study(
     landscapes=24,
     split={"train": 0.5, "validation": 0.25, "test": 0.25},
 )
+
+
+# The parts validation and test have six landscapes each.
+pytestmark = pytest.mark.filterwarnings("ignore:the chips are of few landscapes")
 
 
 @pytest.fixture(scope="module")
@@ -298,7 +303,7 @@ def test_sl2p_maps_sentinel_2_reflectance(image):
             {"retrieval": "sl2p"},
             "surface reflectance factor is needed",
         ),
-        (lambda light: light.assign_coords(gain=1.0, offset=0.0), {}, "digital numbers"),
+        (lambda light: light.drop_attrs().rename("dn").assign_coords(gain=1.0, offset=0.0), {}, "digital numbers"),
         (lambda light: (1e4 * light).fillna(0).astype("uint16"), {}, "digital numbers"),
     ],
 )
@@ -334,6 +339,25 @@ def test_invalid_training_is_rejected(chips, attrs, options, message):
     given = chips if attrs is None else chips.drop_attrs(deep=False).assign_attrs(attrs)
     with pytest.raises(ValueError, match=message):
         fifesim.train(given, **options)
+
+
+def test_few_landscapes_in_a_part_give_a_warning(chips):
+    """Twice as many chips of the same landscapes do not help; other landscapes do."""
+    with pytest.warns(UserWarning, match=r"few landscapes \(train 12, validation 6, test 6\).*at least 10 landscapes"):
+        fifesim.train(chips, "line")
+    enough = chips.assign(landscape=("chip", np.arange(chips.sizes["chip"])))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fifesim.train(enough, "line")
+
+
+@pytest.mark.parametrize("change", [lambda light: light.rename("renamed"), lambda light: light.drop_attrs(deep=False)])
+def test_chips_of_a_dataset_are_retrieved_as_reflectance(light, trained, change):
+    """The calibration of digital numbers is a coordinate of all variables; standard name or name tell them apart."""
+    carries = change(light).assign_coords(gain=("band", [0.5, 0.5, 0.5]), offset=("band", [0.0, 0.0, 0.0]))
+    expected = light.fifesim.retrieve(trained("line"))
+    np.testing.assert_array_equal(carries.fifesim.retrieve(trained("line")).lai, expected.lai)
+    np.testing.assert_array_equal(carries.fifesim.ndvi(), light.fifesim.ndvi())
 
 
 def test_corrected_chips_are_trained_at_the_surface_without_a_study(chips):

@@ -157,7 +157,7 @@ def test_one_band_becomes_an_image_of_one_band(toa):
             "TM has no product scaled to reflectance, unlike OLI",
         ),
         (lambda toa: fifesim.sense(toa, "TM", scaling="product", quantise=False), "is one of digital numbers"),
-        (lambda toa: fifesim.sense(toa, "TM", gain_drift=0.0), "gain_drift must be a factor above 0"),
+        (lambda toa: fifesim.sense(toa, "TM", gain_drift=0.0), "gain_drift must be a factor from 0.1 to 10, got 0"),
         (lambda toa: fifesim.sense(toa, "TM", gain_drift={"TM3": 1.0}), "gain_drift has no number for TM4: it has TM3"),
         (lambda toa: fifesim.sense(toa, "TM", gain_drift=[1.0, 2.0, 3.0]), "one for each of 2 bands, got a list of 3"),
         (lambda toa: fifesim.sense(toa, SILENT, noise="shot"), "TM has no noise for TM3"),
@@ -349,6 +349,68 @@ def test_digital_numbers_of_another_type_are_calibrated(image, dtype):
     np.testing.assert_array_equal(fifesim.to_radiance(image.astype(dtype)), fifesim.to_radiance(image))
     masked = image.astype(np.float32).where(image > 0)
     np.testing.assert_array_equal(fifesim.to_radiance(masked), fifesim.to_radiance(image))
+
+
+# ------------------------------------------------------------------------------------ saturation
+
+
+def clouded(bands):
+    """Reflectance of a white cloud (0.8, 0.79) over the western half of grass (0.1, 0.35)."""
+    values = np.broadcast_to(np.array([0.1, 0.35])[:, None, None], (2, 60, 60)).copy()
+    values[..., :30] = np.array([0.8, 0.79])[:, None, None]
+    grid = fifesim.fife_site(10, window=((0, 60), (0, 60)))
+    return products.labelled(values, grid, bands, {"standard_name": "toa_bidirectional_reflectance"})
+
+
+@pytest.mark.parametrize(
+    ("name", "bands", "options", "largest"),
+    [
+        ("TM", ["TM3", "TM4"], {}, 255),
+        (replace(instrument("TM"), bits=10), ["TM3", "TM4"], {}, 1023),
+        ("MSS", ["MSS5", "MSS7"], {"onto": fifesim.fife_site(60, window=((1, 9), (1, 9)))}, 63),
+        # Their ranges include white clouds.
+        ("OLI", ["OLI4", "OLI5"], {}, 4095),
+        ("OLI", ["OLI4", "OLI5"], {"scaling": "product"}, 65535),
+    ],
+)
+@pytest.mark.parametrize("way", ["memory", "lazy", "file", "netcdf", "float"])
+def test_saturated_pixels_are_no_data_in_derived_images(name, bands, options, largest, way, tmp_path):
+    toa = clouded(bands)
+    image = fifesim.sense(toa, name, geometry=LOW_SUN, min_valid=0.5, **options)
+    assert image.attrs["saturated"] == largest
+    counts = image.values
+    if way == "lazy":
+        with no_compute():
+            seen = fifesim.ndvi(in_chunks(image, {"y": 3, "x": 3}))
+        assert "saturated_pixels" not in seen.attrs
+    if way == "file":
+        image = fifesim.open_image(image.fifesim.to_geotiff(tmp_path / "image.tif"))
+    if way == "netcdf":
+        image.to_netcdf(tmp_path / "image.nc")
+        image = xr.open_dataset(tmp_path / "image.nc", decode_coords="all")["dn"]
+    if way == "float":
+        image = image.where(image > 0)
+    full = counts == largest
+    gone = full | (counts == 0)
+    for light in (fifesim.to_radiance(image), fifesim.to_reflectance(image)):
+        np.testing.assert_array_equal(np.isnan(light), gone)
+        assert light.attrs.get("saturated_pixels", 0) == full.any(0).sum()
+    for index in (fifesim.ndvi(image), fifesim.index(image, "EVI2"), fifesim.ndvi(fifesim.to_reflectance(image))):
+        np.testing.assert_array_equal(np.isnan(index), gone.any(0))
+        assert index.attrs.get("saturated_pixels", 0) == full.any(0).sum()
+
+
+def test_saturated_cloud_is_no_grass_in_a_composite():
+    """On the second date the sky is clear over bare soil, with an NDVI of 0.1 that is below the 0.2 of the counts."""
+    toa = clouded(["TM3", "TM4"])
+    soil = toa.copy(data=np.broadcast_to(np.array([0.27, 0.33])[:, None, None], toa.shape))
+    times = xr.DataArray(np.array(["1987-06-06", "1987-06-22", "1987-07-08"], "M8[ns]"), dims="time", name="time")
+    images = fifesim.sense(xr.concat([toa, soil, toa], times), "TM", geometry=LOW_SUN, min_valid=0.5)
+    reflectance = fifesim.to_reflectance(images)
+    assert reflectance.attrs["saturated_pixels"] == (images == 255).any("band").sum()
+    best = fifesim.composite(reflectance)
+    assert (best.date.isel(x=slice(0, 9)) == times[1]).all() and (best.date.isel(x=slice(11, None)) == times[0]).all()
+    assert "saturated_pixels" not in best.attrs
 
 
 # ------------------------------------------------------------------------------------------ noise

@@ -30,6 +30,7 @@ class Layout(NamedTuple):
     truth: tuple[str, ...]  # names of the true quantities of the ground of the pixels
     has_ndvi: bool
     dn: np.dtype
+    saturated: int  # digital number of saturated pixels
     pixels: tuple[int, int]  # rows and columns
     pixel: float  # [m]
     crs: xr.Variable  # without dimensions, whose attributes are the coordinate reference system
@@ -44,7 +45,8 @@ class Layout(NamedTuple):
 
     def attributes(self, name):
         """Attributes of a stored variable."""
-        return cf.attributes(name) | ({"cell_methods": "area: mean"} if name in self.truth else {})
+        own = {"saturated": self.saturated} if name == "dn" else {}
+        return cf.attributes(name) | own | ({"cell_methods": "area: mean"} if name in self.truth else {})
 
     def shape(self, dims):
         """Lengths of dimensions of a chip."""
@@ -67,6 +69,7 @@ def layout_of(chips):
         truth=tuple(dict.fromkeys((*nodes["truth"].data_vars, *truth))),
         has_ndvi="ndvi" in image,
         dn=image["dn"].dtype,
+        saturated=image["dn"].attrs["saturated"],
         pixels=(image.sizes["y"], image.sizes["x"]),
         pixel=size,
         crs=image["spatial_ref"].variable,
@@ -130,7 +133,7 @@ def _reflectance(found, layout):
     """Planetary reflectance of the digital numbers."""
     bands = {name: layout.bands[name].values[:, None, None] for name in layout.bands.coords if name != "band"}
     scale = (bands["gain"], bands["offset"], bands.get("compression", 0))
-    radiance = calibration.dn_to_radiance(found["dn"], *scale)
+    radiance = calibration.dn_to_radiance(found["dn"], *scale, saturated=layout.saturated)
     sza, distance = (found[name][:, None, None, None] for name in ("sza", "earth_sun_distance"))
     mu_s = np.cos(np.radians(sza))
     return calibration.radiance_to_reflectance(radiance, bands["solar_irradiance"], mu_s, distance)

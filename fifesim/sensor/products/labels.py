@@ -151,7 +151,8 @@ def calibrate(
     -------
     image : xarray.DataArray of unsigned integers, dims (band, y, x)
         Input of ``to_radiance``, ``to_reflectance``, ``to_surface`` and ``ndvi``, which give NaN for 0, the number of
-        no data and saturation. Lazy where the input is.
+        no data and saturation. The attribute ``saturated_pixels`` is the number of saturated pixels, unless the input
+        is lazy. Lazy where the input is.
 
     Raises
     ------
@@ -205,15 +206,16 @@ def calibrate(
         if not np.all(gain > 0):  # type: ignore[operator]
             raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.min(gain):g}")
         _check_scale(gain * (2**full - 1) + offset, bands)
-    saturated = _saturation(saturated, 2**full - 1, 2**bits - 1)
-    kernel = partial(counts, nodata=nodata, largest=2**bits - 1, cure=_CURE, saturated=saturated)
+    saturated = _saturation(saturated, 2**full - 1)
+    kernel = partial(counts, nodata=nodata, largest=2**full - 1, cure=_CURE, saturated=saturated)
     plain = dn.drop_vars("band", errors="ignore")
     out = chunks.pointwise(kernel, plain, dtype=np.uint8 if bits <= 8 else np.uint16)
     scales = {"gain": gain, "offset": offset} | ({"compression": compression} if any(compression) else {})
     out = directions.with_geometry(grids.place(out, grids.geobox(dn)), geometry)
     out = out.assign_coords(coordinates_of_bands(bands, scales))
     out = out if time is None or time.ndim else out.assign_coords(time=((), time.values, cf.TIME_ATTRIBUTES))
-    return sensor_labels.labelled(out, dn, description, f"calibrate: {description.name}")
+    found = {} if saturated in (None, nodata) else sensor_labels.number_of_pixels(dn.variable == saturated)
+    return sensor_labels.labelled(out, dn.assign_attrs(found), description, f"calibrate: {description.name}")
 
 
 def _check_scale(radiance, bands):
@@ -228,12 +230,12 @@ def _check_scale(radiance, bands):
             )
 
 
-def _saturation(given, full, largest):
+def _saturation(given, largest):
     """Digital number of saturated pixels, None if they are kept."""
     if given is None:
         return None
     if isinstance(given, str) and given == "largest":
-        return full
+        return largest
     if isinstance(given, bool | str) or not 0 < given <= largest:
         raise ValueError(f"saturated must be 'largest', None, or a digital number from 1 to {largest}, got {given!r}")
     return given

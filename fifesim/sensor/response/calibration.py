@@ -79,7 +79,7 @@ def radiance_to_dn(radiance, gain, offset, bits, compression=0):
     return counts.astype(np.uint8 if largest < 256 else np.uint16)
 
 
-def dn_to_radiance(dn, gain, offset, compression=0):
+def dn_to_radiance(dn, gain, offset, compression=0, saturated=0):
     r"""
     Radiance of digital numbers.
 
@@ -95,11 +95,13 @@ def dn_to_radiance(dn, gain, offset, compression=0):
         Such as shape (band, 1, 1) for (band, y, x), from `gain_offset`.
     compression : array, broadcastable, optional
         Count c of a scale of square roots; 0 for a linear scale. [1]
+    saturated : int, optional
+        Digital number from which a pixel is saturated, so that its radiance is only a lower limit; 0 if none is. [1]
 
     Returns
     -------
     radiance : array of float64
-        NaN where there are no data. [W m-2 sr-1 um-1]
+        NaN where there are no data or the pixel is saturated. [W m-2 sr-1 um-1]
 
     References
     ----------
@@ -110,7 +112,8 @@ def dn_to_radiance(dn, gain, offset, compression=0):
     if np.any(compression):
         squares = (dn.astype(float) ** 2 + 0.25) / np.where(compression, compression, 1)
         counts = np.where(compression, squares, dn)
-    return np.where(dn == 0, np.nan, counts * np.asarray(gain, float) + offset)
+    unknown = (dn == 0) | (dn >= saturated) if saturated else dn == 0
+    return np.where(unknown, np.nan, counts * np.asarray(gain, float) + offset)
 
 
 def digital_step(radiance, gain, offset, compression=0):

@@ -10,6 +10,7 @@ import xarray as xr
 import zarr
 
 import fifesim
+from fifesim.output.chips import store
 from fifesim.output.chips.store import Shards, checksums, chip_arrays, layout_of, make_store, write_shard
 
 
@@ -42,6 +43,17 @@ def test_xarray_opens_the_store_without_a_warning(made):
         np.testing.assert_array_equal(dataset[name].values, table[name].values)
     assert set(dataset.data_vars) == {"dn", "toa_reflectance", "ndvi", "lai", "fpar", "green_fpar"}
     assert {"split", "landscape", "atmosphere.visibility", "sza", "gain", "spatial_ref"} <= set(dataset.coords)
+
+
+def test_saturated_pixels_have_no_reflectance(made):
+    """The store states the number of saturated pixels, as the image does."""
+    _, _, layout, _, arrays = made
+    assert xr.open_zarr(made[0]).dn.attrs["saturated"] == layout.saturated == 255
+    bright = {name: values.copy() for name, values in arrays[0].items()}
+    bright["dn"][0, :, 1, 1] = 255
+    light = store._reflectance(bright, layout)
+    assert np.isnan(light[0, :, 1, 1]).all()
+    np.testing.assert_array_equal(np.isnan(light).sum(), len(bright["dn"][0]) + (arrays[0]["dn"] == 0).sum())
 
 
 def test_variables_have_units(made):
