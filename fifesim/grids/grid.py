@@ -79,8 +79,9 @@ def regular_geobox(array):
 
 def _check_first(array):
     """Raise ValueError if the first two coordinates of an axis are equal, where the accessor of odc-geo fails."""
-    for name in {"y", "x", *array.dims[-2:]} & set(array.coords):
-        if array.coords[name].size > 1 and array.coords[name].values[0] == array.coords[name].values[1]:
+    for name in {"y", "x"} & set(array.dims) or array.dims[-2:]:
+        given = array.coords.variables.get(name)
+        if given is not None and given.size > 1 and given.values[0] == given.values[1]:
             along_axis(array, name, 0.0, 0.0)
 
 

@@ -259,9 +259,8 @@ _ROWS = 252
 def tiles(kernel, grid, chunks=None, *, tile, dtype=float):
     """Array of a kernel that computes cells from their place, dims (y, x), lazy with ``chunks``."""
     if chunks is None:
-        rows, columns = grid.shape
-        what = f"a raster of {rows} x {columns} cells"
-        check_memory(rows * columns, np.dtype(dtype).itemsize, what, "give chunks='auto', which makes it by parts")
+        what, size = "a raster of {} x {} cells".format(*grid.shape), np.dtype(dtype).itemsize
+        check_memory(grid.shape.y * grid.shape.x, size, what, "give chunks='auto', which makes it by parts")
         return grids.place(xr.DataArray(kernel(0, 0, tuple(grid.shape)), dims=("y", "x")), grid)
     normal = chunk_sizes(grid, chunks, tile=tile)
     lazy = xr.DataArray(array_by_place(kernel, normal, token=tokenize(kernel, normal), dtype=dtype), dims=("y", "x"))
