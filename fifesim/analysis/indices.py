@@ -30,7 +30,12 @@ def normalized_difference(nir, red):
     [Rouse1974]_; the criterion of [Friedl1995]_, Eq. 2, is `fifesim.analysis.scaling.linearity_correlation`
     """
     nir, red = np.asarray(nir, float), np.asarray(red, float)
-    return np.where(np.minimum(nir, red) < 0, np.nan, _ratio(nir - red, nir + red))
+    return np.where(np.minimum(nir, red) < 0, np.nan, linear_normalized_difference(nir, red))
+
+
+def linear_normalized_difference(nir, red):
+    """`normalized_difference` also of negative values, as of a linear model that extends beyond possible reflectance."""
+    return _ratio(nir - red, nir + red)
 
 
 def normalized_difference_std(nir, red, nir_std, red_std):

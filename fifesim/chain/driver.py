@@ -142,10 +142,11 @@ class Driver:
             image = calibration.dn_to_radiance(image, *self._scales, saturated=2 ** self.scale[2] - 1)
         return calibration.radiance_to_reflectance(image, *self._sun)
 
-    def ndvi(self, reflectance):
-        """Normalized difference vegetation index, shape (...), of reflectance, shape (band, ...)."""
+    def ndvi(self, reflectance, linear=False):
+        """Normalized difference vegetation index, shape (...), of reflectance, shape (band, ...), or of its tangent."""
         red, nir = self._red_and_nir
-        return indices.normalized_difference(reflectance[nir], reflectance[red])
+        kernel = indices.linear_normalized_difference if linear else indices.normalized_difference
+        return kernel(reflectance[nir], reflectance[red])
 
     @cached_property
     def _canopy(self):

@@ -104,7 +104,7 @@ def ground_with(scenario, grid, at_work, dem=None):
     return land.compute()
 
 
-def images_of(scene, cells, switches, hazy=True):
+def images_of(scene, cells, switches, hazy=True, linear=False):
     """NDVI, or leaf area by a retrieval, for active or ideal stages of the sensor, shape (5 axes of stages, y, x)."""
     scaling, spread, registration, quantisation, noise = switches
     found = np.empty((*map(len, switches), *scene.shape))
@@ -115,10 +115,11 @@ def images_of(scene, cells, switches, hazy=True):
                 found[:, i, j, k, m] = _estimated(scene, _recorded(scene, means, counts, grains), hazy)
                 continue
             *reflectance, of_cells = means
-            recorded = scene.driver.ndvi(_recorded(scene, np.array(reflectance), counts, grains))
+            recorded = scene.driver.ndvi(_recorded(scene, np.array(reflectance), counts, grains), linear)
             for n, of_reflectance in enumerate(scaling):
                 # Effects of the detector remain.
-                found[n, i, j, k, m] = recorded if of_reflectance else of_cells + (recorded - scene.driver.ndvi(means))
+                direct = scene.driver.ndvi(means, linear)
+                found[n, i, j, k, m] = recorded if of_reflectance else of_cells + (recorded - direct)
     return found
 
 
@@ -243,7 +244,8 @@ def images_of_all(scenes, switches):
         at_work = {name for name, state in zip(lit, states, strict=True) if state}
         cells = _cells(scenes[0], scenes[0].ground(at_work), at_work)
         for found, one, each in zip(images, scenes, switches, strict=True):
-            found.append(images_of(one, cells, [each[name] for name in _SENSED], "atmosphere" in at_work))
+            sensed = [each[name] for name in _SENSED]
+            found.append(images_of(one, cells, sensed, "atmosphere" in at_work, "non-linearity" not in at_work))
     return [_in_order(found, each, lit) for found, each in zip(images, switches, strict=True)]
 
 
@@ -407,7 +409,9 @@ def _cells(scene, ground, at_work):
         seen = _seen(scene, seen, coupling) if setup.adjacency or coupling != "lambert" else driver.toa(seen)
     if at_work & {"clouds", "shadows"}:
         seen = _under_clouds(scene, seen, at_work)
-    return seen if scene.retrieval is not None else np.concatenate([seen, driver.ndvi(seen)[None]])
+    if scene.retrieval is not None:
+        return seen
+    return np.concatenate([seen, driver.ndvi(seen, "non-linearity" not in at_work)[None]])
 
 
 def _under_clouds(scene, clear, at_work):
