@@ -34,7 +34,7 @@ def normalized_difference(nir, red):
 
 
 def linear_normalized_difference(nir, red):
-    """`normalized_difference` also of negative values, as of a linear model that extends beyond possible reflectance."""
+    """`normalized_difference` also of negative values, as of a linear model beyond possible reflectance."""
     return _ratio(nir - red, nir + red)
 
 
