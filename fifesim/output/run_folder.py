@@ -1,7 +1,6 @@
 """Run of a scenario into a folder of files, block by block, which can be resumed; and its estimated cost."""
 
 import json
-import os
 import tempfile
 import time
 from contextlib import suppress
@@ -23,7 +22,7 @@ from fifesim.grids.chunks import found_client
 from fifesim.grids.files import to_geotiff
 from fifesim.grids.reductions import computed
 from fifesim.output import identity, products, report, stac, workers
-from fifesim.output.folders import check_folder, errors_with_their_file, results
+from fifesim.output.folders import check_folder, errors_with_their_file, move_files, results
 from fifesim.output.maps import write_style
 from fifesim.output.progress import Progress, memory, spinner, steps
 from fifesim.scenario.ground import warn_of_canopy
@@ -92,9 +91,9 @@ def simulate_to_folder(
         tree = simulate(complete)
         found = products.products_of(tree, unfinished / SCENE if scene else None)
         threads = threads or workers.usable_cores()
-        if scene and not (unfinished / SCENE).exists():
+        if scene:
             products.make_scene_store(unfinished / f"{SCENE}.partial", found.scene)
-            os.replace(unfinished / f"{SCENE}.partial", unfinished / SCENE)
+            move_files(unfinished / f"{SCENE}.partial", unfinished / SCENE)
         LOG.info("simulating %s into %s", grids.in_words(complete.geobox()), folder)
         _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads, as_json)
         # The function instead of its name, with which dask would import distributed.

@@ -1,6 +1,5 @@
 """Zarr store of chips: metadata written at once, and shards written one by one from chips in memory."""
 
-import os
 import shutil
 import warnings
 import zlib
@@ -10,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.grids import cf
-from fifesim.output.folders import versions
+from fifesim.output.folders import move_files, versions
 from fifesim.scenario.ensemble import LIGHT, realise, realise_arrays
 from fifesim.sensor.response import calibration
 
@@ -205,13 +204,7 @@ def make_store(folder, chips, layout, shards):
         # Readers of Zarr 3 ignore unknown fields.
         warnings.filterwarnings("ignore", "Consolidated metadata is currently not part")
         zarr.consolidate_metadata(fresh)
-    # Complete files replace earlier ones, which are identical, one by one.
-    for path in sorted(fresh.rglob("*")):
-        if path.is_file():
-            target = folder / path.relative_to(fresh)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(path, target)
-    shutil.rmtree(fresh)
+    move_files(fresh, folder)
 
 
 def stored_names(chips, layout):
