@@ -2,9 +2,9 @@
 
 import hashlib
 import io
-import os
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
+from glob import escape
 from pathlib import Path
 from typing import Any
 
@@ -20,34 +20,28 @@ from fifesim.base.messages import warn
 class _CheckedFiles(IndexDataCacheFile):
     """Files of a compiled kernel that end with a SHA-256, because numba runs what it reads."""
 
-    def _tried(self, function, *given):
-        try:
-            return function(*given)
-        except OSError as error:
-            _warn_of_cache(self._cache_path, error.strerror)
-
     def load(self, key):
         """Load a compiled kernel, None if there is none that is intact."""
-        return self._tried(super().load, key)
+        with self._warned_of():
+            pattern = f"{escape(self._index_name.removesuffix('.nbi'))}*.nb?"
+            for path in Path(self._cache_path).glob(pattern):
+                content = path.read_bytes()
+                if hashlib.sha256(content[:-32]).digest() != content[-32:]:
+                    path.unlink()
+                    _warn_of_cache(self._cache_path, "damaged files are removed")
+            return super().load(key)
 
     def save(self, key, data):
         """Save a compiled kernel if the disk takes it."""
-        self._tried(super().save, key, data)
+        with self._warned_of():
+            super().save(key, data)
 
-    def _load_index(self):
-        self._remove_if_damaged(self._index_path)
-        return super()._load_index()
-
-    def _load_data(self, name):
-        self._remove_if_damaged(self._data_path(name))
-        return super()._load_data(name)
-
-    def _remove_if_damaged(self, path):
-        with suppress(FileNotFoundError):
-            content = Path(path).read_bytes()
-            if hashlib.sha256(content[:-32]).digest() != content[-32:]:
-                _warn_of_cache(self._cache_path, "damaged files are removed")
-                os.unlink(path)
+    @contextmanager
+    def _warned_of(self):
+        try:
+            yield
+        except OSError as error:
+            _warn_of_cache(self._cache_path, error.strerror)
 
     @contextmanager
     def _open_for_write(self, filepath):

@@ -1,6 +1,5 @@
 """Files: safe opening of the user's files, and the tables of the data folder."""
 
-import errno
 import os
 import re
 import reprlib
@@ -122,9 +121,9 @@ def flush(*paths):
         number = os.open(path, os.O_RDONLY)
         try:
             os.fsync(number)
-        except OSError as error:
+        except OSError:
             # Some network disks do not flush folders.
-            if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+            if not os.path.isdir(path):
                 raise
         finally:
             os.close(number)

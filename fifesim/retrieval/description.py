@@ -70,13 +70,8 @@ class _Description(BaseModel, extra="forbid", strict=True):
 
     @model_validator(mode="after")
     def _agree(self):
-        if len(self.wavelengths) != len(self.bands):
-            raise ValueError(f"{len(self.bands)} bands have {len(self.wavelengths)} wavelengths")
-        for names in (self.bands, self.quantities):
-            if len(set(names)) < len(names):
-                raise ValueError(f"names are there twice: {', '.join(names)}")
-        if sorted(set(self.levels)) != list(self.levels):
-            raise ValueError(f"levels must increase, got {self.levels}")
+        if len(self.wavelengths) != len(self.bands) or sorted(set(self.levels)) != list(self.levels):
+            raise ValueError("bands need one wavelength each, and levels must increase")
         return self
 
 

@@ -251,29 +251,20 @@ def _given(tables, angles):
     return angles[:, [at for at, name in enumerate(TABLE_ANGLES) if name in names]]
 
 
-# Shape, and lowest and highest value, of each table by method. A figure is a length, and a letter one that is the same
-# in all tables: b of bands, i of inputs, q of quantities, l of levels, o of outputs, m of measurements.
-_ANY, _POSITIVE = (-np.inf, np.inf), (np.nextafter(0, 1), np.inf)
-_COMMON = {
-    "prior_range": ("2q", 0, 20), "angle_range": ("23", 0, 180), "stretch": ("ql", 0, np.inf),
-    "domain_mean": ("b", *_ANY), "domain_scale": ("bb", *_ANY), "domain_radius": ("", 0, np.inf),
-}  # fmt: skip
-_TABLES = {
-    "line": {"line": ("q7", *_ANY), "bands": ("2", 0, np.inf)},
-    "lookup": {
-        "members": ("km", *_ANY), "states": ("kq", *_ANY), "scale": ("bb", *_ANY), "varies": ("3", 0, 1),
-    },
-    "quantiles": {
-        "input_mean": ("i", *_ANY), "input_spread": ("i", *_POSITIVE),
-        "centre": ("q", *_ANY), "scale": ("q", *_POSITIVE),
-        "weight0": ("ih", *_ANY), "weight1": ("hg", *_ANY), "weight2": ("go", *_ANY),
-        "bias0": ("h", *_ANY), "bias1": ("g", *_ANY), "bias2": ("o", *_ANY),
-    },
-    "optimal-estimation": {
-        "error_covariance": ("bb", *_ANY), "prior_mean": ("u", *_ANY), "prior_covariance": ("uu", *_ANY),
-    },
-}  # fmt: skip
+# Shape of each table by method. A figure is a length, and a letter one that is the same in all tables: b of bands, i of
+# inputs, q of quantities, l of levels, o of outputs, m of measurements.
+_SHAPES = {
+    "": "prior_range:2q angle_range:23 stretch:ql domain_mean:b domain_scale:bb domain_radius:",
+    "line": "line:q7 bands:2",
+    "lookup": "members:km states:kq scale:bb varies:3",
+    "quantiles": "input_mean:i input_spread:i centre:q scale:q weight0:ih weight1:hg weight2:go bias0:h bias1:g bias2:o",
+    "optimal-estimation": "error_covariance:bb prior_mean:u prior_covariance:uu",
+}
 
+# Lowest and highest value of tables.
+_POSITIVE = np.nextafter(0, 1), np.inf
+_RANGES = {"prior_range:2q": (0, 20), "angle_range:23": (0, 180), "stretch:ql": (0, np.inf)}
+_RANGES |= {"domain_radius:": (0, np.inf), "varies:3": (0, 1), "input_spread:i": _POSITIVE, "scale:q": _POSITIVE}
 
 # Columns of the table of a line: number of pixels, residual deviation and sum of squares.
 _NOT_NEGATIVE = [_LINE.index(name) for name in ("n", "residual_deviation", "x_sum_of_squares")]
@@ -281,33 +272,31 @@ _NOT_NEGATIVE = [_LINE.index(name) for name in ("n", "residual_deviation", "x_su
 
 def check_tables(method, tables, bands, quantities, levels):
     """Raise ValueError for tables of a file that are missing or unknown, or whose shape or values are impossible."""
-    wanted = _COMMON | _TABLES[method]
+    wanted = f"{_SHAPES['']} {_SHAPES[method]}".split()
     if method == "optimal-estimation":
-        axes = _names(tables)
-        wanted |= {f"axis_{name}": ("2", *_ANY) for name in axes}
-        nodes = "ABCDEFGHI"[: len(axes)]
-        wanted |= {"reflectance": (f"{nodes}b", *_ANY), "quantities": (f"{nodes}q", *_ANY)}
-    if odd := sorted(wanted.keys() ^ tables.keys()):
-        raise ValueError(f"the table {odd[0]} is {'missing' if odd[0] in wanted else 'unknown'}")
+        nodes = "ABCDEFGHI"[: len(axes := _names(tables))]
+        wanted += [*(f"axis_{name}:2" for name in axes), f"reflectance:{nodes}b", f"quantities:{nodes}q"]
+    if odd := sorted({each.partition(":")[0] for each in wanted} ^ tables.keys()):
+        raise ValueError(f"the table {odd[0]} is {'unknown' if odd[0] in tables else 'missing'}")
     sizes = {"b": bands, "i": bands + 3, "q": quantities, "l": levels, "o": quantities * (2 * levels + 1)}
     sizes["m"] = bands + np.count_nonzero(tables.get("varies"))
-    for name, (shape, lowest, highest) in wanted.items():
-        values = tables[name]
-        if values.ndim != len(shape) or values.dtype != float:
-            raise ValueError(f"the table {name} has {values.ndim} dimensions and the type {values.dtype}")
-        lengths = tuple(
-            int(each) if each.isdigit() else sizes.setdefault(each, size)
-            for each, size in zip(shape, values.shape, strict=True)
+    for each in wanted:
+        name, _, shape = each.partition(":")
+        values, (lowest, highest) = tables[name], _RANGES.get(each, (-np.inf, np.inf))
+        known = (
+            int(at) if at.isdigit() else sizes.setdefault(at, n) for at, n in zip(shape, values.shape, strict=False)
         )
-        if values.shape != lengths:
-            raise ValueError(f"the table {name} has the shape {values.shape}, not {lengths}")
+        if values.ndim != len(shape) or values.shape != tuple(known) or values.dtype != float:
+            raise ValueError(f"the table {name} has the shape {values.shape} and the type {values.dtype}")
         # An input that does not vary has an infinite spread.
         is_known = np.isfinite(values) | (name == "input_spread")
         if not (is_known & (values >= lowest) & (values <= highest)).all():
             raise ValueError(f"the table {name} has values that are not finite or out of range")
         if (name.startswith("axis_") or name.endswith("_range")) and not (values[0] <= values[1]).all():
             raise ValueError(f"the table {name} has an upper end below the lower end")
-    if method == "line" and (tables["bands"].max() >= bands or tables["line"][:, _NOT_NEGATIVE].min() < 0):
+    if method == "line" and not (
+        ((tables["bands"] >= 0) & (tables["bands"] < bands)).all() and (tables["line"][:, _NOT_NEGATIVE] >= 0).all()
+    ):
         raise ValueError("the tables line and bands have values out of range")
 
 
