@@ -238,3 +238,64 @@ def test_scale_offset_and_fill_value_are_applied_and_removed():
 def test_unpacked_values_are_unchanged():
     plain = xr.DataArray(CELLS.astype(np.float32), dims=("y", "x"), attrs={"_FillValue": np.nan, "scale_factor": 1})
     assert unpacked(plain) is plain
+
+
+def test_scales_by_band_follow_the_numbers_of_the_bands(fractions):
+    """rioxarray has `scales` and `offsets` for all bands of the file, also after a selection."""
+    stored = as_stored(fractions, scales=(1e-4, 2e-4), offsets=(0.0, 0.1), _FillValue=-9999)
+    stored = stored.assign_coords(band=[1, 2])
+    expected = with_hole(fractions).values * [[[1]], [[2]]] + [[[0]], [[0.1]]]
+    np.testing.assert_allclose(opened(stored), expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(opened(stored.sel(band=2)), expected[1], rtol=0, atol=1e-12)
+    with pytest.raises(ValueError, match=r"scale_factor \(0\.0001, 0\.0002\).*one for each numbered band"):
+        opened(stored.assign_coords(band=["red", "nir"]))
+
+
+@pytest.mark.parametrize(
+    "attrs", [{"valid_range": (0, 100)}, {"valid_min": 0, "valid_max": np.uint8(100)}, {"valid_max": 100}]
+)
+def test_numbers_beyond_the_valid_range_are_no_data(site, attrs):
+    """LAI of MODIS: 249 to 254 stand for water, cities and the like, and CF takes them as missing."""
+    whole = grids.place(xr.DataArray(np.full(site.shape, 25, "uint8"), dims=("y", "x"), name="lai"), site)
+    whole[2, 3], whole[4, 5] = 253, 255
+    expected = whole.where(whole == 25) * 0.1
+    lai = opened(whole.assign_attrs(scale_factor=0.1, _FillValue=255, **attrs))
+    np.testing.assert_allclose(lai, expected, rtol=1e-15)
+    assert not {"valid_range", "valid_min", "valid_max", "scale_factor"} & set(lai.attrs)
+    # In fractions, the attributes may still refer to the stored numbers.
+    np.testing.assert_array_equal(opened((expected * 1000).assign_attrs(attrs)), expected * 1000)
+
+
+@pytest.mark.parametrize("scale", [0.0, np.nan, "0.1", (0.1, 0.2)])
+def test_impossible_scale_is_named(site, scale):
+    whole = grids.place(xr.DataArray(np.full(site.shape, 25, "uint8"), dims=("y", "x"), name="mine"), site)
+    with pytest.raises(ValueError, match="mine has scale_factor .* must be a finite number"):
+        opened(whole.assign_attrs(scale_factor=scale))
+
+
+def test_codes_and_digital_numbers_stay_whole_numbers(site):
+    codes = grids.place(xr.DataArray(np.zeros(site.shape, "int16"), dims=("y", "x")), site)
+    codes = codes.assign_attrs(_FillValue=-1, flag_values=[0, 1])
+    counts = codes.drop_attrs().assign_attrs(_FillValue=0).assign_coords(gain=0.8, offset=-1.2)
+    assert opened(codes) is codes and opened(counts) is counts
+
+
+def test_written_file_has_the_scale_of_its_whole_numbers(site, tmp_path):
+    stored = grids.place(xr.DataArray(np.full(site.shape, 8, "int16"), dims=("y", "x"), name="lai"), site)
+    stored[1, 1] = -1
+    for key, mine in {
+        "attrs": stored.assign_attrs(scale_factor=0.1, add_offset=0.5, _FillValue=-1),
+        "encoding": stored.copy(),
+    }.items():
+        mine.encoding |= {"scale_factor": 0.1, "add_offset": 0.5, "_FillValue": -1} if key == "encoding" else {}
+        path = mine.fifesim.to_geotiff(tmp_path / f"{key}.tif")
+        with rasterio.open(path) as file:
+            assert (file.scales, file.offsets, file.nodata, file.dtypes) == ((0.1,), (0.5,), -1, ("int16",))
+        with rioxarray.open_rasterio(path, mask_and_scale=True) as read:
+            np.testing.assert_allclose(read[0, 0], 1.3, rtol=1e-6)
+        again = fifesim.open_image(path)
+        np.testing.assert_array_equal(again, mine)
+        np.testing.assert_allclose(fifesim.open_lai(path, site), opened(mine), rtol=1e-12)
+        np.testing.assert_allclose(opened(again), opened(mine), rtol=1e-12)
+    with pytest.raises(ValueError, match="fractions but also scale_factor"):
+        (stored * 0.1).assign_attrs(scale_factor=0.1).fifesim.to_geotiff(tmp_path / "scaled.tif")

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, TypeAlias
 import numpy as np
 import xarray as xr
 
-from fifesim.base.arguments import Kind, NumberByBand, Time
+from fifesim.base.arguments import RASTER, Kind, NumberByBand, Time
 from fifesim.base.bands import counts
 from fifesim.base.files import in_a_line
 from fifesim.grids import cf, chunks, directions
@@ -17,6 +17,7 @@ from fifesim.grids import grid as grids
 from fifesim.grids.dates import by_date
 from fifesim.grids.directions import Directions
 from fifesim.grids.grid import north_up
+from fifesim.grids.inputs import no_data_of
 from fifesim.grids.opening import ErrorsOfGdal, check_memory, check_raster, horizontal_crs, raster_file, stored_cells
 from fifesim.sensor import labels as sensor_labels
 from fifesim.sensor.description.instrument_file import InstrumentLike
@@ -114,7 +115,7 @@ Saturation: TypeAlias = Annotated[
 
 @by_date
 def calibrate(
-    dn: xr.DataArray,
+    dn: Annotated[xr.DataArray, RASTER._replace(stored=True)],
     instrument: InstrumentLike,
     *,
     time: Time | None = None,
@@ -141,7 +142,7 @@ def calibrate(
         Radiance of one count, and of digital number 0: RADIANCE_MULT and RADIANCE_ADD of Landsat's metadata. By default
         from the description of the instrument, including a square-root scale. [W m-2 sr-1 um-1]
     nodata : int, optional
-        Digital number of no data.
+        Digital number of no data, in addition to the fill value that the raster declares.
     saturated : int, "largest" or None, optional
         Digital number of saturated pixels, which become no data, as in `open_landsat`. By default the largest number
         of the instrument's bits, such as 255 for TM; with `gain` and `offset`, 255 for instruments of up to 8 bits and
@@ -185,6 +186,8 @@ def calibrate(
         raise ValueError("the raster carries a calibration already: drop it with .drop_vars(['gain', 'offset'])")
     description = find_instrument(instrument)
     dn = north_up(dn if "band" in dn.dims else dn.expand_dims("band")).transpose("band", "y", "x")
+    declared = no_data_of(dn)
+    dn = dn if declared in (None, nodata) or np.isnan(declared) else dn.where(dn != declared, nodata)
     bands = matching_bands(dn, description)
     # A given geometry overrides the sun of a given time, which still becomes the time of the image.
     geometry = directions.given_geometry(geometry, dn, time if geometry is None else None)

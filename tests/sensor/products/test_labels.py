@@ -178,3 +178,9 @@ def test_layers_of_different_grids_raise():
     assert reflectance([one, one], bands).dims == ("band", "y", "x")
     with pytest.raises(ValueError, match=r"^b\.tif and a\.tif have different grids, .*bands="):
         reflectance([one, two], bands)
+
+
+def test_declared_fill_value_is_no_data_in_addition(dn):
+    whole = dn.astype("uint16").where(dn.x > float(dn.x[0]), np.uint16(65535))
+    image = fifesim.calibrate(whole.assign_attrs(_FillValue=65535), "TM", geometry=SUN)
+    np.testing.assert_array_equal(image, dn.where(dn.x > float(dn.x[0]), 0))
