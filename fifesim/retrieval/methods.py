@@ -257,7 +257,8 @@ _SHAPES = {
     "": "prior_range:2q angle_range:23 stretch:ql domain_mean:b domain_scale:bb domain_radius:",
     "line": "line:q7 bands:2",
     "lookup": "members:km states:kq scale:bb varies:3",
-    "quantiles": "input_mean:i input_spread:i centre:q scale:q weight0:ih weight1:hg weight2:go bias0:h bias1:g bias2:o",
+    "quantiles": "input_mean:i input_spread:i centre:q scale:q weight0:ih bias0:h weight1:hg bias1:g weight2:go "
+    "bias2:o",
     "optimal-estimation": "error_covariance:bb prior_mean:u prior_covariance:uu",
 }
 
@@ -283,9 +284,8 @@ def check_tables(method, tables, bands, quantities, levels):
     for each in wanted:
         name, _, shape = each.partition(":")
         values, (lowest, highest) = tables[name], _RANGES.get(each, (-np.inf, np.inf))
-        known = (
-            int(at) if at.isdigit() else sizes.setdefault(at, n) for at, n in zip(shape, values.shape, strict=False)
-        )
+        ends = zip(shape, values.shape, strict=False)
+        known = (int(end) if end.isdigit() else sizes.setdefault(end, size) for end, size in ends)
         if values.ndim != len(shape) or values.shape != tuple(known) or values.dtype != float:
             raise ValueError(f"the table {name} has the shape {values.shape} and the type {values.dtype}")
         # An input that does not vary has an infinite spread.
