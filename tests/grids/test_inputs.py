@@ -269,7 +269,7 @@ def test_numbers_beyond_the_valid_range_are_no_data(site, attrs):
 @pytest.mark.parametrize("scale", [0.0, np.nan, "0.1", (0.1, 0.2)])
 def test_impossible_scale_is_named(site, scale):
     whole = grids.place(xr.DataArray(np.full(site.shape, 25, "uint8"), dims=("y", "x"), name="mine"), site)
-    with pytest.raises(ValueError, match="mine has scale_factor .* must be a finite number"):
+    with pytest.raises(ValueError, match=r"mine has scale_factor .* must be a finite number"):
         opened(whole.assign_attrs(scale_factor=scale))
 
 
