@@ -31,6 +31,8 @@ class Quantity:
         object.__setattr__(self, "label", self.label or self.long_name)
 
 
+# Glint, snow and slopes in low sun have reflectance factors of up to 5, and corrections leave some below 0. The range of
+# elevations is of land, with a margin.
 QUANTITIES = {
     "lai": Quantity("1", "leaf_area_index", "leaf area index", "one-sided leaf area per ground area",
         label="LAI", shown_units="m2 m-2", lowest=0, highest=100, colours="YlGn", ends=(0, None)),
@@ -64,8 +66,9 @@ QUANTITIES = {
         label="class share", lowest=0, highest=1),
     "normal_score": Quantity("1", "", "standard normal deviate"),
     "surface_reflectance": Quantity("1", "surface_bidirectional_reflectance", "surface reflectance factor",
-        "direct and diffuse light mixed", label="reflectance", lowest=0, colours="gray"),
-    "dem": Quantity("m", "surface_altitude", "elevation of the ground", label="elevation", colours="land"),
+        "direct and diffuse light mixed", label="reflectance", lowest=-0.5, highest=5, colours="gray"),
+    "dem": Quantity("m", "surface_altitude", "elevation of the ground",
+        label="elevation", lowest=-500, highest=9000, colours="land"),
     "slope": Quantity("degree", "ground_slope_angle", "slope of the ground",
         label="slope", lowest=0, highest=90, colours="YlOrBr", ends=(0, None)),
     "aspect": Quantity("degree", "ground_slope_direction", "aspect of the ground",
@@ -101,7 +104,7 @@ QUANTITIES = {
     "topographic_k": Quantity("1", "", "exponent of the Minnaert correction"),
     "toa_reflectance": Quantity("1", "toa_bidirectional_reflectance",
         "apparent reflectance at the top of the atmosphere", "the cosine of the solar zenith angle is divided out",
-        label="reflectance", lowest=0, colours="gray"),
+        label="reflectance", lowest=-0.5, highest=5, colours="gray"),
     "toa_radiance": Quantity("W m-2 sr-1 um-1", "toa_outgoing_radiance_per_unit_wavelength",
         "radiance at the top of the atmosphere", label="radiance", lowest=0, colours="gray"),
     "toa_radiance_std": Quantity("W m-2 sr-1 um-1", "toa_outgoing_radiance_per_unit_wavelength standard_error",

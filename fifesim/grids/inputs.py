@@ -169,8 +169,8 @@ def storage(raster):
     return {**raster.attrs, **raster.encoding} if raster.dtype.kind in "iu" else raster.attrs
 
 
-# Range of reflectance factors; glint, snow and slopes in low sun stay within. [1]
-LOWEST, HIGHEST = -0.5, 5.0
+LOWEST, HIGHEST = cf.QUANTITIES["surface_reflectance"].lowest, cf.QUANTITIES["surface_reflectance"].highest
+"""Range of reflectance factors. [1]"""
 
 # Distance of the rows in which the scale of a raster from fifesim is checked. [row]
 SAMPLED_ROWS = 16

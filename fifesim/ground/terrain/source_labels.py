@@ -28,9 +28,6 @@ from fifesim.ground.terrain.slope import metres_per_unit
 # Positions in another CRS are a polynomial through this number of Chebyshev nodes along each axis of a tile.
 _NODES = 12
 
-# Range of the elevations of land, with a margin. [m]
-LAND_ELEVATIONS = (-500, 9000)
-
 # Elevations of exactly 0 among others that are all farther from it may be voids. [m]
 _CLIFF = 50.0
 
@@ -204,12 +201,13 @@ def _chebyshev(values):
 def check_heights(name, values):
     """Raise ValueError for heights that do not occur on land, and warn of voids of 0."""
     # Whole numbers have no infinity, and unsigned ones no difference.
-    values, (low, high) = np.asarray(values, float), LAND_ELEVATIONS
-    wrong = values[(values < low) | (values > high)]
+    values, land = np.asarray(values, float), cf.QUANTITIES["dem"]
+    wrong = values[(values < land.lowest) | (values > land.highest)]
     if wrong.size:
         raise ValueError(
-            f"{name} holds elevations such as {wrong.flat[0]:.0f} m, land has {low} to {high} m: if it marks no data, "
-            "declare it (gdal_edit.py -a_nodata, .rio.write_nodata); if the unit is another, give vertical_units="
+            f"{name} holds elevations such as {wrong.flat[0]:.0f} m, land has {land.lowest} to {land.highest} m: if it "
+            "marks no data, declare it (gdal_edit.py -a_nodata, .rio.write_nodata); if the unit is another, give "
+            "vertical_units="
         )
     void = values == 0
     if void.any() and np.fmin.reduce(np.abs(values[~void]), initial=np.inf) > _CLIFF:
