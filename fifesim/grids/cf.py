@@ -302,7 +302,7 @@ def check_units(array, *names):
 
 def band_coordinates(**values):
     """Coordinates along the band dimension."""
-    names = np.asarray(values.pop("band"), dtype=str)
+    names = np.asarray(values.pop("band"), dtype=str).astype(object)
     found = {"band": xr.DataArray(names, dims="band", attrs={"long_name": "band"})}
     for name, value in values.items():
         found[name] = xr.DataArray(np.asarray(value, float), dims="band", attrs=attributes(name))
