@@ -31,8 +31,8 @@ class Quantity:
         object.__setattr__(self, "label", self.label or self.long_name)
 
 
-# Glint, snow and slopes in low sun have reflectance factors of up to 5, and corrections leave some below 0. The range of
-# elevations is of land, with a margin.
+# Glint, snow and slopes in low sun have reflectance factors of up to 5, and corrections leave some below 0. Elevations
+# are of land, with a margin.
 QUANTITIES = {
     "lai": Quantity("1", "leaf_area_index", "leaf area index", "one-sided leaf area per ground area",
         label="LAI", shown_units="m2 m-2", lowest=0, highest=100, colours="YlGn", ends=(0, None)),
