@@ -68,8 +68,8 @@ class Geometry:
                 )
         check_fields(self)
         for name in ("saa", "vaa"):
-            if not -360 <= getattr(self, name) <= 360:
-                raise ValueError(f"{name} must be in [-360, 360] degrees, got {getattr(self, name)}")
+            if not -720 <= getattr(self, name) <= 720:
+                raise ValueError(f"{name} must be in [-720, 720] degrees, got {getattr(self, name)}")
         hints = {
             "sza": "the sun is below the horizon; check time, latitude and longitude",
             "vza": "the sensor looks down",

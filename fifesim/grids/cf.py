@@ -234,8 +234,9 @@ def check_quantity(array, *names):
     wanted = [QUANTITIES[name].standard_name for name in names]
     if stated not in _LONG_NAMES or stated in wanted:
         check_units(array, *names)
-        # Names of reflectance do not tell its level.
-        found = named(str(array.name)) & _KNOWN_BY_NAME
+        # Names of reflectance do not tell its level, and a name is weaker than a unit.
+        has_unit = "units" in array.attrs and QUANTITIES[names[0]].units != "1"
+        found = set() if has_unit else named(str(array.name)) & _KNOWN_BY_NAME
         if stated in _LONG_NAMES or not found:
             return
         stated, key, cure = QUANTITIES[min(found)].standard_name, "name", f"type .rename({names[0]!r})"

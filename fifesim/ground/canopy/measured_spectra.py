@@ -25,7 +25,7 @@ class Spectrum:
 
     wavelength: tuple = field(repr=False)
     reflectance: tuple = field(repr=False)
-    gaps: tuple = field(default=(), repr=False, init=False)  # wavelengths on both sides of each wide gap [um]
+    gaps: tuple = field(default=(), repr=False, kw_only=True)  # wavelengths on both sides of each wide gap [um]
 
     def __post_init__(self):
         wavelength, shapes = np.asarray(self.wavelength, float), {np.shape(each) for each in self.values()}
@@ -42,8 +42,8 @@ class Spectrum:
             raise ValueError("fewer than two wavelengths of the spectrum have values: the others are deleted")
         deleted = [wavelength[[low, high]].tolist() for low, high in pairwise(known) if high > low + 1]
         wavelength, values = wavelength[known], values[:, known]
-        gaps = tuple((low, high) for low, high in deleted if high - low > WIDEST_GAP)
-        own = {"wavelength": tuple(wavelength.tolist()), "gaps": gaps}
+        gaps = ((low, high) for low, high in deleted if high - low > WIDEST_GAP)
+        own = {"wavelength": tuple(wavelength.tolist()), "gaps": (*self.gaps, *gaps)}
         for name, each in zip(self.names(), values, strict=True):
             own[name] = tuple(_reflected(name, each, wavelength).tolist())
         for name, each in own.items():
@@ -52,7 +52,7 @@ class Spectrum:
     @classmethod
     def names(cls):
         """Names of the quantities by wavelength."""
-        return tuple(each.name for each in fields(cls) if each.init and each.name != "wavelength")
+        return tuple(each.name for each in fields(cls) if each.name not in ("wavelength", "gaps"))
 
     def values(self):
         """Values of the quantities by wavelength, each of shape (n,). [1]"""

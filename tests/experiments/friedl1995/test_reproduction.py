@@ -98,7 +98,7 @@ def test_scenes_are_a_stac_collection(one_of_nine):
     (path,) = [link["href"] for link in found["links"] if link["rel"] == "item"]
     item = json.loads((one_of_nine.parent / path).read_text(encoding="utf-8"))
     assert item["collection"] == found["id"] and found["extent"]["spatial"]["bbox"] == [item["bbox"]]
-    assert set(item["assets"]) == {"image", "truth", "scene", "scenario"}
+    assert set(item["assets"]) == {"image", "image-style", "truth", "truth-style", "scene", "scenario"}
     assert [band["eo:common_name"] for band in item["assets"]["image"]["bands"]] == ["red", "nir"]
     assert [band["name"] for band in item["assets"]["scene"]["bands"]] == ["lai", "fpar", "TM3", "TM4"]
     assert "singlebandpseudocolor" in (one_of_nine / "truth.qml").read_text(encoding="utf-8")
