@@ -4,7 +4,7 @@ import inspect
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from datetime import datetime
 from functools import cache, wraps
 from itertools import chain
@@ -317,15 +317,32 @@ def _rasters(value):
         return [value]
     if is_a(value, "Dataset"):
         return [each for each in value.data_vars.values() if each.ndim >= 2]
+    # Classes of pydantic have checked their fields, and longer sequences hold no rasters.
+    checked = hasattr(value, "__pydantic_validator__") or (isinstance(value, list | tuple) and len(value) != 2)
+    return list(chain.from_iterable(map(_rasters, () if checked else parts_of(value).values())))
+
+
+def parts_of(value):
+    """Parts of a mapping, a sequence or a description by name, none of another value."""
+    if isinstance(value, Mapping | list | tuple):
+        return dict(value if isinstance(value, Mapping) else enumerate(value))
+    own = fields(value) if is_dataclass(type(value)) else ()
+    return {each.name: getattr(value, each.name) for each in own if each.init}
+
+
+def with_parts(value, change):
+    """Mapping, sequence or description with its parts changed by a function, itself if none changes."""
+    parts = parts_of(value)
+    found = {name: change(each) for name, each in parts.items()}
+    changed = {name: each for name, each in found.items() if each is not parts[name]}
+    if not changed:
+        return value
+    if isinstance(value, list | tuple):
+        return type(value)._make(found.values()) if hasattr(value, "_make") else type(value)(found.values())
     if isinstance(value, Mapping):
-        parts = value.values()
-    elif isinstance(value, list | tuple) and len(value) == 2:
-        parts = value
-    else:
-        # Classes of pydantic have checked their fields.
-        plain = is_dataclass(type(value)) and not hasattr(value, "__pydantic_validator__")
-        parts = [getattr(value, each.name) for each in fields(value)] if plain else ()
-    return list(chain.from_iterable(map(_rasters, parts)))
+        return found
+    # A Canopy keeps which of its fields were given.
+    return value.replace(**changed) if hasattr(value, "replace") else replace(value, **changed)
 
 
 def _cure(value, kind):

@@ -1,7 +1,6 @@
 """Rasters over time: steps for one date, applied to each date separately."""
 
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass, replace
 from functools import wraps
 from hashlib import blake2b
 from inspect import signature
@@ -9,6 +8,8 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 import xarray as xr
+
+from fifesim.base.arguments import parts_of, with_parts
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -80,42 +81,23 @@ def epoch(raster):
 def _check_no_dates(step, options):
     """Raise ValueError for arguments with dates if the raster has one date."""
     for name, other in options.items():
-        if isinstance(other, dict | tuple | list) or is_dataclass(other):
-            _check_no_dates(step, _parts(other))
-        elif isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
+        if not isinstance(other, xr.DataArray | xr.Dataset | xr.DataTree):
+            _check_no_dates(step, parts_of(other))
+        elif "time" in other.dims:
             raise ValueError(
                 f"{name} has dates and the raster of {step.__name__} has none: give the raster a dimension time, or "
                 "select one date with .isel(time=0)"
             )
 
 
-def _parts(other):
-    """Parts of a mapping, a sequence or a description, by name."""
-    if isinstance(other, dict):
-        return other
-    if isinstance(other, tuple | list):
-        return dict(enumerate(other))
-    return {field.name: getattr(other, field.name) for field in fields(other) if field.init}
-
-
 def _at(other, number, raster):
     """Select a date in an argument with the dimension time, or in its parts."""
-    if isinstance(other, dict | tuple | list) or is_dataclass(other):
-        parts = _parts(other)
-        found = {name: _at(each, number, raster) for name, each in parts.items()}
-        changed = {name: each for name, each in found.items() if each is not parts[name]}
-        if not changed:
-            return other
-        if isinstance(other, dict):
-            return found
-        if isinstance(other, tuple | list):
-            return type(other)._make(found.values()) if hasattr(other, "_make") else type(other)(found.values())
-        # A Canopy keeps which of its fields were given.
-        return other.replace(**changed) if hasattr(other, "replace") else replace(other, **changed)
-    if isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
-        if not np.array_equal(other["time"].values, raster["time"].values):
-            raise ValueError(
-                f"the times of {getattr(other, 'name', None) or 'a Dataset'} differ from the times of the raster"
-            )
-        return other.isel(time=number)
-    return other
+    if not isinstance(other, xr.DataArray | xr.Dataset | xr.DataTree):
+        return with_parts(other, lambda each: _at(each, number, raster))
+    if "time" not in other.dims:
+        return other
+    if not np.array_equal(other["time"].values, raster["time"].values):
+        raise ValueError(
+            f"the times of {getattr(other, 'name', None) or 'a Dataset'} differ from the times of the raster"
+        )
+    return other.isel(time=number)

@@ -1,15 +1,13 @@
 """Rasters given by the user: their types, packing, band order, orientation and units."""
 
 import re
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass, replace
 from typing import Annotated, Any, TypeAlias, TypeVar
 
 import numpy as np
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 
-from fifesim.base.arguments import RASTER, FilePath, Kind
+from fifesim.base.arguments import RASTER, FilePath, Kind, with_parts
 from fifesim.base.bands import LONGEST, PER_MICROMETRE
 from fifesim.base.messages import warn
 from fifesim.grids import cf, chunks
@@ -25,7 +23,6 @@ Raster = TypeVar("Raster", xr.DataArray, xr.Dataset)
 RasterOrDataset: TypeAlias = Annotated[xr.DataArray | xr.Dataset, RASTER_OR_DATASET]
 # A raster along any dimensions.
 AnyDimensions: TypeAlias = Annotated[xr.DataArray, RASTER._replace(dimensions=0)]
-NumberOrRaster: TypeAlias = float | xr.DataArray
 FileOrRaster: TypeAlias = Annotated[
     FilePath | xr.DataArray, Kind("the path of a file, or an xarray.DataArray", dimensions=2)
 ]
@@ -69,16 +66,7 @@ def opened(value):
         own = {key: each.assign_attrs(shared | each.attrs) if shared else each for key, each in own.items()}
         changed = {key: found for key, each in own.items() if (found := opened(each)) is not each}
         return value.assign(changed).drop_attrs(deep=False).assign_attrs(value.attrs) if changed else value
-    if isinstance(value, Mapping) and not isinstance(value, xr.DataTree):
-        return {key: opened(each) for key, each in value.items()}
-    if isinstance(value, list | tuple) and len(value) == 2:
-        return type(value)(map(opened, value))
-    if is_dataclass(value):
-        own = {each.name: getattr(value, each.name) for each in fields(value) if each.init}
-        rasters = {name: each for name, each in own.items() if isinstance(each, xr.DataArray)}
-        changed = {name: found for name, each in rasters.items() if (found := opened(each)) is not each}
-        return replace(value, **changed) if changed else value
-    return value
+    return value if isinstance(value, xr.DataTree) else with_parts(value, opened)
 
 
 def unpacked(raster):
