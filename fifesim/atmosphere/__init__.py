@@ -2,7 +2,7 @@
 
 from importlib import import_module
 
-from fifesim.base.ranges import Range
+from fifesim.base.arguments import Range
 
 ENGINES = ("5S", "successive-orders", "6S")
 """Schemes of radiative transfer by name, in the order of messages. Importing the list loads no physics."""

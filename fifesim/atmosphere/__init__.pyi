@@ -1,6 +1,6 @@
 """Where the public name of this folder lives, for editors and type checkers."""
 
-from fifesim.base.ranges import Range
+from fifesim.base.arguments import Range
 
 from .labels import spectrum as spectrum
 

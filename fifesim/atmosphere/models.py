@@ -12,9 +12,8 @@ import numpy as np
 from fifesim.atmosphere import ENGINES, RANGES, aerosols, five_s, gases, mixtures
 from fifesim.atmosphere.aerosols import Aerosol, known_aerosol
 from fifesim.atmosphere.gases import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, Levels, column, profile_above
-from fifesim.base.arguments import PLAIN, AerosolMixture, Numbers, check_fields, described
+from fifesim.base.arguments import PLAIN, AerosolMixture, Numbers, check_fields, check_number, described
 from fifesim.base.messages import closest
-from fifesim.base.ranges import check_number
 
 # Band limits of the Thematic Mapper, as its designers state them. [um]
 _BANDS = ((0.45, 0.52), (0.52, 0.60), (0.63, 0.69), (0.76, 0.90), (1.55, 1.75), (2.08, 2.35))

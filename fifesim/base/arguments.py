@@ -27,7 +27,7 @@ from typing import (
 
 import numpy as np
 
-from fifesim.base.messages import closest, unknown_argument
+from fifesim.base.messages import closest, unknown_argument, warn
 
 
 class Kind(NamedTuple):
@@ -363,6 +363,43 @@ def _cure(value, kind):
     if kind is GRID and is_a(value, "DataArray"):
         return ": type raster.odc.geobox"
     return ""
+
+
+class Range(NamedTuple):
+    """Unit of a quantity, its allowed and its usual values, and factors from other units to its unit."""
+
+    unit: str
+    lowest: float
+    highest: float
+    usual: tuple[float, float] = (-np.inf, np.inf)
+    others: Mapping[str, float] = {}
+    note: str = ""  # what else the number may have been meant as
+
+
+def likely_units(name, value, known):
+    """Units in which a value is usual, and the note of a range, as the end of a message."""
+    low, high = max(known.usual[0], known.lowest), min(known.usual[1], known.highest)
+    found = [
+        f"if it is in {unit}, type {name}={value * factor:.4g}"
+        for unit, factor in known.others.items()
+        if low <= value * factor <= high
+    ]
+    return "; ".join([*filter(None, [known.note]), *found])
+
+
+def check_number(what, values, known):
+    """Raise ValueError for impossible numbers, and warn if their mean is unusual and not 0; NaN in arrays passes."""
+    one, values = np.ndim(values) == 0, np.atleast_1d(np.asarray(values, float))
+    wrong = (values < known.lowest) | (values > known.highest) | (one & np.isnan(values))
+    known_values = values[np.isfinite(values)]
+    number = values[wrong][0] if wrong.any() else known_values.mean() if known_values.size else 0.0
+    unit = "" if known.unit == "1" else f" {known.unit}"
+    hint = likely_units(what.rpartition(" ")[2], number, known) or "check its unit"
+    if wrong.any():
+        raise ValueError(f"{what} must be in [{known.lowest:g}, {known.highest:g}]{unit}, got {number:g}: {hint}")
+    if number and not known.usual[0] <= number <= known.usual[1]:
+        low, high = max(known.usual[0], known.lowest), min(known.usual[1], known.highest)
+        warn(f"{what} is {number:g}{unit}, and {low:g} to {high:g} is usual: {hint}")
 
 
 class Array(Protocol):

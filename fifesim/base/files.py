@@ -89,7 +89,7 @@ def read_toml(path):
         raise ValueError(in_a_line(f"{name} is not valid TOML: {error}")) from None
 
 
-def check_place(path):
+def check_target(path):
     """Raise OSError if no file can be written at a path."""
     path = Path(path)
     if path.is_dir():
@@ -106,7 +106,7 @@ def check_place(path):
 def whole_file(path):
     """Context with the path of a new file in a private folder, which becomes the file if there is no error."""
     path = Path(path)
-    check_place(path)
+    check_target(path)
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
         new = Path(folder) / f"whole{path.suffix}"
         yield new

@@ -7,10 +7,9 @@ import xarray as xr
 
 from fifesim.atmosphere.labels import diffuse_fraction
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.arguments import Names
+from fifesim.base.arguments import Names, check_number
 from fifesim.base.geometry import Geometry, warn_of_radians
 from fifesim.base.messages import nearest
-from fifesim.base.ranges import check_number
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.description import TALLGRASS, Canopy, is_raster

@@ -22,7 +22,7 @@ from rioxarray.raster_writer import RasterioWriter
 
 from fifesim.base.arguments import Chunks, FilePath
 from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, nearest_band
-from fifesim.base.files import check_place, check_suffix, in_a_line, whole_file
+from fifesim.base.files import check_suffix, check_target, in_a_line, whole_file
 from fifesim.base.geometry import ANGLES
 from fifesim.base.messages import warn
 from fifesim.grids import cf
@@ -201,7 +201,7 @@ def to_geotiff(
     (90, 90)
     """
     path = Path(path)
-    check_place(path)
+    check_target(path)
     check_suffix(path, "GeoTIFF", ".tif", ".tiff")
     if path.exists() and not overwrite:
         raise FileExistsError(

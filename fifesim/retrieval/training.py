@@ -14,7 +14,7 @@ from fifesim.analysis.score_labels import score
 from fifesim.atmosphere.aerosols import aerosol_optical_thickness
 from fifesim.base.arguments import FilePath, Kind, Names, described
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
-from fifesim.base.files import check_place
+from fifesim.base.files import check_target
 from fifesim.base.messages import warn
 from fifesim.chain.driver import Driver
 from fifesim.output.chips.store import chip_arrays, layout_of
@@ -125,7 +125,7 @@ def train(
     _check(names, levels)
     if path is not None:
         # Before the training, which would be lost.
-        check_place(path)
+        check_target(path)
     dataset = (
         source
         if isinstance(source, xr.Dataset)

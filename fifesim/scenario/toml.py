@@ -9,9 +9,9 @@ from pathlib import Path
 import tomlkit
 from pydantic import ValidationError
 
+from fifesim.base.arguments import likely_units
 from fifesim.base.files import in_a_line, read_toml, shown
 from fifesim.base.messages import closest, in_own_words, nearest
-from fifesim.base.ranges import likely_units
 from fifesim.scenario.keys import Keys
 
 # Maximum length of the message on all mistakes of a scenario. [character]

@@ -8,9 +8,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 import numpy as np
 
 from fifesim.base import arguments
-from fifesim.base.arguments import Array, FilePath, NumberOrArray
+from fifesim.base.arguments import Array, FilePath, NumberOrArray, check_number
 from fifesim.base.messages import PARTS
-from fifesim.base.ranges import check_number
 from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
 from fifesim.ground.canopy.optics import check_background

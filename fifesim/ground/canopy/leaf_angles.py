@@ -9,10 +9,9 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from fifesim.base.arguments import described
+from fifesim.base.arguments import Range, check_number, described
 from fifesim.base.caches import cached
 from fifesim.base.messages import closest
-from fifesim.base.ranges import Range, check_number
 
 RADIANS_PER_DEGREE = math.pi / 180  # unlike numpy.radians, it serves complex angles, for derivatives
 

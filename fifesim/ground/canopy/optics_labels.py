@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from fifesim.base.ranges import check_number
+from fifesim.base.arguments import check_number
 from fifesim.grids import cf
 from fifesim.grids import chunks as chunking
 from fifesim.grids.chunks import by_band, layers_of

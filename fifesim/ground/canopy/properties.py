@@ -8,7 +8,7 @@ _PERCENT = {"percent": 0.01}
 
 
 class Property(NamedTuple):
-    """Property of the canopy, with the fields of a `fifesim.base.ranges.Range`."""
+    """Property of the canopy, with the fields of a `fifesim.base.arguments.Range`."""
 
     default: Any
     meaning: str

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fifesim.base import files
-from fifesim.base.arguments import Array, NumberOrArray, described
+from fifesim.base.arguments import Array, NumberOrArray, Range, check_number, described
 from fifesim.base.arrays import as_rows, compiled, jitable
 from fifesim.base.caches import cached
-from fifesim.base.ranges import Range, check_number
 
 _PIGMENT = {"mg m-2": 0.1, "g m-2": 100.0, "mg cm-2": 1000.0}
 

@@ -8,9 +8,8 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 
-from fifesim.base.arguments import MAPPING, Kind, Names, Numbers, check_fields
+from fifesim.base.arguments import MAPPING, Kind, Names, Numbers, Range, check_fields, check_number
 from fifesim.base.lattice import generator
-from fifesim.base.ranges import Range, check_number
 
 # Kinds of noise that can be requested by name.
 KINDS = ("shot", "thermal", "fixed-pattern")
