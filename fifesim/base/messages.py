@@ -123,13 +123,18 @@ _QUIET = ContextVar("fifesim_quiet", default=False)
 
 
 @contextmanager
-def quiet(wanted=True):
-    """Context in which long work shows no progress."""
-    token = _QUIET.set(wanted)
+def during(variable, value=True):
+    """Context in which a variable has a value."""
+    token = variable.set(value)
     try:
         yield
     finally:
-        _QUIET.reset(token)
+        variable.reset(token)
+
+
+def quiet(wanted=True):
+    """Context in which long work shows no progress."""
+    return during(_QUIET, wanted)
 
 
 def is_quiet():

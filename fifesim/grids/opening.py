@@ -21,6 +21,7 @@ import xarray as xr
 from rasterio.windows import Window
 
 from fifesim.base.files import check_regular, in_a_line, shown
+from fifesim.base.messages import during
 from fifesim.grids import grid as grids
 from fifesim.grids import projection
 from fifesim.grids.projection import lies_in_words
@@ -121,15 +122,10 @@ _CURE = "for trusted files, allow_remote=True (fifesim simulate: --allow-remote)
 _REMOTE = ContextVar("fifesim_remote_rasters", default=False)
 
 
-@contextmanager
 def remote_allowed():
     """Context in which rasters may have addresses and any format of GDAL."""
     # It applies to the check of a file in the current thread; later lazy reads keep the decision.
-    token = _REMOTE.set(True)
-    try:
-        yield
-    finally:
-        _REMOTE.reset(token)
+    return during(_REMOTE)
 
 
 @dataclass(frozen=True)
@@ -153,6 +149,11 @@ class RasterFile:
     def opened(self):
         """Open the file."""
         return rasterio.open(self.path, driver=self.driver)
+
+    def read(self, source, window):
+        """Values of a window of the open file in their unit, NaN for no data, shape (rows, columns)."""
+        values = source.read(self.band, window=window, masked=True).astype(float).filled(np.nan)
+        return values * source.scales[self.band - 1] + source.offsets[self.band - 1]
 
 
 def raster_file(path, allow_remote=False):

@@ -102,16 +102,10 @@ class _ArraySource:
     shape: tuple[int, int]
     transform: Affine
     first: tuple[int, int] = (0, 0)
-    band: int = 1
-    scales: tuple = (1.0,)
-    offsets: tuple = (0.0,)
 
-    def read(self, band, window, masked):
+    def read(self, source, window):
         top, left = int(window.row_off - self.first[0]), int(window.col_off - self.first[1])
-        return np.ma.asarray(self.cells[top : top + int(window.height), left : left + int(window.width)])
-
-    def window_transform(self, window):
-        return rasterio.windows.transform(window, self.transform)
+        return np.array(self.cells[top : top + int(window.height), left : left + int(window.width)], float)
 
 
 class _TileReads(NamedTuple):
@@ -285,8 +279,7 @@ def _warp_block(source, file, block, back, options, samples, checked):
             f"{file.name} is far finer than the cells, {window.width * window.height:.2g} of its cells lie in {size} x "
             f"{size}: average it first, with gdalwarp -r average -tr and a cell between the two"
         )
-    values = source.read(file.band, window=window, masked=True).astype(float).filled(np.nan)
-    values = values * source.scales[file.band - 1] + source.offsets[file.band - 1]
+    values = file.read(source, window)
     if checked is not None:
         part, check = checked
         top, left = (max(int(at), 0) for at in (part.row_off - window.row_off, part.col_off - window.col_off))
@@ -295,6 +288,7 @@ def _warp_block(source, file, block, back, options, samples, checked):
         strip = np.full((size * samples, min(size, _STRIP) * samples), np.nan)
         transform = Affine(a.a / samples, 0.0, a.c + first * a.a, 0.0, a.e / samples, a.f)
         with _ONE_AT_A_TIME:
-            reproject(values, strip, src_transform=source.window_transform(window), dst_transform=transform, **options)
+            origin = rasterio.windows.transform(window, source.transform)
+            reproject(values, strip, src_transform=origin, dst_transform=transform, **options)
         out[:, first : first + _STRIP] = strip if samples == 1 else _most_frequent(strip, samples)
     return out

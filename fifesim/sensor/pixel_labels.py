@@ -1,13 +1,12 @@
 """Pixels of an instrument over a labelled scene: their positions, and means over their footprints."""
 
-from contextlib import contextmanager
 from contextvars import ContextVar
 
 import numpy as np
 import xarray as xr
 
 from fifesim.base.arguments import described
-from fifesim.base.messages import warn
+from fifesim.base.messages import during, warn
 from fifesim.grids import directions, projection
 from fifesim.grids import grid as grids
 from fifesim.grids.reductions import areas, regularized
@@ -90,14 +89,9 @@ _OWN = 0.8, 1.25
 _WARNED = ContextVar("fifesim_warned_of_pixels", default=False)
 
 
-@contextmanager
 def warned_of_pixels():
     """Context in which pixels of other sizes give no warning, because their user was warned."""
-    token = _WARNED.set(True)
-    try:
-        yield
-    finally:
-        _WARNED.reset(token)
+    return during(_WARNED)
 
 
 def warn_of_pixels(instrument, bands, sizes):

@@ -141,8 +141,7 @@ def _file_window(file, rows, columns):
     window = rasterio.windows.Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
     task = f"cannot read rows {rows.start} to {rows.stop} and columns {columns.start} to {columns.stop} of {file.name}"
     with ErrorsOfGdal(task), file.opened() as opened:
-        values = opened.read(file.band, window=window, masked=True).astype(float).filled(np.nan)
-        return values * opened.scales[file.band - 1] + opened.offsets[file.band - 1]
+        return file.read(opened, window)
 
 
 @dataclass(frozen=True, eq=False)
