@@ -76,11 +76,12 @@ COMMON_NAMES = {
 
 
 def check_micrometres(what, wavelengths):
-    """Raise ValueError if increasing wavelengths are in another unit."""
-    if not SHORTEST <= wavelengths[-1] <= LONGEST:
-        nm = wavelengths[-1] > LONGEST
-        cure = "divide nanometres by 1000, or state the unit nm" if nm else "convert them to micrometres"
-        raise ValueError(f"{what} are in um, got {wavelengths[-1]:g}: {cure}")
+    """Raise ValueError if the largest of some wavelengths is in another unit."""
+    largest = np.max(wavelengths)
+    if not SHORTEST <= largest <= LONGEST:
+        nm = "divide nanometres by 1000, or state their unit, .attrs['units'] = 'nm'"
+        cure = nm if largest > LONGEST else "convert them to um, or correct their unit"
+        raise ValueError(f"{what} are in um, got {largest:g}: {cure}")
 
 
 def without_noise(what, values, wavelength, highest=np.inf):

@@ -43,25 +43,29 @@ def check_suffix(path, kind, *suffixes):
 
 def read_csv(path, what):
     """Read a CSV table, in which ``#`` starts a comment, with the file name in every message."""
-    name = in_a_line(str(path), 200)
-    if "://" in str(path):
-        raise ValueError(f"cannot read {what} {name}: it is an address; download the file and give its path")
-    try:
+    with reading(what, path, "; it must be CSV in UTF-8"), warnings.catch_warnings():
         check_regular(path)
-        with warnings.catch_warnings():
-            # Without index_col, pandas takes surplus values for an index.
-            warnings.simplefilter("error", pd.errors.ParserWarning)
+        # Without index_col, pandas takes surplus values for an index.
+        warnings.simplefilter("error", pd.errors.ParserWarning)
+        try:
             return pd.read_csv(path, comment="#", skipinitialspace=True, index_col=False)
+        except pd.errors.ParserWarning:
+            raise ValueError("rows have more values than the first line has names; name all columns") from None
+
+
+@contextmanager
+def reading(what, path, cure=""):
+    """Context of the reading of a file on this disk, with the file name in every message."""
+    beginning = f"cannot read {what} {in_a_line(str(path), 200)}"
+    if "://" in str(path):
+        raise ValueError(f"{beginning}: it is an address; download the file and give its path")
+    try:
+        yield
     except FileNotFoundError:
-        raise ValueError(f"cannot read {what} {name}: there is no such file") from None
-    except pd.errors.ParserWarning:
-        raise ValueError(
-            f"cannot read {what} {name}: rows have more values than the first line has names; name all columns, and "
-            "write decimals with a point"
-        ) from None
+        raise ValueError(f"{beginning}: there is no such file") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise ValueError(f"cannot read {what} {name}: {in_a_line(reason, 150)}; it must be CSV in UTF-8") from None
+        raise ValueError(f"{beginning}: {in_a_line(reason, 150)}{cure}") from None
 
 
 def read_bounded(path, largest, what):

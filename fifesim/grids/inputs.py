@@ -8,7 +8,7 @@ import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 
 from fifesim.base.arguments import RASTER, FilePath, Kind, with_parts
-from fifesim.base.bands import LONGEST, PER_MICROMETRE
+from fifesim.base.bands import PER_MICROMETRE, check_micrometres
 from fifesim.base.messages import warn
 from fifesim.grids import cf, chunks
 from fifesim.grids import grid as grids
@@ -194,16 +194,18 @@ def in_micrometres(array):
 
 def micrometres(wavelength):
     """Wavelengths in micrometres, from the unit in their attribute. [um]"""
-    unit = str(wavelength.attrs.get("units", "um")).strip()
-    if unit.lower() not in PER_MICROMETRE:
-        raise ValueError(f"wavelength has units {unit!r}: they are to be um or nm")
-    values = np.asarray(wavelength.values, float) / PER_MICROMETRE[unit.lower()]
-    if values.size and not np.max(values) <= LONGEST:
-        raise ValueError(
-            f"wavelength reaches {np.max(values):g} um: if these are nanometres, set "
-            "raster.wavelength.attrs['units'] = 'nm'"
-        )
+    values = wavelength.values / per_micrometre(wavelength)
+    if values.size:
+        check_micrometres("wavelengths", values)
     return values
+
+
+def per_micrometre(coordinate):
+    """Number of units of wavelengths or widths in a micrometre, from the unit in their attribute, um by default."""
+    unit = str(coordinate.attrs.get("units", "")).strip() or "um"
+    if unit.lower() not in PER_MICROMETRE:
+        raise ValueError(f"wavelengths are in {unit!r}: convert them to 'um' or 'nm', then set .attrs['units']")
+    return PER_MICROMETRE[unit.lower()]
 
 
 def check_reflectance(values):

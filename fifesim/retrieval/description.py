@@ -13,7 +13,7 @@ import xarray as xr
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from fifesim.base.arguments import FilePath
-from fifesim.base.files import check_suffix, in_a_line, read_bounded, whole_file
+from fifesim.base.files import check_suffix, in_a_line, read_bounded, reading, whole_file
 from fifesim.retrieval import methods
 from fifesim.sensor.description.fields import Name, Positive, Share, errors_in_words
 
@@ -243,12 +243,8 @@ def read_retrieval(path: FilePath) -> Retrieval:
     >>> retrieval = fifesim.read_retrieval("oli.nc")  # doctest: +SKIP
     """
     name = in_a_line(str(path), 200)
-    try:
+    with reading("the retrieval", path):
         content = read_bounded(path, _LARGEST, "a retrieval")
-    except FileNotFoundError:
-        raise ValueError(f"cannot read the retrieval {name}: there is no such file") from None
-    except (OSError, ValueError) as error:
-        raise ValueError(f"cannot read the retrieval {name}: {in_a_line(error, 150)}") from None
     # NetCDF's library may not return from a damaged file, so that the checksum comes first.
     content, seal, text = content.rpartition(_SEAL)
     version, _, checksum = text.partition(b" ")

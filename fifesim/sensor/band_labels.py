@@ -8,9 +8,8 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.arguments import Names
-from fifesim.base.bands import LONGEST, PER_MICROMETRE
 from fifesim.grids import cf
-from fifesim.grids.inputs import AnyDimensions, check_reflectance, storage_of
+from fifesim.grids.inputs import AnyDimensions, check_reflectance, micrometres, per_micrometre, storage_of
 from fifesim.grids.reductions import combined
 from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
@@ -35,8 +34,7 @@ def spectral_axis(array):
         )
     coordinate = array.coords["wavelength"]
     (dim,) = coordinate.dims
-    scale = _per_micrometre(coordinate, "wavelength")
-    wavelength = _in_micrometres(coordinate, scale)
+    wavelength = _positive(coordinate, micrometres(coordinate))
     if wavelength.size < 2 or np.unique(wavelength).size < wavelength.size:
         raise ValueError(
             f"spectra need two different wavelengths or more, each once, got {wavelength.size}, of which "
@@ -45,33 +43,14 @@ def spectral_axis(array):
     if "fwhm" not in array.coords or array.coords["fwhm"].dims != (dim,):
         return SpectralAxis(dim, wavelength, None)
     widths = array.coords["fwhm"]
-    own = _per_micrometre(widths, "fwhm") if widths.attrs.get("units") else scale
-    return SpectralAxis(dim, wavelength, _in_micrometres(widths, own))
+    own = widths if widths.attrs.get("units") else coordinate
+    return SpectralAxis(dim, wavelength, _positive(widths, widths.values / per_micrometre(own)))
 
 
-def _per_micrometre(coordinate, name):
-    """Number of units of a coordinate in a micrometre."""
-    unit = str(coordinate.attrs.get("units", "")).strip()
-    if unit and unit.lower() not in PER_MICROMETRE:
-        raise ValueError(f"{name} is in {unit!r}, it must be in 'um' or 'nm': convert it, then set .attrs['units']")
-    scale, largest = PER_MICROMETRE.get(unit.lower(), 1.0), float(np.max(coordinate.values))
-    if largest / scale > LONGEST:
-        raise ValueError(
-            f"{name} reaches {largest:g}{' ' + unit if unit else ' without a unit'}: if these are nanometres, "
-            f"set cube[{name!r}].attrs['units'] = 'nm'"
-        )
-    if name == "wavelength" and largest / scale < 0.1:
-        raise ValueError(
-            f"wavelength reaches only {largest:g} {unit}: if these are um, set its attribute units to 'um'"
-        )
-    return scale
-
-
-def _in_micrometres(coordinate, scale):
-    values = np.asarray(coordinate.values, float) / scale
+def _positive(coordinate, values):
     if not np.all(values > 0):
         raise ValueError(
-            f"{coordinate.name} must be positive throughout, got {values[~(values > 0)][0] * scale:g}: "
+            f"{coordinate.name} must be positive throughout, got {coordinate.values[~(values > 0)][0]:g}: "
             "select the samples that have one with .isel"
         )
     return values

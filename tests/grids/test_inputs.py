@@ -187,7 +187,7 @@ def test_wavelengths_in_nanometres(fractions, unit):
     toa = here.fifesim.to_toa(AIR, time=TIME)
     assert toa.dtype == incoming(here, "surface_reflectance").dtype == np.float32
     np.testing.assert_allclose(there.fifesim.to_toa(AIR, time=TIME), toa, rtol=1e-6)
-    with pytest.raises(ValueError, match="units 'angstrom': they are to be um or nm"):
+    with pytest.raises(ValueError, match="are in 'angstrom': convert them to 'um' or 'nm'"):
         in_micrometres(fractions.assign_coords(wavelength=("band", [6650.0, 8330.0], {"units": "angstrom"})))
 
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from fifesim.base.bands import PER_MICROMETRE, check_micrometres, without_noise
-from fifesim.base.files import in_a_line, read_bounded
+from fifesim.base.files import in_a_line, read_bounded, reading
 from fifesim.base.messages import warn
 
 # Wider gaps are not interpolated: absorption features of leaves and soils are as narrow as 50 nm. [um]
@@ -164,13 +164,8 @@ def read_spectrum(path, kind=Spectrum):
 
 def _lines(path, name):
     """Lines of a text file that are not empty, without comments."""
-    if "://" in str(path):
-        raise ValueError(f"cannot read the spectrum {name}: it is an address; download the file and give its path")
-    try:
+    with reading("the spectrum", path):
         content = read_bounded(path, _LARGEST, "a spectrum")
-    except OSError as error:
-        reason = "there is no such file" if isinstance(error, FileNotFoundError) else error.strerror
-        raise ValueError(f"cannot read the spectrum {name}: {reason}") from None
     if b"\0" in content:
         raise ValueError(f"cannot read the spectrum {name}: it is no text; export it as CSV in UTF-8")
     try:
