@@ -116,15 +116,13 @@ def is_path(value):
     return isinstance(value, str | os.PathLike)
 
 
-def _is_size(value):
-    return isinstance(value, str) and re.fullmatch(r"auto|[\d.]+ *[kMGT]?i?B", value) is not None
-
-
 def _are_chunks(value):
     sizes = value.values() if _is_mapping(value) else value if isinstance(value, tuple) else [value]
     if any(_is_number(each) and (each == 0 or each < -1) for each in sizes):
         raise ValueError(f"chunks have 1 cell or more, or -1 for all, got {value!r}: type for instance chunks='auto'")
-    return value is None or _is_number(value) or isinstance(value, tuple) or _is_mapping(value) or _is_size(value)
+    if isinstance(value, str):
+        return re.fullmatch(r"auto|[\d.]+ *[kMGT]?i?B", value) is not None
+    return value is None or _is_number(value) or isinstance(value, tuple) or _is_mapping(value)
 
 
 NUMBER = Kind("a number", _is_number)
@@ -134,13 +132,11 @@ PAIR = Kind("a number, or two: down and across", _is_pair)
 LIST = Kind("a number, or a list of them", lambda value: _are_numbers(value) and np.ndim(value) < 2)
 TWO = Kind("two numbers, such as (0.5, 2.0)", _are_two)
 ROW = Kind("a name, a mapping, a description, or an array with one dimension", _is_row)
-LISTED = Kind("a list", lambda value: _is_row(value) and np.iterable(value) and not isinstance(value, str))
 FLAG = Kind("True or False", lambda value: isinstance(value, bool | np.bool_))
 TEXT = Kind("a name", lambda value: isinstance(value, str))
 NAMES = Kind("a list of names", lambda value: isinstance(value, str) or (_is_plain(value) and np.iterable(value)))
 PATH = Kind("the path of a file", is_path)
 MAPPING = Kind("a mapping of names", _is_mapping)
-FUNCTION = Kind("a function", callable)
 CHUNKS = Kind("a number of cells, 'auto', '64MB', None or a mapping such as {'y': 1024, 'x': 1024}", _are_chunks)
 RASTER = Kind("an xarray.DataArray over (y, x)", lambda value: is_a(value, "DataArray"), dimensions=2)
 GRID = Kind(
@@ -176,9 +172,9 @@ _KINDS = {
     float: NUMBER,
     str: TEXT,
     tuple[float, float]: TWO,
-    Sequence: LISTED,
+    Sequence: Kind("a list", lambda value: _is_row(value) and np.iterable(value) and not isinstance(value, str)),
     Mapping: MAPPING,
-    Callable: FUNCTION,
+    Callable: Kind("a function", callable),
     Any: UNCHECKED,
     "DataArray": RASTER,
     "Dataset": Kind("an xarray.Dataset", lambda value: is_a(value, "Dataset")),

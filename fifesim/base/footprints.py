@@ -287,11 +287,6 @@ class LineSpread(Transfer):
         """Share of the response before a distance [m] from the pixel centre. [1]"""
         return self._cumulative(np.asarray(x, float))
 
-    @staticmethod
-    def _check_width(width):
-        if not 0 < width < np.inf:
-            raise ValueError(f"the width of a line spread function must be positive metres, got {width}")
-
 
 # Any object with the two members of a line spread function.
 Spread: TypeAlias = Annotated[
@@ -322,7 +317,8 @@ class FiniteSpread(LineSpread):
     width: float
 
     def __post_init__(self):
-        self._check_width(self.width)
+        if not 0 < self.width < np.inf:
+            raise ValueError(f"the width of a line spread function must be positive metres, got {self.width}")
 
     @property
     def half_width(self):

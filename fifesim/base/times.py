@@ -31,18 +31,17 @@ def utc(time, name="time"):
     """Time in UTC, from text after ISO 8601 or a datetime; UTC is assumed if no time zone is given."""
     if isinstance(time, str) and re.fullmatch(r"\s*\d{4}-?\d{2}-?\d{2}\s*", time):
         raise ValueError(f"{name} = {time!r} is a date alone: add the time of day, such as {time.strip()}T17:10Z")
-    if isinstance(time, str) and not _WRITTEN.fullmatch(time):
+    # A number would be taken for nanoseconds since 1970.
+    known = _WRITTEN.fullmatch(time) if isinstance(time, str) else not isinstance(time, int | float | np.number)
+    try:
+        stamp = pd.Timestamp(time) if known else pd.NaT
+    except (TypeError, ValueError):
+        stamp = pd.NaT
+    if stamp is pd.NaT:
         raise ValueError(
             f"{name} must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}: the year first, "
             "then month and day, for other orders are read in several ways"
         )
-    try:
-        # A number would be taken for nanoseconds since 1970.
-        stamp = pd.NaT if isinstance(time, int | float | np.number) else pd.Timestamp(time)
-    except (TypeError, ValueError):
-        stamp = pd.NaT
-    if stamp is pd.NaT:
-        raise ValueError(f"{name} must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}")
     if not _YEARS[0] <= stamp.year < _YEARS[1]:
         allowed = f"{_YEARS[0]} to {_YEARS[1]}"
         raise ValueError(f"{name} must be of the years {allowed}, in which there are satellites, got {described(time)}")

@@ -29,7 +29,7 @@ from fifesim.grids import cf
 from fifesim.grids import grid as grids
 from fifesim.grids.chunks import found_client
 from fifesim.grids.inputs import RASTER_OR_DATASET, STORAGE, no_data_of, opened, scale_and_offset, storage, unpacked
-from fifesim.grids.opening import ErrorsOfGdal, check_memory, check_raster, horizontal_crs, raster_file, stored_cells
+from fifesim.grids.opening import ErrorsOfGdal, check_memory, raster_file, sound_raster, stored_cells
 from fifesim.grids.tags import (
     DAYS,
     TAG,
@@ -46,13 +46,12 @@ from fifesim.grids.tags import (
 def physical(array, storage):
     """Values of a file from another program in physical units, NaN for no data; digital numbers are kept."""
     scales, offsets, nodata = storage["scales"], storage["offsets"], storage["nodata"]
-    missing = xr.zeros_like(array, dtype=bool) if nodata is None else array == nodata
-    if scales is None:
-        return array.where(~missing, array.dtype.type(0))
-    if nodata is None and all(scale == 1 for scale in scales) and not any(offsets):
+    if nodata is not None:
+        array = array.where(array != nodata, *(() if scales else [array.dtype.type(0)]))
+    if not scales or (nodata is None and set(scales) == {1.0} and not any(offsets)):
         return array
     gain, offset = (xr.DataArray(list(values), dims="band") for values in (scales, offsets))
-    return array.where(~missing) * gain + offset
+    return array * gain + offset
 
 
 def gdal_description(source, file_name):
@@ -289,18 +288,14 @@ def open_image(path: FilePath, chunks: Chunks | None = None, *, allow_remote: bo
     True
     """
     file = raster_file(path, allow_remote)
-    with ErrorsOfGdal(f"cannot read {file.name}"):
-        with file.opened() as source:
-            check_raster(source, file.name, north_up=True)
-            crs = horizontal_crs(source, file.name)
-            if chunks is None:
-                cells = source.count * source.height * source.width
-                size = np.dtype(source.dtypes[0]).itemsize
-                check_memory(cells, size, f"all of {file.name}", "give chunks='auto', which reads it by parts")
-            description = read_tag(source, file.name)
-            written_here = description is not None
-            if not written_here:
-                description, storage = gdal_description(source, file.name)
+    with sound_raster(file, north_up=True) as (source, crs):
+        if chunks is None:
+            cells, size = source.count * source.height * source.width, np.dtype(source.dtypes[0]).itemsize
+            check_memory(cells, size, f"all of {file.name}", "give chunks='auto', which reads it by parts")
+        description = read_tag(source, file.name)
+        written_here = description is not None
+        if not written_here:
+            description, storage = gdal_description(source, file.name)
         plain = stored_cells(file, crs, chunks)
     try:
         grid = grids.geobox(plain)

@@ -295,10 +295,10 @@ _FARTHEST = 1e9
 
 
 @contextmanager
-def sound_raster(file):
+def sound_raster(file, *, north_up=False):
     """Context with an open file that holds numbers at places on the Earth."""
     with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
-        check_raster(source, file.name)
+        check_raster(source, file.name, north_up=north_up)
         yield source, horizontal_crs(source, file.name)
 
 

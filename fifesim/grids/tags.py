@@ -50,7 +50,8 @@ class Located:
 
 def fingerprint_of(source):
     """Fingerprint of an open file, as JSON types for `Fingerprint`."""
-    rows, columns = (_spread(size) for size in source.shape)
+    spread = (np.arange(_LINES) + 0.5) / _LINES
+    rows, columns = (np.unique((spread * size).astype(int)).tolist() for size in source.shape)
     cells = np.array([[source.read(window=Window(column, row, 1, 1))[:, 0, 0] for column in columns] for row in rows])
     values = np.moveaxis(cells, -1, 0).astype(object)
     values[values != values] = None
@@ -61,11 +62,6 @@ def fingerprint_of(source):
         "x": [a.c + (column + 0.5) * a.a for column in columns],
         "values": values.tolist(),
     }
-
-
-def _spread(size):
-    """Evenly spread rows or columns, at most a fixed number."""
-    return np.unique(((np.arange(_LINES) + 0.5) / _LINES * size).astype(int)).tolist()
 
 
 def fingerprint_cells(fingerprint, order, source):

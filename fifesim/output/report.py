@@ -240,13 +240,9 @@ def headline(scenario):
     time = scenario.geometry.time
     when = "" if time is None else f", {time_in_words(time)}"
     synthetic = summary(scenario)
-    text = f"Simulated {scenario.sensor.description.title} image, {_place(scenario)}{when}"
+    place = "FIFE site" if is_on_site(scenario) else position(*projection.middle(scenario.geobox()))
+    text = f"Simulated {scenario.sensor.description.title} image, {place}{when}"
     return f"{text} ({synthetic})" if synthetic else text
-
-
-def _place(scenario):
-    """Name or position of the centre of a scene."""
-    return "FIFE site" if is_on_site(scenario) else position(*projection.middle(scenario.geobox()))
 
 
 def finding(fits, reasons):

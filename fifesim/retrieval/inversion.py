@@ -207,7 +207,7 @@ def optimal_estimation(
         moved = tried - state[active]
         values, slopes = forward(tried, active)
         found = cost_of(tried, values, active)
-        length = np.sqrt(_square_each(moved, inverse) / size)
+        length = np.sqrt(np.einsum("ni,nij,nj->n", moved, inverse, moved) / size)
         better = found <= cost[active] * (1 + _ROUNDING)
         at = active[better]
         state[at], modelled[at], slope[at], cost[at] = tried[better], values[better], slopes[better], found[better]
@@ -226,11 +226,6 @@ def optimal_estimation(
 def _square(vectors, matrix):
     """Quadratic forms of vectors with one symmetric matrix."""
     return np.einsum("ni,ij,nj->n", vectors, matrix, vectors, optimize=True)
-
-
-def _square_each(vectors, matrices):
-    """Quadratic forms of vectors, each with its matrix."""
-    return np.einsum("ni,nij,nj->n", vectors, matrices, vectors)
 
 
 DRAWN_STATES = {

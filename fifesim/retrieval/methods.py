@@ -117,17 +117,9 @@ def fit_lookup(pixels, levels, seed):
     # Bands that are nearly equal keep their noise.
     scale = vectors / np.sqrt(np.maximum(values, 1e-6 * values.max()))
     chosen = np.random.default_rng(seed).permutation(len(fitted))[:_MEMBERS]
-    members = np.hstack([fitted[chosen] @ scale, _scaled_angles(pixels.angles[chosen], pixels.angles)])
-    return {"members": members, "states": pixels.truth[chosen], "scale": scale, "varies": _varies(pixels.angles)}
-
-
-def _varies(angles):
-    """Which angles vary between training pixels."""
-    return np.ptp(angles, axis=0) > _ANGLE
-
-
-def _scaled_angles(angles, training):
-    return angles[:, _varies(training)] / _ANGLE
+    varies = np.ptp(pixels.angles, axis=0) > _ANGLE
+    members = np.hstack([fitted[chosen] @ scale, pixels.angles[chosen][:, varies] / _ANGLE])
+    return {"members": members, "states": pixels.truth[chosen], "scale": scale, "varies": varies}
 
 
 def by_lookup(tables, reflectance, angles, levels):

@@ -18,7 +18,7 @@ from fifesim.grids.dates import by_date
 from fifesim.grids.directions import Directions
 from fifesim.grids.grid import north_up
 from fifesim.grids.inputs import no_data_of
-from fifesim.grids.opening import ErrorsOfGdal, check_memory, check_raster, horizontal_crs, raster_file, stored_cells
+from fifesim.grids.opening import check_memory, raster_file, sound_raster, stored_cells
 from fifesim.sensor import labels as sensor_labels
 from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
@@ -35,18 +35,15 @@ def open_layer(folder, name, chunks, cure, count=None):
     if not path.exists():
         raise ValueError(f"{in_a_line(name, 150)} is missing in {in_a_line(folder, 120)}: {cure}")
     file = raster_file(path)
-    with ErrorsOfGdal(f"cannot read {file.name}"):
-        with file.opened() as source:
-            check_raster(source, file.name, north_up=True)
-            crs = horizontal_crs(source, file.name)
-            if source.count != (count or 1) or np.dtype(source.dtypes[0]).kind not in "iu":
-                raise ValueError(
-                    f"{file.name} has {source.count} bands of {source.dtypes[0]}, where a product has {count or 1} of "
-                    "whole numbers: is it another file?"
-                )
-            if chunks is None:
-                size = source.count * source.height * source.width
-                check_memory(size, 12, f"all of {file.name}", "leave chunks out, which reads it by parts")
+    with sound_raster(file, north_up=True) as (source, crs):
+        if source.count != (count or 1) or np.dtype(source.dtypes[0]).kind not in "iu":
+            raise ValueError(
+                f"{file.name} has {source.count} bands of {source.dtypes[0]}, where a product has {count or 1} of "
+                "whole numbers: is it another file?"
+            )
+        if chunks is None:
+            size = source.count * source.height * source.width
+            check_memory(size, 12, f"all of {file.name}", "leave chunks out, which reads it by parts")
         plain = stored_cells(file, crs, {"y": CHUNK, "x": CHUNK} if chunks == "auto" else chunks)
     layer = xr.DataArray(plain.data, dims=("band", "y", "x"), name=path.name)
     layer = layer if count else layer.isel(band=0)
