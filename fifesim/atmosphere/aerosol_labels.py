@@ -11,7 +11,7 @@ import xarray as xr
 from fifesim.atmosphere import aerosols, mixtures
 from fifesim.atmosphere.aerosols import Aerosol, phase_of_moments
 from fifesim.base.arguments import AerosolMixture, FilePath
-from fifesim.base.files import in_a_line, read_csv
+from fifesim.base.files import read_csv, reading
 
 # Other spellings of each name, by Eradiate, libRadtran and AERONET.
 _NAMES = {
@@ -167,8 +167,6 @@ def _opened(path):
     readers = {".nc": _read_netcdf, ".csv": _read_csv}
     if path.suffix.lower() not in readers:
         raise ValueError(f"aerosol must be a Dataset or a file .nc or .csv, got {str(path)!r}: give one of these")
-    if not path.is_file():
-        raise ValueError(f"aerosol file {str(path)!r} does not exist: give its path")
     return readers[path.suffix.lower()](path), path.stem
 
 
@@ -177,13 +175,10 @@ _LARGEST = 10**8
 
 
 def _read_netcdf(path):
-    try:
-        with xr.open_dataset(path) as file:
-            if file.nbytes > _LARGEST:
-                raise ValueError(f"it declares {file.nbytes} bytes of numbers, at most {_LARGEST} are read")
-            return file.load()
-    except (OSError, ValueError, RuntimeError) as error:
-        raise ValueError(f"aerosol file {str(path)!r} cannot be read: {in_a_line(error, 250)}") from None
+    with reading("the aerosol", path), xr.open_dataset(path) as file:
+        if file.nbytes > _LARGEST:
+            raise ValueError(f"it declares {file.nbytes} bytes of numbers, at most {_LARGEST} are read")
+        return file.load()
 
 
 def _read_csv(path):

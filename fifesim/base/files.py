@@ -44,7 +44,6 @@ def check_suffix(path, kind, *suffixes):
 def read_csv(path, what):
     """Read a CSV table, in which ``#`` starts a comment, with the file name in every message."""
     with reading(what, path, "; it must be CSV in UTF-8"), warnings.catch_warnings():
-        check_regular(path)
         # Without index_col, pandas takes surplus values for an index.
         warnings.simplefilter("error", pd.errors.ParserWarning)
         try:
@@ -60,10 +59,11 @@ def reading(what, path, cure=""):
     if "://" in str(path):
         raise ValueError(f"{beginning}: it is an address; download the file and give its path")
     try:
+        check_regular(path)
         yield
     except FileNotFoundError:
         raise ValueError(f"{beginning}: there is no such file") from None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or error
         raise ValueError(f"{beginning}: {in_a_line(reason, 150)}{cure}") from None
 

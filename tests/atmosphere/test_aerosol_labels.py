@@ -151,7 +151,7 @@ def test_unreadable_aerosol_raises(totals, tables, tmp_path):
         (totals.assign_coords(w=totals["w"].assign_attrs(units="cm-1")), "um, nm or m, got 'cm-1': convert it"),
         (totals.assign_coords(w=totals["w"].drop_attrs()), "from 0.1 to 50 um, got 1020: divide nanometres by 1000"),
         (totals.assign(phase=totals["phase"].drop_attrs(deep=False)), "got 0.07958 at .* um: divide"),
-        (tmp_path / "none.nc", "does not exist: give its path"),
+        (tmp_path / "none.nc", "there is no such file"),
         (tmp_path / "mine.txt", "a file .nc or .csv"),
     ):
         with pytest.raises(ValueError, match=message):
@@ -190,5 +190,5 @@ def test_damaged_tables_and_declared_sizes_are_found_in_a_file(tmp_path):
         file.createDimension("wavelength", 10**9)
         file.createVariable("extinction", "f8", ("wavelength",), chunksizes=(10**6,))
     for name, said in (("damaged", "HDF error"), ("large", "declares 8000000000 bytes")):
-        with pytest.raises(ValueError, match=rf"{name}.nc' cannot be read.*{said}"):
+        with pytest.raises(ValueError, match=rf"cannot read the aerosol .*{name}\.nc: .*{said}"):
             fifesim.read_aerosol(tmp_path / f"{name}.nc")
