@@ -194,7 +194,7 @@ def in_micrometres(array):
 
 def micrometres(wavelength):
     """Wavelengths in micrometres, from the unit in their attribute. [um]"""
-    values = wavelength.values / per_micrometre(wavelength)
+    values = np.asarray(wavelength.values, float) / per_micrometre(wavelength)
     if values.size:
         check_micrometres("wavelengths", values)
     return values

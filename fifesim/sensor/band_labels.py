@@ -34,7 +34,7 @@ def spectral_axis(array):
         )
     coordinate = array.coords["wavelength"]
     (dim,) = coordinate.dims
-    wavelength = _positive(coordinate, micrometres(coordinate))
+    wavelength = micrometres(_positive(coordinate))
     if wavelength.size < 2 or np.unique(wavelength).size < wavelength.size:
         raise ValueError(
             f"spectra need two different wavelengths or more, each once, got {wavelength.size}, of which "
@@ -44,16 +44,17 @@ def spectral_axis(array):
         return SpectralAxis(dim, wavelength, None)
     widths = array.coords["fwhm"]
     own = widths if widths.attrs.get("units") else coordinate
-    return SpectralAxis(dim, wavelength, _positive(widths, widths.values / per_micrometre(own)))
+    return SpectralAxis(dim, wavelength, np.asarray(_positive(widths), float) / per_micrometre(own))
 
 
-def _positive(coordinate, values):
+def _positive(coordinate):
+    values = coordinate.values
     if not np.all(values > 0):
         raise ValueError(
-            f"{coordinate.name} must be positive throughout, got {coordinate.values[~(values > 0)][0]:g}: "
-            "select the samples that have one with .isel"
+            f"{coordinate.name} must be positive throughout, got {values[~(values > 0)][0]:g}: select the samples that "
+            "have one with .isel"
         )
-    return values
+    return coordinate
 
 
 MIN_COVERAGE = 0.99

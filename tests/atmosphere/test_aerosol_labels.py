@@ -175,7 +175,7 @@ def test_user_aerosol_passes_through_the_chain(tables):
     np.testing.assert_allclose(found, same.fifesim.to_toa(), rtol=1e-10)
     np.testing.assert_allclose(found.fifesim.to_surface(), rho, rtol=1e-10)
     assert "aerosol=continental#" in found.attrs["atmosphere"]
-    ground = (100 + 50 * lai).drop_attrs(deep=False).assign_attrs(units="m")
+    ground = (100 + 50 * lai).rename("dem").drop_attrs(deep=False).assign_attrs(units="m")
     np.testing.assert_allclose(*(each.fifesim.to_toa(elevation=ground) for each in (rho, same)), rtol=1e-10)
 
 

@@ -263,7 +263,7 @@ def test_leaf_spectra_from_file_or_dataset(tmp_path, lai):
     [
         (leaf_dataset((400, 700, 800, 2500)), "leaf_optics: wavelengths are in um, got 2500: divide nanometres"),
         (leaf_dataset((4e-7, 7e-7, 8e-7, 2.5e-6)), "leaf_optics: wavelengths are in um, got 2.5e-06"),
-        (leaf_dataset(units="m"), "leaf_optics: wavelength has units 'm'"),
+        (leaf_dataset(units="m"), "leaf_optics: wavelengths are in 'm'"),
         (leaf_dataset(transmittance=(0.01, 0.05, 0.6, 0.1)), r"leaf_optics: .*add up to 1\.1 at 0\.8 um"),
         (leaf_dataset(transmittance=(1, 5, 40, 10)), "leaf_optics: the transmittance .* got 5 at 0.7 um: give a fract"),
         (leaf_dataset().drop_vars("transmittance"), "leaf_optics: the Dataset has no transmittance"),
