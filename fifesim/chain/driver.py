@@ -1,6 +1,6 @@
 """The chain on plain arrays: each step runs the kernel of its labelled function, without labels."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,7 @@ from fifesim.base.caches import cached
 from fifesim.base.footprints import regularize
 from fifesim.base.geometry import Geometry
 from fifesim.chain import absorbed_light, landscapes
-from fifesim.chain.setup import Setup
+from fifesim.chain.setup import Setup, is_default
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import as_carried
 from fifesim.grids.reductions import areas, operators
@@ -29,12 +29,22 @@ from fifesim.sensor.labels import noisy
 from fifesim.sensor.pixel_labels import check_scene, pixel_grid, shifts_of
 from fifesim.sensor.response import calibration
 
+# Fields of a setup that the steps on arrays use. A setup whose other fields differ from their defaults needs labels.
+_SUPPORTED = frozenset(
+    ("instrument", "bands", "atmosphere", "geometry", "canopy", "upwelling")
+    + ("onto", "interval", "offset", "min_valid", "noise", "noise_models", "seed", "quantise")
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Driver:
     """Steps of a setup on arrays over (band, y, x) or (y, x). Shared tables are computed once."""
 
     setup: Setup
+
+    def __post_init__(self):
+        if parts := varying_parts(self.setup):
+            raise ValueError(f"plain arrays do not support {', '.join(parts)}: use fifesim.simulate")
 
     @cached_property
     def instrument(self):
@@ -83,7 +93,6 @@ class Driver:
 
     def fpar(self, lai, fpar_inf, leaves="all"):
         """Fraction of absorbed photosynthetically active radiation, as `absorbed_light.fpar` by Beer's law."""
-        _check_uniform(self.setup)
         return fpar_kernel(None, self.setup.canopy, self.setup.geometry, fpar_inf, leaves)[0](lai)
 
     def absorbed(self, lai, canopy, leaves="green"):
@@ -151,7 +160,6 @@ class Driver:
     @cached_property
     def _canopy(self):
         """Kernel of the canopy and its arrays."""
-        _check_uniform(self.setup)
         own = self.setup
         stand = landscapes.canopies_of(landscapes.Land(None), self._responses, own.canopy)[None]
         light = Light(own.geometry, atmosphere_labels.diffuse_fraction(self.air, self._responses, own.geometry))
@@ -161,7 +169,6 @@ class Driver:
     @cached_property
     def _terms(self):
         """Terms of the atmosphere in each band."""
-        _check_uniform(self.setup)
         light = self.setup.geometry
         return engines.band_terms(self.air, self._responses, light.sza, light.vza, light.raa)
 
@@ -195,23 +202,11 @@ class Driver:
 
 
 def varying_parts(setup):
-    """Names of the parts of a setup that plain arrays do not support: they vary by cell or couple cells."""
-    found = {
-        "relief": setup.dem is not None,
-        "upright plants": setup.slopes != "kt",
-        f"{setup.coupling} coupling": setup.coupling != "lambert",
-        "adjacency": setup.adjacency,
-        "clouds": setup.clouds is not None,
-        "angles by cell": not isinstance(setup.geometry, Geometry),
-        "a drifting offset": any(np.ndim(each) for each in setup.offset),
-    }
-    rasters = [name for name in PROPERTIES if isinstance(getattr(setup.canopy, name), xr.DataArray | xr.Dataset)]
-    return [name for name, is_so in found.items() if is_so] + rasters
-
-
-def _check_uniform(setup):
-    if parts := varying_parts(setup):
-        raise ValueError(f"plain arrays do not support {', '.join(parts)}: use fifesim.simulate")
+    """Names of the parts of a setup that plain arrays do not support, because they are unknown or vary by cell."""
+    found = [each.name for each in fields(setup) if each.name not in _SUPPORTED and not is_default(setup, each.name)]
+    found += [] if isinstance(setup.geometry, Geometry) else ["angles by cell"]
+    found += ["a drifting offset"] if any(np.ndim(each) for each in setup.offset) else []
+    return found + [name for name in PROPERTIES if isinstance(getattr(setup.canopy, name), xr.DataArray | xr.Dataset)]
 
 
 def cell_block_means(values, cells, size, min_valid):

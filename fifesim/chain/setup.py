@@ -105,12 +105,12 @@ class Setup:
 
     def __repr__(self):
         others = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "instrument"}
-        changed = [f"{name}={_brief(value)}" for name, value in others.items() if not _is_default(self, name)]
+        changed = [f"{name}={_brief(value)}" for name, value in others.items() if not is_default(self, name)]
         name = getattr(self.instrument, "name", self.instrument)
         return f"Setup({', '.join([f'instrument={name!r}', *changed])})"
 
 
-def _is_default(setup, name):
+def is_default(setup, name):
     """Whether a field has its default value; always False for rasters."""
     value, default = getattr(setup, name), Setup.__dataclass_fields__[name].default
     return value is default or (isinstance(value, (str, int, float, tuple)) and value == default)

@@ -21,11 +21,29 @@ from fifesim.grids import grid as grids
 from fifesim.grids.grid import as_carried
 from fifesim.ground.landscape.lai_labels import scene_cells
 from fifesim.scenario.ground import elevation, fpar_kinds, ground_scene, in_memory, light_of, truth_of
+from fifesim.scenario.keys import KEYS
 from fifesim.scenario.simulation import setup_of, simulate, with_margin
 from fifesim.sensor.instrument_labels import attributes_of
 
 # Coordinates of an image that describe its illumination and view.
 LIGHT = ("sza", "saa", "vza", "vaa", "earth_sun_distance")
+
+# Keys by section that plain arrays use. `simulate` computes a scenario whose other keys differ from their defaults.
+# The listed keys of clouds have no effect on a clear sky, and `varying_parts` names the clouds of another sky.
+_STAND = " ".join(KEYS) + " distribution arp leaf leaf_reflectance leaf_transmittance brown_leaf"
+_STAND += " background background_spectra"
+_KNOWN = {
+    "grid": "crs west north width height cell",
+    "ground": f"{_STAND} seed method lai_file fpar_inf",
+    "landscape": "cover size deviations arps coarser covary",
+    "classes": f"{_STAND} share code",
+    "terrain": "dem seed fill vertical_units horizon_reach upwelling",
+    "geometry": "time latitude longitude sza saa vza vaa",
+    "atmosphere": "profile aerosol visibility aot altitude h2o o3 engine",
+    "clouds": "thickness deviation length base top seed mask",
+    "sensor": "instrument bands pixel interval offset response noise noise_model seed min_valid",
+}
+_SUPPORTED = {section: frozenset(keys.split()) for section, keys in _KNOWN.items()}
 
 # Larger scenes are computed in chunks. [cell]
 _LARGEST = 4_000_000
@@ -36,7 +54,7 @@ def realise(scenario, *, complete=False):
     # Consecutive scenes share intermediate results if they have the same grid, atmosphere, canopy or instrument, and
     # tiles of the random field if they have the same seed and arp.
     grid, setup = scenario.geobox(), setup_of(scenario)
-    if _is_small(grid) and not varying_parts(setup):
+    if _is_small(grid) and not unsupported_parts(scenario, setup):
         scene = _scene(scenario, grid, setup, complete)
         return {"image": _labelled_image(scene), "truth": _labelled_truth(scenario, scene)}
     run = simulate(scenario, chunks=None if _is_small(grid) else "auto", complete=complete)
@@ -46,7 +64,7 @@ def realise(scenario, *, complete=False):
 def realise_arrays(scenario, *, complete=False):
     """Image and truth as arrays, for small scenes where labels would take longer than the simulation."""
     grid, setup = scenario.geobox(), setup_of(scenario)
-    if not _is_small(grid) or varying_parts(setup):
+    if not _is_small(grid) or unsupported_parts(scenario, setup):
         image, truth = realise(scenario, complete=complete).values()
         return _values(image) | {name: image[name].values for name in LIGHT}, _values(truth)
     scene = _scene(scenario, grid, setup, complete)
@@ -58,12 +76,24 @@ def realise_arrays(scenario, *, complete=False):
 def uniform_reflectance(scenario, ground):
     """Planetary reflectance of pixels of uniform ground without noise, shape (band, y, x). [1]"""
     setup = setup_of(scenario)
+    if parts := unsupported_parts(scenario, setup):
+        raise ValueError(f"uniform ground does not support {', '.join(parts)}: use pixels='chain'")
     driver = _driver(scenario, setup)
     if scenario.landscape.is_one():
         return driver.toa(driver.reflectance(ground["lai"]))
     pixels = grids.aligned_grid(as_carried(scenario.geobox()), scenario.sensor.size)
     variables = {name: xr.Variable(("y", "x"), each, {"units": "1"}) for name, each in ground.items()}
     return driver.toa(reflectance_of(setup, _placed(variables, grids.coordinates(pixels))).values)
+
+
+def unsupported_parts(scenario, setup):
+    """Names of the parts of a setup, or of the keys of its scenario, that plain arrays do not support."""
+    return varying_parts(setup) or [
+        ".".join((*place, key))
+        for place, section in scenario.sections().items()
+        for key in type(section).model_fields.keys() - _SUPPORTED.get(place[0], ())
+        if getattr(section, key) != type(section).model_fields[key].get_default(call_default_factory=True)
+    ]
 
 
 def _values(dataset):

@@ -1,6 +1,6 @@
 """The chain on plain arrays compared with the labelled steps."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -69,13 +69,60 @@ def test_reflectance_is_recovered_from_digital_numbers(setup):
 
 
 def test_varying_parts_are_named(lai, setup):
-    varying = Driver(replace(setup, dem=lai, adjacency=True, canopy=fifesim.Canopy(brown=lai)))
-    for step in (varying.reflectance, varying.toa, lambda values: varying.fpar(values, 0.94)):
-        with pytest.raises(ValueError, match="do not support relief, adjacency, brown: use"):
-            step(lai.values)
+    with pytest.raises(ValueError, match="do not support dem, adjacency, brown: use"):
+        Driver(replace(setup, dem=lai, adjacency=True, canopy=fifesim.Canopy(brown=lai)))
     assert varying_parts(replace(setup, offset=(np.zeros(3), 0.0))) == ["a drifting offset"]
     angles = xr.Dataset({"sza": 30.0, "saa": 120.0})
     assert varying_parts(replace(setup, geometry=angles)) == ["angles by cell"]
+
+
+HILLS = fifesim.flint_hills(GRID.pad(1), seed=2)
+LOW_SUN = {"dem": HILLS, "geometry": fifesim.Geometry(75.0, 120.0, 20.0, 80.0)}
+NOISY = {"instrument": "OLI", "bands": ("B4", "B5"), "noise": ("thermal",)}
+
+# A value of each field of a setup that changes the image, and the other fields that it needs.
+FIELDS = {
+    "instrument": ("OLI", {"bands": ("nir", "red")}),
+    "bands": (("TM3", "TM4"), {}),
+    "atmosphere": (fifesim.Atmosphere(visibility=10), {}),
+    "geometry": (fifesim.Geometry(50.0, 120.0), {}),
+    "canopy": (fifesim.Canopy(brown=0.4), {}),
+    "dem": (HILLS, {}),
+    "horizon": (fifesim.horizon(fifesim.flint_hills(GRID.pad(100), seed=2)), LOW_SUN),
+    "upwelling": (False, {"dem": HILLS}),
+    "slopes": ("upright", {"dem": HILLS, "canopy": fifesim.Canopy()}),
+    "coupling": ("four-stream", {}),
+    "adjacency": (True, {}),
+    "surroundings": (0.5, {"adjacency": True}),
+    "clouds": (fifesim.cloud_field(GRID, 0.8, seed=2, margin=2000), {}),
+    "onto": (fifesim.grid_at(GRID.crs, GRID.affine.c + 7.0, GRID.affine.f - 11.0, 120, 90, 30), {}),
+    "interval": ("native", {}),
+    "offset": ((0.4, -0.3), {}),
+    "min_valid": (0.5, {}),
+    "noise": (("thermal",), NOISY),
+    "noise_models": (fifesim.NoiseModel(thermal=5.0, shot=0.0), NOISY),
+    "seed": (5, NOISY),
+    "quantise": (False, {}),
+}
+
+
+@pytest.mark.parametrize("name", [each.name for each in fields(fifesim.Setup)])
+def test_each_field_changes_the_image_and_arrays_support_or_refuse_it(lai, setup, name):
+    value, others = FIELDS[name]
+    base = replace(setup, **{key: each for key, each in others.items() if key != name})
+    changed = replace(base, **{name: value})
+    before, expected = (image_of(each, reflectance_of(each, lai), lai) for each in (base, changed))
+    assert before.dtype != expected.dtype or not np.array_equal(before, expected, equal_nan=True)
+    # Elevation is not a field of the setup of a driver but an argument of its steps.
+    level, dem = replace(changed, dem=None, horizon=None), changed.dem
+    if varying_parts(level):
+        assert name in {*varying_parts(level), "surroundings"}
+        return
+    driver = Driver(level)
+    found = driver.reflectance(lai.values)
+    if dem is not None:
+        found = driver.on_slopes(found, light_on_slopes(dem, grids.geobox(lai), changed.geometry, changed.horizon))
+    np.testing.assert_array_equal(driver.image(driver.toa(found), GRID), expected)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from fifesim.atmosphere.clouds.labels import COLUMNS, cast_clouds, cloud_tables
 from fifesim.atmosphere.clouds.layer import under_clouds
 from fifesim.base.footprints import Boxcar, regularize
 from fifesim.chain import coupled_ground
-from fifesim.chain.driver import Driver, cell_block_means, shared_operators, varying_parts
+from fifesim.chain.driver import Driver, cell_block_means, shared_operators
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.chain.steps import to_toa
 from fifesim.grids import grid as grids
@@ -314,8 +314,7 @@ class _Scene:
 
     def is_stand(self, ground):
         """Whether only leaf area varies, so that plain arrays suffice."""
-        plain = self.setup.slopes == "kt" and not varying_parts(self.driver.setup)
-        return plain and set(ground.land.data_vars) == {"lai"}
+        return self.setup.slopes == "kt" and set(ground.land.data_vars) == {"lai"}
 
     def spread_out(self, cells):
         """Means over the pixels of the truth, spread over the cells."""
@@ -331,7 +330,8 @@ def scene_of(scenario, retrieval=None):
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
     # In memory, because every set of stages with topography needs them.
     dem, horizon = in_memory(*elevation(scenario, grid)[:2])
-    level = replace(setup, bands=tuple(band.name for band in bands), clouds=None, slopes="kt", coupling="lambert")
+    plain = {"clouds": None, "slopes": "kt", "coupling": "lambert", "adjacency": False}
+    level = replace(setup, bands=tuple(band.name for band in bands), **plain)
     driver = Driver(level)
     return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), driver, grid, blocks, image, retrieval)
 
@@ -427,8 +427,8 @@ def _under_clouds(scene, clear, at_work):
 
 def _seen(scene, reflectance, coupling):
     """Apparent reflectance, shape (band, y, x), of a reflectance or its streams by a coupling, or with adjacency."""
-    own, streams = scene.driver.setup, coupled_ground.STREAMS_OF.get(coupling)
-    coords = {"band": list(own.bands)} | ({"stream": list(streams)} if streams else {})
+    own, streams = scene.setup, coupled_ground.STREAMS_OF.get(coupling)
+    coords = {"band": list(scene.driver.setup.bands)} | ({"stream": list(streams)} if streams else {})
     array = xr.DataArray(reflectance, dims=("stream", "band", "y", "x")[-reflectance.ndim :], coords=coords)
     given = {"geometry": own.geometry, "instrument": own.instrument, "adjacency": own.adjacency, "coupling": coupling}
     return to_toa(grids.place(array, scene.grid), scene.driver.air, **given).values
