@@ -8,7 +8,7 @@ from lazy import ODD_CHUNKS, check_place, check_raster_function, in_chunks, no_c
 import fifesim
 from fifesim.analysis import indices
 from fifesim.analysis.index_labels import INDICES, reflectance_index, reflectance_ndvi
-from fifesim.base.bands import nearest_band
+from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, SHORTWAVE_INFRARED, nearest_band
 from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument
 
@@ -24,11 +24,14 @@ def reflectance(lai, wavelengths=(0.56, 0.66, 0.83, 1.65)):
 def test_indices_are_raster_functions_and_equal_the_kernels(lai_with_hole):
     """Bands are in the order of wavelength: blue, green, red, near and shortwave infrared."""
     cube = reflectance(lai_with_hole, (0.48, 0.56, 0.66, 0.83, 1.65))
-    blue, green, red, nir, swir = cube.values
-    bands = {"EVI": (nir, red, blue), "NDWI": (green, nir), "NDMI": (nir, swir)}
-    for name, (kernel, _) in INDICES.items():
+    known = dict(zip((BLUE, GREEN, RED, NEAR_INFRARED, SHORTWAVE_INFRARED), cube.values, strict=True))
+    for name, (kernel, windows) in INDICES.items():
         result = check_raster_function(lambda array, n=name: reflectance_index(array, n), cube, quantity=name.lower())
-        np.testing.assert_array_equal(result, kernel(*bands.get(name, (nir, red))))
+        np.testing.assert_array_equal(result, kernel(*(known[each] for each in windows)))
+    blue, green, red, nir, swir = cube.values
+    for name, (one, other) in {"NDVI": (nir, red), "NDWI": (green, nir), "NDMI": (nir, swir)}.items():
+        np.testing.assert_array_equal(reflectance_index(cube, name), indices.normalized_difference(one, other))
+    np.testing.assert_array_equal(reflectance_index(cube, "EVI"), indices.enhanced(nir, red, blue))
     result = reflectance_ndvi(cube)
     np.testing.assert_array_equal(result, reflectance_index(cube, "ndvi"))
     np.testing.assert_array_equal(np.isnan(result), np.isnan(lai_with_hole))
