@@ -52,7 +52,7 @@ def sound_cells(array):
             f"{array.name or 'the array'} holds digital numbers, whose 0 is no data: convert it with "
             ".fifesim.to_reflectance() or .fifesim.to_radiance() first"
         )
-    if array.dtype.kind != "f" or not array.size:
+    if array.dtype.kind == "b" or not array.size:
         return array
     check = partial(_sound, name=_range_name(array))
     return array.copy(data=array.data.map_blocks(check, dtype=array.dtype) if array.chunks else check(array.data))
@@ -250,6 +250,8 @@ def relative_equivalent_noise(
         raise ValueError(f"increment must be positive, got {increment:g}: it is a width in units of the variable")
     if min_count < 2:
         raise ValueError(f"min_count must be at least 2, got {min_count}: one value has no deviation")
+    if variable.attrs.get("standard_name") == cf.QUANTITIES["ndvi"].standard_name:
+        raise ValueError("variable is NDVI, where a variable inferred from it is needed: exchange the two rasters")
     variable, ndvi = matched(variable, ndvi, pair)
     if slope is None:
         slope = regress(ndvi, variable, pair="index").slope
@@ -338,6 +340,7 @@ def invert(
     >>> clear = estimate["lai"].where(estimate["flag"] == 0)  # without clipped and extrapolated pixels
     """
     _check_names(ndvi, fit, quantity)
+    ndvi = sound_cells(ndvi)
     if not 0 < level < 1:
         raise ValueError(f"level must be between 0 and 1, got {level:g}: 0.95 holds 95 % of new values")
     line = f"invert: {fit.intercept:.6g} + {fit.slope:.6g} x {ndvi.name or 'index'}"

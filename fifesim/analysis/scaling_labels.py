@@ -317,6 +317,8 @@ def density(
     >>> round(float(density.integrate("value")), 2)
     1.0
     """
+    if points < 2:
+        raise ValueError(f"points must be at least 2, got {points}: it is the number of values of the density")
     array = sound_cells(array)
     low, high = extremes(array)
     if reflect is None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from fifesim.base.arguments import check_fields
 from fifesim.base.messages import warn
+from fifesim.grids.inputs import opened
 from fifesim.ground.canopy.description import ByValue, NumberByCell, is_raster
 from fifesim.ground.canopy.leaf_area import LARGEST_LAI
 
@@ -138,7 +139,8 @@ class Weather(ByValue):
     def __post_init__(self):
         check_fields(self)
         for each in fields(self):
-            value, limits = getattr(self, each.name), WEATHER_LIMITS[each.name]
+            value, limits = opened(getattr(self, each.name)), WEATHER_LIMITS[each.name]
+            object.__setattr__(self, each.name, value)
             units = str(value.attrs.get("units", limits.unit)) if is_raster(value) else limits.unit
             if units != limits.unit:
                 raise ValueError(f"{each.name} has units {units!r}, needs {limits.unit!r}: convert it, then set units")

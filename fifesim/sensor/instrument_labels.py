@@ -25,6 +25,9 @@ _ADAPTER: TypeAdapter = TypeAdapter(Instrument)
 # Instrument of the paper, the default for scenes on the FIFE site.
 _FIFE = "TM"
 
+# [W m-2 sr-1 um-1]
+_BRIGHTEST = 2000.0
+
 
 def attributes_of(description):
     """Attributes for the instrument of a raster: its name, and the full description of a user-supplied one."""
@@ -184,6 +187,9 @@ def _band_at(wavelength, instrument):
 # Samples of a point spread over the full width of its support, when no spacing is given.
 _SAMPLES = 121
 
+# Samples of the finest spacing, which take 200 MB.
+_MOST_SAMPLES = 5000
+
 
 def psf(instrument: InstrumentLike = "TM", band: str | None = None, *, spacing: float | None = None) -> xr.DataArray:
     r"""
@@ -226,8 +232,12 @@ def psf(instrument: InstrumentLike = "TM", band: str | None = None, *, spacing: 
     along, across = description.line_spreads(band)
     if spacing is None:
         spacing = 2 * max(along.half_width, across.half_width) / _SAMPLES
-    if not 0 < spacing < np.inf:
-        raise ValueError(f"spacing must be a positive number of metres, got {spacing}")
+    widest = 2 * max(along.half_width, across.half_width)
+    if not widest / _MOST_SAMPLES <= spacing < np.inf:
+        raise ValueError(
+            f"spacing must be at least {widest / _MOST_SAMPLES:.3g} m, 1/{_MOST_SAMPLES} of the support, got {spacing:g}: "
+            "give metres, not km"
+        )
     y, rows = _line(along, spacing)
     x, columns = _line(across, spacing)
     return xr.DataArray(
@@ -287,6 +297,11 @@ def mtf(
     own = np.array([[0.5 / interval for interval in description.ground_intervals(band)] for band in selected])
     product = np.array([0.5 / description.pixel(band) for band in selected])
     frequency = np.linspace(0, 2 * own.max(), 201) if frequency is None else np.atleast_1d(frequency).astype(float)
+    if not np.all((frequency >= 0) & (frequency <= 100 * own.max())):
+        raise ValueError(
+            f"frequency must be from 0 to {100 * own.max():.3g} cycles m-1, 100 times the Nyquist frequency, got "
+            f"{np.max(np.abs(frequency)):g}: a wave of 60 m has 1 / 60"
+        )
     both, units = ("band", "direction"), {"units": "cycles m-1"}
     return xr.DataArray(
         np.array([[spread.mtf(frequency) for spread in pair] for pair in spreads]),
@@ -386,10 +401,13 @@ def snr(instrument: InstrumentLike, band: str, radiance: Numbers) -> np.ndarray:
 
 
 def _checked(radiance):
-    """Radiance as an array; ValueError if a value is negative."""
+    """Radiance as an array; ValueError if a value is impossible."""
     radiance = np.asarray(radiance, float)
-    if np.any(radiance < 0):
-        raise ValueError(f"radiance must not be negative, got {radiance[radiance < 0].flat[0]:g} W m-2 sr-1 um-1")
+    # White ground under the sun at the zenith has 700.
+    if (wrong := radiance[~((radiance >= 0) & (radiance <= _BRIGHTEST))]).size:
+        raise ValueError(
+            f"radiance must not be negative, nor above {_BRIGHTEST:g} W m-2 sr-1 um-1, got {wrong.flat[0]:g}"
+        )
     return radiance
 
 

@@ -32,6 +32,9 @@ from fifesim.sensor.response.scan import Footprints, Track, apply_operator, foot
 # Nodes along each axis between which the direction to the sensor is a cubic spline.
 _NODES = 65
 
+# A quarter of the circumference of the Earth. [m]
+_FARTHEST = 1e7
+
 _TILE = 512
 
 
@@ -110,6 +113,8 @@ def find_track(grid, track=None, nadir_offset=0.0, heading=180.0):
         if nadir_offset:
             raise ValueError("track and nadir_offset both determine the track: give one of them")
         return track
+    if not abs(nadir_offset) <= _FARTHEST:
+        raise ValueError(f"nadir_offset must be at most {_FARTHEST:g} m on either side, got {nadir_offset:g}")
     latitude, longitude = latitude_longitude(grid, grid.shape.y / 2, grid.shape.x / 2)
     here = scan.Track(float(latitude), float(longitude), heading)
     aside = np.degrees(nadir_offset / scan.EARTH_RADIUS)

@@ -33,6 +33,9 @@ LOWEST_SUN = 85.0  # zenith angle beyond which shadows have no end [degree]
 LEAST = 0.1  # optical thickness from which a cell counts as cloud; sensors miss thinner clouds [1]
 DEEPEST_GROUND = 500.0  # ground below the altitude of the atmosphere that the margin of relief allows for [m]
 _TILE = 1008
+
+# Jet streams stay below. [m s-1]
+_FASTEST = 150.0
 _MOST_LAYERS = 64  # of clouds at different heights
 
 COLUMNS = ("optical_thickness", "shadow_thickness", "overhead_thickness")
@@ -143,8 +146,11 @@ def cloud_field(
             f"thickness must be a mean from 0 to {layer.THICKEST:g} and a standard deviation above 0, got {thickness}"
         )
     day, seconds = _day_and_seconds(time)
-    if np.shape(drift) != (2,) or not np.all(np.isfinite(drift)):
-        raise ValueError(f"drift must be two speeds, eastward and northward, such as (5.0, 0.0), got {drift}")
+    if np.shape(drift) != (2,) or not np.all(np.abs(drift) <= _FASTEST):
+        raise ValueError(
+            f"drift must be two speeds, eastward and northward, of at most {_FASTEST:g} m s-1, such as (5.0, 0.0), "
+            f"got {drift}"
+        )
     sky = CloudCover(float(cover), (mean, deviation), float(length), check_seed(seed), day)
     around = [int(np.ceil(margin / size - 1e-9)) for size in grids.cell_size(grid)]
     grid = grids.on_lattice(grid.pad(around[1], around[0]))

@@ -221,6 +221,8 @@ def arp_for_length(length: float, cell: float = 1.0) -> float:
         )
     if length == 0:
         return 0.0
+    if length < cell / 50:
+        raise ValueError(f"length must be 0 or at least 1/50 of a cell of {cell:g} m, got {length:g}: metres, not km")
     # Below this length the lag-one correlation, about 2 arp, underflows the bracket of the root search.
     smallest = 1e-12
     if length <= correlation_length(smallest, cell):

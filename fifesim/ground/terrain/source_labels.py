@@ -21,7 +21,7 @@ from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import regular_geobox
 from fifesim.grids.opening import ErrorsOfGdal, RasterFile
-from fifesim.ground.layer_labels import file_of, one_layer
+from fifesim.ground.layer_labels import file_of, one_layer, words_of
 from fifesim.ground.terrain import spline
 from fifesim.ground.terrain.slope import metres_per_unit
 
@@ -96,12 +96,14 @@ def open_source(raster, vertical_units=None, allow_remote=False):
     file = file_of("dem", raster, allow_remote)
     name = in_a_line(Path(file.path).name, 150)
     with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as opened:
+        cf.check_words(name, words_of(opened, file.band), "dem")
         source = Source(name, file, opened.shape, opened.transform, None, 1.0)
         return _in_metres(source, opened.crs.to_wkt(), in_a_line(opened.units[file.band - 1] or "", 40), vertical_units)
 
 
 def _array_source(raster, vertical_units):
     raster, name = one_layer(raster, "dem"), str(raster.name or "the elevation model")
+    cf.check_words(name, (raster.name, raster.attrs.get("long_name")), "dem")
     crs = raster.rio.crs
     found = regular_geobox(raster)
     if found is None:
@@ -288,8 +290,12 @@ def source_resolution(dem, given=None):
     """Resolution of the source of an elevation model: given, from the attribute, or the smaller side of a cell. [m]"""
     known = dem.attrs.get("source_resolution") if given is None else given
     found = min(grids.cell_size(grids.geobox(dem))) if known is None else float(known)
-    if not 0 < found < np.inf:
-        raise ValueError(f"the resolution of an elevation's source must be positive metres, got {found:g}")
+    least = 0.0 if given is None else min(grids.cell_size(grids.geobox(dem))) / 50
+    if not (found > 0 and least <= found < np.inf):
+        raise ValueError(
+            f"the resolution of an elevation's source must be positive metres, and if given at least 1/50 of a cell, "
+            f"got {found:g}: give metres, not km"
+        )
     return found
 
 
