@@ -178,29 +178,11 @@ _SAME_UNITS = dict.fromkeys(("", "m2 m-2", "dimensionless", "unitless", "reflect
 )
 
 
-# Words in names and descriptions that identify a quantity.
-_WORDS = {
-    name: name
-    for name in (
-        "lai",
-        "ndvi",
-        "evi",
-        "evi2",
-        "savi",
-        "msavi",
-        "ndwi",
-        "ndmi",
-        "nirv",
-        "fpar",
-        "dem",
-        "slope",
-        "aspect",
-    )
-}
+# Words in names and descriptions that identify a quantity; the first alone decide, where no standard name does.
+_KNOWN_BY_NAME = {"lai", "ndvi", "fpar", "dem", "slope", "aspect"}
+_WORDS = {name: name for name in (*_KNOWN_BY_NAME, "evi", "evi2", "savi", "msavi", "ndwi", "ndmi", "nirv")}
 _WORDS |= {"fapar": "fpar", "elevation": "dem", "altitude": "dem", "reflectance": "surface_reflectance"}
 _WORDS |= {"radiance": "toa_radiance"} | dict.fromkeys(("quality", "qa", "qc", "flag", "flags", "mask"), "quality")
-# These names alone decide, where no standard name does.
-_KNOWN_BY_NAME = {"lai", "ndvi", "fpar", "dem", "slope", "aspect"}
 _OTHER_UNITS = {"%", "percent", "m", "metre", "metres", "meter", "meters", "ft", "feet", "degree", "degrees", "k"}
 
 
@@ -269,9 +251,8 @@ def check_quantity(array, *names):
 
 def is_counts(array):
     """Whether an array holds digital numbers: by its standard name, its name, and the coordinates of a calibration."""
-    if "gain" not in array.coords or array.attrs.get("standard_name") in _LONG_NAMES:
-        return False
-    return array.name == "dn" or array.name not in QUANTITIES
+    stated, name = array.attrs.get("standard_name") in _LONG_NAMES, getattr(array, "name", None)
+    return "gain" in array.coords and not (stated or (name != "dn" and name in QUANTITIES))
 
 
 def check_words(raster, texts, name, units=""):

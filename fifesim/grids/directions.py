@@ -166,7 +166,8 @@ def from_grid_north(geometry, grid):
             f"grid north rotates by up to {off:.1f} degrees between centre and corners of the scene; light on slopes "
             "uses one direction of the sun: split the scene, or use a local CRS such as its UTM zone"
         )
-    return replace(geometry, saa=geometry.saa - turn, vaa=geometry.vaa - turn)
+    # An azimuth of 360 degrees may exceed 360 from grid north.
+    return replace(geometry, saa=np.fmod(geometry.saa - turn, 360), vaa=np.fmod(geometry.vaa - turn, 360))
 
 
 def angles(geometry):

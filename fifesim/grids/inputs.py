@@ -123,8 +123,8 @@ def _numbers(raster, name, given):
         if band is not None and band.dtype.kind in "iu" and band.min() > 0 and band.max() <= values.size:
             return xr.DataArray(values[band.values - 1], dims=band.dims)
     raise ValueError(
-        f"{raster.name or 'the raster'} has {name} {given!r}: it must be a finite number, or one for each numbered band; "
-        f"correct .attrs[{name!r}]"
+        f"{raster.name or 'the raster'} has {name} {given!r}: it must be a finite number, or one for each numbered "
+        f"band; correct .attrs[{name!r}]"
     )
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from rasterio.enums import ColorInterp
 
+from fifesim.base.messages import warn
 from fifesim.grids import cf
 from fifesim.grids.inputs import with_band_names
 from fifesim.grids.opening import raster_file, sound_raster
@@ -15,6 +16,12 @@ def file_of(quantity, path, allow_remote=False):
     with sound_raster(file) as (source, _):
         numbers = [each for each in source.indexes if source.colorinterp[each - 1] != ColorInterp.alpha]
         index = _band_of(file.name, [words_of(source, each) for each in numbers], quantity)
+        if quantity != "cover" and source.colorinterp[numbers[index] - 1] == ColorInterp.palette:
+            raise ValueError(
+                f"{file.name} has a colour table, so that its numbers are classes, where "
+                f"{cf.QUANTITIES[quantity].long_name} is needed: take a map of that quantity, or remove the table with "
+                "gdal_translate -colorinterp gray"
+            )
     return replace(file, band=numbers[index])
 
 
@@ -49,4 +56,13 @@ def _band_of(raster, bands, name):
     raise ValueError(
         f"{raster} has {len(texts)} bands, and not exactly one is described as {cf.QUANTITIES[name].long_name}: select "
         "the band, for instance with rioxarray.open_rasterio(path).sel(band=2), or gdal_translate -b 2 of a file"
+    )
+
+
+def warn_of_integers(name):
+    """Warn that integers without a scale are used as leaf area index."""
+    warn(
+        f"{name} holds integers without a scale, which are used as leaf area index: if they are scaled, set their "
+        "scale (.assign_attrs(scale_factor=0.1), or gdal_edit.py -a_scale 0.1 for a file), else convert them with "
+        ".astype(float)"
     )

@@ -235,8 +235,8 @@ def psf(instrument: InstrumentLike = "TM", band: str | None = None, *, spacing: 
     widest = 2 * max(along.half_width, across.half_width)
     if not widest / _MOST_SAMPLES <= spacing < np.inf:
         raise ValueError(
-            f"spacing must be at least {widest / _MOST_SAMPLES:.3g} m, 1/{_MOST_SAMPLES} of the support, got {spacing:g}: "
-            "give metres, not km"
+            f"spacing must be at least {widest / _MOST_SAMPLES:.3g} m, 1/{_MOST_SAMPLES} of the support, got "
+            f"{spacing:g}: give metres, not km"
         )
     y, rows = _line(along, spacing)
     x, columns = _line(across, spacing)

@@ -28,6 +28,7 @@ from fifesim.ground.canopy.reflectance_table import (
     uniform_scene,
     with_shares,
 )
+from fifesim.ground.layer_labels import warn_of_integers
 
 CELL_SHARES = ("brown", "dissociation", "crown_cover")  # properties that may vary by cell in SAIL
 
@@ -320,4 +321,6 @@ def checked_scene(lai):
         # Scenes and maps made by fifesim have this attribute and were checked when they were made.
         if "lai_distribution" not in lai.attrs:
             warn_of_large(lai.values)
+    if lai.dtype.kind in "iu":
+        warn_of_integers(lai.name or "the raster")
     return lai

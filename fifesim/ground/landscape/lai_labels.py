@@ -14,7 +14,6 @@ from odc.geo.geobox import GeoBox
 from fifesim.base.arguments import Chunks, LaiDistribution, Times, WholeNumber
 from fifesim.base.files import in_a_line
 from fifesim.base.lattice import check_seed
-from fifesim.base.messages import warn
 from fifesim.base.times import utc
 from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking
@@ -26,7 +25,7 @@ from fifesim.grids.warp import file_onto_grid, raster_onto_grid
 from fifesim.ground.canopy.leaf_area import check_map, check_source, warn_of_large
 from fifesim.ground.landscape.autoregression import FIELD_TILE, check_arp, periodic_field, streaming_field
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
-from fifesim.ground.layer_labels import file_of, one_layer, words_of
+from fifesim.ground.layer_labels import file_of, one_layer, warn_of_integers, words_of
 
 _REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
 
@@ -290,11 +289,7 @@ def _check_band(file, name):
 def _check_metadata(name, words, units, counts):
     cf.check_words(name, words, "lai", str(units or ""))
     if counts:
-        warn(
-            f"{name} holds integers without a scale, which are used as leaf area index: if they are scaled, set their "
-            "scale (.assign_attrs(scale_factor=0.1), or gdal_edit.py -a_scale 0.1 for a file), else convert them with "
-            ".astype(float)"
-        )
+        warn_of_integers(name)
 
 
 def _plausible(lai):
