@@ -75,6 +75,7 @@ def spelled(described):
 _WORDS = {
     "bool_type": "must be true or false",
     "bool_parsing": "must be true or false",
+    "dataclass_type": "must be a table of keys",
     "dict_type": "must be a table of keys",
     "finite_number": "must be a finite number",
     "float_parsing": "must be a number",

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -13,7 +14,7 @@ from fifesim.atmosphere.engines import check_zenith
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base import files, geometry
 from fifesim.base.arguments import FilePath
-from fifesim.base.files import shown
+from fifesim.base.files import in_a_line, shown
 from fifesim.base.messages import nearest
 from fifesim.base.times import SITE_CORNERS, SITE_LATITUDE, SITE_LONGITUDE, SITE_TIME, utc
 from fifesim.grids import grid as grids
@@ -502,8 +503,8 @@ def read_scenario(path: FilePath) -> Scenario:
     Raises
     ------
     ValueError
-        If the file is missing or not TOML, or a key or value is wrong. The message has one line per mistake, with the
-        key, the value and the allowed range.
+        If the file is missing or not TOML, or a key or value is wrong. The message names the file and has one line per
+        mistake, with the key, the value and the allowed range.
 
     Examples
     --------
@@ -515,7 +516,11 @@ def read_scenario(path: FilePath) -> Scenario:
     >>> fifesim.read_scenario(path).ground.arp
     0.24
     """
-    return parse_scenario(with_false_colour(load_values(path)))
+    values = with_false_colour(load_values(path))
+    try:
+        return parse_scenario(values)
+    except ValueError as error:
+        raise ValueError(f"{in_a_line(Path(path).name)}: {error}") from None
 
 
 class NamedKey(NamedTuple):

@@ -220,7 +220,7 @@ def test_misspelt_key_does_not_hide_another_mistake(text, second, tmp_path):
     with pytest.raises(ValueError, match="unknown key") as caught:
         read_text(tmp_path, text)
     first, *others = str(caught.value).splitlines()
-    assert first.startswith("unknown key") and len(others) == 1 and second in others[0]
+    assert first.startswith("scenario.toml: unknown key") and len(others) == 1 and second in others[0]
 
 
 @pytest.mark.parametrize(

@@ -129,7 +129,7 @@ class CenteredResponse(NamedResponse):
 
 
 def _kind(value):
-    keys = set(value) if isinstance(value, dict) else set(vars(value))
+    keys = set(value if isinstance(value, dict) else getattr(value, "__dict__", ()))
     if keys & {"center", "width"}:
         return "centered"
     return "table" if "table" in keys else "listed" if keys & {"wavelength", "response"} else "pyrsr"

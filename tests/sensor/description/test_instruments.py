@@ -105,6 +105,7 @@ MISTAKES = [
     (srf("wavelength = [0.62, 0.69], response = [0, -1]"), "bands.3.*must not be negative"),
     (srf("wavelength = [0.62, 0.69]"), "the key bands.3.srf.response is missing"),
     (srf("response = [0, 1]"), "the key bands.3.srf.wavelength is missing"),
+    ((srf("")[0], "srf = 0.66"), "bands.3.srf.* = 0.66: must be"),
     (srf('table = "none.csv", satellite = "A", band = "1"'), "srf.table = 'none.csv': no such file beside"),
     (srf('table = "avhrr_response.csv", satellite = "NOAA-9", band = "3"'), "has no NOAA-9 3: it has .*NOAA-11 2"),
     (('sensor = "TM", band = "7"', 'sensor = "TM", band = "9"'), "bands.6.srf: pyrsr has no .* Landsat-5 TM 9"),
