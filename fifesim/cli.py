@@ -365,31 +365,18 @@ def sensors_command(
 
 @app.command("verify")
 def verify_command():
-    """Check this installation against independent results. The exit code is 1 if a deviation exceeds its bound."""
-    # The matrices are small, so BLAS threads (loaded only now) would cost time.
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    """Compare this installation with independent results. The exit code is 1 if a deviation exceeds its bound."""
+    with importing():
+        from fifesim.experiments.verification import listing, verify
 
-    from fifesim.experiments.verification.areas import deviations
-    from fifesim.experiments.verification.deviations import HEADING, by_stage, deviation_summary
-
-    found = []
-    print_lines(HEADING)
     try:
-        for text in by_stage(_collected(deviations(), found)):
-            print_lines(text)
+        found = verify()
     except FileNotFoundError as error:
         # A table missing from the installation is a failure, not an invalid request.
         exit_with_error(error, Exit.FAILURE)
-    print_lines(deviation_summary(found))
+    print_lines(*listing(found))
     if not all(deviation.within for deviation in found):
         raise typer.Exit(Exit.FAILURE)
-
-
-def _collected(items, kept):
-    """Iterate over items, and append each to a list."""
-    for item in items:
-        kept.append(item)
-        yield item
 
 
 def _default(paper):

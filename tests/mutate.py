@@ -169,10 +169,10 @@ def failing(tests, seconds=LONGEST):
 
 
 def verified():
-    """Whether the checks of an installation pass."""
-    from fifesim.experiments.verification.areas import deviations
+    """The first comparison of `fifesim verify` beyond its bound, or None."""
+    from fifesim.experiments.verification import verify
 
-    return next((f"{each.area}: {each.what}" for each in deviations() if not each.within), None)
+    return next((f"{each.area}: {each.what}" for each in verify() if not each.within), None)
 
 
 def apart(folder, function, *given):

@@ -18,7 +18,7 @@ TURNED = {
 TURNED |= {ast.FloorDiv: ast.Mult, ast.And: ast.Or, ast.Or: ast.And, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd}
 TURNED |= {ast.Lt: ast.GtE, ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
 SHIFTED = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}
-CHECKS = "fifesim/experiments/verification"  # what `fifesim verify` runs
+CHECKS = "fifesim/experiments/verification.py"  # what `fifesim verify` runs
 STAGES = ("base", "ground", "atmosphere", "sensor", "analysis")  # whose kernels it names
 
 
@@ -65,7 +65,7 @@ def changed(source, number):
 
 
 def draw(count, seed, only, verify=False):
-    """Random mutations of all code, or only of kernels that `fifesim verify` checks."""
+    """Random mutations of all code, or only of kernels that `fifesim verify` calls."""
     places, start = [], ROOT / only
     for path in sorted(each.relative_to(ROOT) for each in ([start] if start.is_file() else start.rglob("*.py"))):
         tree = ast.parse((ROOT / path).read_text())
@@ -84,9 +84,9 @@ def imported(tree):
 
 @cache
 def _named():
-    """Files that the checks import, and all names that they use."""
-    trees = [ast.parse(path.read_text()) for path in (ROOT / CHECKS).glob("*.py")]
-    return {each for tree in trees for each in imported(tree)}, set().union(*map(_names, trees))
+    """Files that the comparisons import, and all names that they use."""
+    tree = ast.parse((ROOT / CHECKS).read_text())
+    return set(imported(tree)), _names(tree)
 
 
 def _names(node):
@@ -94,7 +94,7 @@ def _names(node):
 
 
 def _named_lines(path, tree):
-    """Lines of functions of a file that the checks name, and of functions of the file called by them."""
+    """Lines of functions of a file that the comparisons name, and of functions of the file called by them."""
     files, names = _named()
     if path not in files or path.parts[1] not in STAGES or {"raster.py", "rasters"} & set(path.parts):
         return set()

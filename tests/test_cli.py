@@ -332,7 +332,7 @@ def test_ctrl_c_exits_with_130_and_one_line(invoke, tmp_path, monkeypatch, comma
         "reproduce": "experiments.friedl1995.report.reproduce_to_folder",
         "budget": "experiments.scatter.report.budget_to_folder",
         "endtoend": "experiments.scatter.endtoend.endtoend_to_folder",
-        "verify": "experiments.verification.areas.deviations",
+        "verify": "experiments.verification.verify",
         "simulate": "output.run_folder.simulate_to_folder",
     }
     monkeypatch.setattr(f"fifesim.{called[command]}", pressed)

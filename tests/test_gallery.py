@@ -6,10 +6,10 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from verification import atmosphere, benchmarks, canopy
 
 from fifesim.accessor import DataArrayAccessor
 from fifesim.base.geometry import relative_azimuth, scattering_angle_cosine
-from fifesim.experiments.verification import atmosphere, benchmarks, canopy
 
 DOCS = Path(__file__).parents[1] / "docs"
 SIGNED = "positive toward the sun"

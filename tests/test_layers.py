@@ -198,9 +198,9 @@ def test_package_has_few_files():
     assert sum(len(docstring_lines(name)) for name in FILES) <= 15_000
 
 
-# Names that several files may define: commands have the names of functions, every verification file has a list of
-# checks, and experiments and sweeps list their regressed variables.
-SHARED_NAMES = {"CHECKS", "VARIABLES", "budget", "dataset", "explore", "reproduce", "rerun", "simulate", "verify"}
+# Names that several files may define: commands have the names of functions, and experiments and sweeps list their
+# regressed variables.
+SHARED_NAMES = {"VARIABLES", "budget", "dataset", "explore", "reproduce", "rerun", "simulate", "verify"}
 
 
 def test_names_are_defined_in_one_file():

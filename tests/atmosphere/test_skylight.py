@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.polynomial.legendre import leggauss
+from verification.benchmarks import _between
 
 import fifesim
 from fifesim.atmosphere.column import matrix_moments
@@ -22,7 +23,6 @@ from fifesim.atmosphere.skylight import (
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
 from fifesim.base.geometry import scattering_angle_cosine
 from fifesim.base.surface_kernels import RPV, ross_li, rpv
-from fifesim.experiments.verification.benchmarks import _between
 
 DATA = Path(__file__).parents[1] / "data"
 AIR = fifesim.Atmosphere(visibility=15)

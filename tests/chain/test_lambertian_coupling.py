@@ -10,6 +10,7 @@ import pytest
 from numpy.polynomial.legendre import leggauss
 from odc.geo.xr import wrap_xr
 from oracles_atmosphere import Air, Ground, coupled_reflectance, mixed_stokes
+from verification import benchmarks
 
 import fifesim
 from fifesim.atmosphere.column import matrix_moments
@@ -19,7 +20,6 @@ from fifesim.atmosphere.skylight import atmospheric_sky, directional_coupling, g
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance, stokes_reflectance
 from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
-from fifesim.experiments.verification import benchmarks
 from fifesim.ground.canopy.sail_model import sail, with_background
 
 ROOT = Path(__file__).parents[2]

@@ -9,8 +9,7 @@ and a canopy of discs. :doc:`/benchmarks` explains the results.
 # sphinx_gallery_thumbnail_number = 2
 import matplotlib.pyplot as plt
 import numpy as np
-
-from fifesim.experiments.verification import benchmarks
+from verification import benchmarks
 
 COLORS = {"I": "#1b1b1b", "Q": "#2166ac", "U": "#b2182b"}
 

@@ -5,9 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-
-import fifesim
-from fifesim.experiments.verification.benchmarks import (
+from verification.benchmarks import (
     RAMI_AEROSOL,
     RAMI_GROUND,
     RAMI_MOLECULES,
@@ -15,6 +13,8 @@ from fifesim.experiments.verification.benchmarks import (
     _rami_air,
     hom45,
 )
+
+import fifesim
 from fifesim.ground.canopy.layers import extinction_coefficient
 from fifesim.ground.canopy.leaf_transfer import discrete_ordinates
 from fifesim.ground.canopy.sail_model import sail, with_background

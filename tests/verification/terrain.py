@@ -8,10 +8,10 @@ from scipy import sparse
 from scipy.sparse import csgraph, linalg
 
 from fifesim.base.geometry import Geometry
-from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.ground.terrain import flint_hills, horizon, spline
 from fifesim.ground.terrain import lit_slopes as lights
 from fifesim.ground.terrain import slope as terrain
+from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "terrain")
 

@@ -18,9 +18,9 @@ from fifesim.atmosphere.models import Atmosphere
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
 from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
-from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument
+from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "atmosphere")
 

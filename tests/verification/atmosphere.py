@@ -22,8 +22,8 @@ from fifesim.atmosphere.models import Atmosphere
 from fifesim.base import files
 from fifesim.base.bands import Band
 from fifesim.base.geometry import relative_azimuth
-from fifesim.experiments.verification.deviations import Deviation, largest, rms_percent
 from fifesim.sensor.description.instruments import instrument
+from verification.deviations import Deviation, largest, rms_percent
 
 _deviation = partial(Deviation, "atmosphere", source="6SV1.1")
 

@@ -9,8 +9,8 @@ from fifesim.atmosphere.column import matrix_moments
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance, stokes_reflectance
 from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
-from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.ground.canopy.sail_model import sail, with_background
+from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "atmosphere")
 

@@ -10,16 +10,21 @@ import pytest
 from broken import exceeded, notices
 
 from fifesim.atmosphere import adjacency, column
-from fifesim.experiments.verification import areas, atmosphere, canopy, scattering
+from verification import areas, atmosphere, canopy, scattering
 
-TABLE = Path(__file__).parents[2] / "data" / "broken_kernels.csv"
+TABLE = Path(__file__).parents[1] / "data" / "broken_kernels.csv"
 BROKEN = pd.read_csv(TABLE, comment="#", keep_default_na=False, dtype=str)
 
-# Checks with many cases of successive orders, which have separate tests.
+# Checks with many cases of successive orders.
 SLOW = (atmosphere._light, atmosphere._successive_orders, canopy._foliage_tables)
+CHECKS = [
+    pytest.param(check, marks=[pytest.mark.slow] if check in SLOW else [], id=f"{area}-{check.__name__}")
+    for area, checks in areas.AREAS.items()
+    for check in checks
+]
 
 
-@pytest.mark.parametrize("check", [check for checks in areas.AREAS.values() for check in checks if check not in SLOW])
+@pytest.mark.parametrize("check", CHECKS)
 def test_check_passes(check):
     assert exceeded(check) == []
 
@@ -32,7 +37,7 @@ def found(path):
 
 @pytest.mark.parametrize(("owner", "kernel", "factor", "check", "what"), BROKEN.to_numpy().tolist())
 def test_production_kernels_are_checked(monkeypatch, owner, kernel, factor, check, what):
-    owner, check = found(owner), found(f"fifesim.experiments.verification.{check}")
+    owner, check = found(owner), found(f"verification.{check}")
     if not factor:
         assert notices(check, monkeypatch, owner, kernel)
         return

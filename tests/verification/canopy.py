@@ -9,7 +9,6 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from fifesim.base import files
-from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.ground.canopy import layers
 from fifesim.ground.canopy.crowns import SHAPE, clumped, crown_shares, crown_terms, crowns_over_background
 from fifesim.ground.canopy.layers import light_budget, two_layers
@@ -22,6 +21,7 @@ from fifesim.ground.canopy.sail_model import (
     volume_scattering,
     with_background,
 )
+from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "canopy")
 

@@ -5,7 +5,6 @@ from functools import partial
 import numpy as np
 from scipy.stats import norm
 
-from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.ground.landscape.autoregression import (
     FIELD_TILE,
     autocorrelation,
@@ -16,6 +15,7 @@ from fifesim.ground.landscape.autoregression import (
     white_noise,
 )
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map, treatments
+from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "random field")
 

@@ -11,7 +11,7 @@ from fifesim.analysis import regression, scaling, scores
 from fifesim.analysis.indices import normalized_difference
 from fifesim.analysis.regression import fit, row_sums
 from fifesim.base.footprints import Boxcar, axis_operator
-from fifesim.experiments.verification.deviations import Deviation, largest
+from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "analysis")
 

@@ -11,7 +11,6 @@ from scipy.stats import norm
 
 from fifesim.base.bands import NEAR_INFRARED, RED, Band, nearest_band, solar_irradiance_steps, solar_spectrum
 from fifesim.base.footprints import Boxcar, axis_operator, regularize
-from fifesim.experiments.verification.deviations import Deviation, integral, largest
 from fifesim.grids import grid as grids
 from fifesim.grids.reductions import areas, regularized
 from fifesim.sensor.description.instruments import instrument
@@ -25,6 +24,7 @@ from fifesim.sensor.response.spatial import (
     SystemSpread,
     TableSpread,
 )
+from verification.deviations import Deviation, integral, largest
 
 _deviation = partial(Deviation, "sensor")
 

@@ -7,12 +7,12 @@ import pyproj
 
 from fifesim.base.footprints import Boxcar, axis_operator
 from fifesim.base.geometry import fife_geometry
-from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.grids import grid as grids
 from fifesim.sensor.response import scan
 from fifesim.sensor.response.scan import Footprints, apply_operator, footprint_operator
 from fifesim.sensor.response.spatial import AggregatedSpread, CosineSpread, GaussianSpread
 from fifesim.sensor.scan_labels import scan_geometry, sense_swath
+from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "sensor")
 

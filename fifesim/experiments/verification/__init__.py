@@ -1,1 +1,0 @@
-"""Checks of an installation against published results and theory."""

@@ -1,0 +1,100 @@
+"""`fifesim verify` passes on a sound installation, covers all stages and names broken physics."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from threadpoolctl import threadpool_info
+from typer.testing import CliRunner
+
+import fifesim
+from fifesim.base import files
+from fifesim.cli import app
+from fifesim.experiments.verification import QUANTITIES, Deviation, listing
+
+TABLE = files.table("verification.csv")
+AREAS = (
+    "landscape", "leaf", "canopy", "soil", "terrain", "atmosphere", "clouds", "sensor", "geometry", "analysis",
+    "retrieval", "land models",
+)  # fmt: skip
+
+
+def run():
+    return CliRunner().invoke(app, ["verify"])
+
+
+@pytest.fixture
+def only(monkeypatch):
+    """A function that leaves only the rows of one quantity."""
+
+    right = files.table
+
+    def select(quantity):
+        rows = TABLE[TABLE["quantity"] == quantity]
+        monkeypatch.setattr(files, "table", lambda name: rows if name == "verification.csv" else right(name))
+        return rows
+
+    return select
+
+
+def test_installation_is_within_all_bounds():
+    result = run()
+    assert result.exit_code == 0, result.output
+    *lines, last = result.stdout.splitlines()
+    assert last == f"{len(TABLE)} comparisons, all within their bounds"
+    for (_, row), line in zip(TABLE.iterrows(), lines[1:], strict=True):
+        assert line.startswith(row["area"]) and line.endswith(row["source"])
+
+
+def test_rows_cover_all_areas_and_use_all_quantities():
+    assert tuple(TABLE["area"].unique()) == AREAS
+    assert set(TABLE["quantity"]) == set(QUANTITIES)
+    assert not TABLE.duplicated(["area", "compared"]).any()
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_results_that_are_2_percent_too_large_are_noticed(monkeypatch, only, quantity):
+    """5 % for the variance of a sample, and 25 % for crowns, whose model has an error of 14 %."""
+    rows, right, factor = only(quantity), QUANTITIES[quantity], {"noise variance": 1.05, "crowns": 1.25}
+    monkeypatch.setitem(QUANTITIES, quantity, lambda **inputs: factor.get(quantity, 1.02) * right(**inputs))
+    found = fifesim.verify()
+    assert len(found) == len(rows) and not all(each.within for each in found)
+
+
+def test_broken_kernel_is_named_with_exit_code_1(monkeypatch, only):
+    only("Ross-Li")
+    monkeypatch.setitem(QUANTITIES, "Ross-Li", lambda **inputs: np.nan)
+    result = run()
+    assert result.exit_code == 1
+    last = "1 comparisons, 1 beyond their bounds: analysis: reflectance of Ross and Li"
+    assert result.stdout.splitlines()[-1] == last and result.stdout.count("EXCEEDED") == 1
+
+
+def test_blas_has_one_thread(monkeypatch, only):
+    only("Ross-Li")
+    found = []
+
+    def threads(**inputs):
+        found.extend(each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas")
+        return np.nan
+
+    monkeypatch.setitem(QUANTITIES, "Ross-Li", threads)
+    fifesim.verify()
+    assert found and set(found) == {1}
+
+
+def test_missing_table_is_one_line_with_exit_code_1(monkeypatch):
+    monkeypatch.setattr(files, "table", lambda name: files.path("none.csv"))
+    result = run()
+    assert result.exit_code == 1
+    assert len(result.stderr.strip().splitlines()) == 1 and "none.csv" in result.stderr
+
+
+def test_columns_are_aligned_and_nan_exceeds_every_bound():
+    within = Deviation("terrain", "slope of planes", 1e-12, 1e-9, "degree", "plane")
+    beyond = Deviation("canopy", "reciprocity", np.nan, 0.1, "1", "theory")
+    heading, one, other, last = listing([within, beyond])
+    for word, text in (("compared", "slope of planes"), ("with", "plane")):
+        assert one.rindex(text) == heading.index(word)
+    assert other.endswith("EXCEEDED") and "EXCEEDED" not in one
+    assert last == "2 comparisons, 1 beyond their bounds: canopy: reciprocity"
+    assert TABLE["compared"].str.len().max() < 58 and pd.api.types.is_numeric_dtype(TABLE["tolerance"])
