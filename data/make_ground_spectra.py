@@ -97,7 +97,7 @@ def main():
     write("ground_spectra.csv", header, table.round(5))
 
     for name, rows, purpose in zip(
-        ("library_ground.csv", "verification/held_out_soils.csv"),
+        ("library_ground.csv", "../tests/data/verification/held_out_soils.csv"),
         drawn(listed, spectra),
         ("below the canopies of the library of land spectra", "that the library of land spectra does not have"),
         strict=True,

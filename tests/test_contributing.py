@@ -101,7 +101,7 @@ def edit(copy, file, old="", new="", **whole):
 def failed(tmp_path_factory):
     """Errors by recipe, in a copy of the package with all recipes applied to the files named in their rows."""
     copy, table = tmp_path_factory.mktemp("copy"), rows()
-    for folder in (PACKAGE, "data"):
+    for folder in (PACKAGE, "data", "tests/verification", "tests/data/verification"):
         copytree(ROOT / folder, copy / folder, ignore=ignore_patterns("make_*.py"))
     for name, recipe in RECIPES.items():
         for change in recipe["edits"]:
@@ -111,7 +111,7 @@ def failed(tmp_path_factory):
     text = mine.read_text(encoding="utf-8").replace('name = "TM"', 'name = "MINE"')
     mine.write_text(re.sub(r"^aliases = .*$", "", text, flags=re.MULTILINE), encoding="utf-8")
     (copy / "checks.json").write_text(json.dumps({name: recipe["check"] for name, recipe in RECIPES.items()}))
-    env = {"PYTHONPATH": str(copy), "HOME": str(copy)}
+    env = {"PYTHONPATH": f"{copy}:{copy / 'tests'}", "HOME": str(copy)}
     done = subprocess.run([sys.executable, "-c", _RUN], cwd=copy, env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout.splitlines()[-1])

@@ -1,14 +1,20 @@
-"""Data tables of the package state their sources and units."""
+"""Data tables of the package, and independent results for the tests, state their sources and units."""
 
 import re
 
 import pandas as pd
+import pytest
+from verification import tables
 
 from fifesim.base import files
 
 DATA = files.path("lai_distributions.csv").parent
-TABLES = sorted(path for path in DATA.rglob("*") if path.suffix in (".csv", ".toml"))
-SCRIPTS = {path.name for path in DATA.glob("make_*.py")}
+EACH = pytest.mark.parametrize("folder", [DATA, tables.FOLDER], ids=["package", "tests"])
+SCRIPTS = {path.name for folder in (DATA, tables.FOLDER) for path in folder.glob("make_*.py")}
+
+
+def tables_of(folder):
+    return sorted(path for path in folder.rglob("*") if path.suffix in (".csv", ".toml"))
 
 
 def header(path):
@@ -25,23 +31,23 @@ def is_named(name, readme):
     return name in readme or f"`{file}`" in table.partition("\n\n")[0]
 
 
-def test_tables_are_listed_and_have_sources_and_units():
+@EACH
+def test_tables_are_listed_and_have_sources_and_units(folder):
     """A source is a publication, the script that generates the table, or the calibration data."""
-    readme, breaches = (DATA / "README.md").read_text(encoding="utf-8"), []
-    for path in TABLES:
-        name, text = path.relative_to(DATA).as_posix(), header(path)
+    readme, breaches = (folder / "README.md").read_text(encoding="utf-8"), []
+    for path in tables_of(folder):
+        name, text = path.relative_to(folder).as_posix(), header(path)
         breaches += [] if is_named(name, readme) else [f"{name} is not in README.md"]
         breaches += [] if re.search(r"Source|\[sources\]|by make_\w+\.py|Calibrated", text) else [f"{name}: no source"]
-        breaches += [
-            f"{each} is missing" for each in re.findall(r"\bmake_\w+\.py", text) if not (DATA / each).is_file()
-        ]
+        breaches += [f"{each} is missing" for each in re.findall(r"\bmake_\w+\.py", text) if each not in SCRIPTS]
         if path.suffix == ".csv":
             table = pd.read_csv(path, comment="#")
             breaches += [] if re.search(r"\[[^\]]+\]", text) else [f"{name}: no units"]
             breaches += [f"{name} has gaps"] if table.empty or table.isna().any(axis=None) else []
-    assert len(TABLES) >= 9 and breaches == []
+    assert len(tables_of(folder)) >= 9 and breaches == []
 
 
-def test_folder_has_only_tables_and_their_scripts():
-    extra = {path.name for path in DATA.rglob("*") if path.is_file() and path not in TABLES}
+@EACH
+def test_folder_has_only_tables_and_their_scripts(folder):
+    extra = {path.name for path in folder.rglob("*") if path.is_file() and path not in tables_of(folder)}
     assert [name for name in extra if name != "README.md" and not re.fullmatch(r"make_\w+\.py", name)] == []

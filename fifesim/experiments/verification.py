@@ -1,7 +1,7 @@
 """
 Comparison of an installation with stored results of other codes, published tables and closed forms.
 
-Each row of ``data/verification.csv`` names one of the `QUANTITIES`, with its inputs, and the expected value.
+Each row of ``data/verification.csv`` names one of the `COMPARED`, with its inputs, and the expected value.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def verify() -> list[Deviation]:
 def _compared(row):
     """Deviation of one row of the table."""
     inputs = tomllib.loads(row.inputs.replace("; ", "\n"))
-    deviation = abs(float(QUANTITIES[row.quantity](**inputs)) - row.expected)
+    deviation = abs(float(COMPARED[row.quantity](**inputs)) - row.expected)
     return Deviation(row.area, row.compared, deviation, row.tolerance, row.unit, row.source)
 
 
@@ -342,7 +342,7 @@ def _networks(quantity, bands, **cosines):
 
 
 # Functions of the inputs of a row, by the names of quantities in the table.
-QUANTITIES = {
+COMPARED = {
     "random word": _random_word,
     "field autocorrelation": autocorrelation,
     "field correlation": _field_correlation,

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from numpy.polynomial.legendre import leggauss, legval
 from oracles_atmosphere import SIEWERT, henyey_greenstein
+from verification import tables
 
 from fifesim.atmosphere.aerosols import aerosol_phase, aerosol_polarization
 from fifesim.atmosphere.column import matrix_moments, rayleigh_expansion
@@ -16,7 +17,6 @@ from fifesim.atmosphere.successive_orders import (
     path_reflectance,
     stokes_reflectance,
 )
-from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
 
 SIXS = pd.read_csv(Path(__file__).parents[1] / "data" / "sixs_scattering.csv", comment="#")
@@ -42,7 +42,7 @@ def test_polarized_molecules_agree_with_natraj_tables():
     Over black ground 2e-5: truncation of the orders, and 400 layers for a view at 89 degrees. Ground of reflectance 0.8
     minus black ground 1.2e-4: 200 layers, and the last digit of the table.
     """
-    table = files.table("verification/polarized_molecules.csv")
+    table = tables.table("polarized_molecules.csv")
     mu_s, mu_v, raa = 0.2, np.array([0.02, 0.4, 1.0]), [180.0, 120.0]
     black, bright = (table.loc[table["ground"] == ground, "intensity"].to_numpy() for ground in (0.0, 0.8))
     views = degrees(mu_s), degrees(mu_v), raa

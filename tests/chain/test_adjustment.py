@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 from lazy import check_raster_function
+from verification import tables
 
 import fifesim
 from fifesim.base import files
@@ -92,7 +93,7 @@ def held_out():
     prosail = pytest.importorskip("prosail")
     random = np.random.Generator(np.random.Philox(36))
     between = random.uniform
-    table = files.table("verification/held_out_soils.csv").set_index("wavelength")
+    table = tables.table("held_out_soils.csv").set_index("wavelength")
     spectra = []
     for name in table:
         soil = np.interp(np.arange(400, 2501) / 1000, table.index, table[name])
@@ -132,17 +133,18 @@ def _inside(band):
 
 
 @pytest.mark.parametrize(
-    ("name", "band", "most"),
-    [("ground_spectra.csv", "TM5", 0.004), ("verification/held_out_soils.csv", "TM7", 0.003)],
+    ("table", "band", "most"),
+    [(files.table("ground_spectra.csv"), "TM5", 0.004), (tables.table("held_out_soils.csv"), "TM7", 0.003)],
+    ids=["dead grass", "soils"],
 )
-def test_measured_ground_spectra_are_estimated(name, band, most):
+def test_measured_ground_spectra_are_estimated(table, band, most):
     """
     Measured dead grass and soils that the library lacks, without a canopy model.
 
     TM5 extends 0.1 um beyond the nearest band, into an absorption of dry grass. In TM7, clay minerals absorb outside
     the MSI band, and the nearest band is equally good.
     """
-    table = files.table(name).set_index("wavelength")
+    table = table.set_index("wavelength")
     spectra = xr.DataArray(table.to_numpy().T, dims=("sample", "wavelength"), coords={"wavelength": table.index})
     # The table has gaps where the atmosphere is opaque.
     spectra = spectra.interp(wavelength=np.linspace(0.4, 2.45, 206))

@@ -10,7 +10,7 @@ import pytest
 from numpy.polynomial.legendre import leggauss
 from odc.geo.xr import wrap_xr
 from oracles_atmosphere import Air, Ground, coupled_reflectance, mixed_stokes
-from verification import benchmarks
+from verification import benchmarks, tables
 
 import fifesim
 from fifesim.atmosphere.column import matrix_moments
@@ -18,7 +18,6 @@ from fifesim.atmosphere.coupling import apparent_reflectance
 from fifesim.atmosphere.engines import band_terms, whole_scattering
 from fifesim.atmosphere.skylight import atmospheric_sky, directional_coupling, ground_streams
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance, stokes_reflectance
-from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
 from fifesim.ground.canopy.sail_model import sail, with_background
 
@@ -93,7 +92,7 @@ def rpv_ground():
 
 def rami_air(vza, raa):
     """Molecules and aerosol of the reference, with aerosol evenly distributed below 2 km."""
-    knots, phase = files.table("verification/rami4atm_phase.csv")[["scattering_cosine", "phase"]].to_numpy().T
+    knots, phase = tables.table("rami4atm_phase.csv")[["scattering_cosine", "phase"]].to_numpy().T
     nodes, weights = benchmarks._between(knots, 4)
     moments = matrix_moments(np.interp(nodes, knots, phase), np.zeros(nodes.size), nodes, weights, 48)
     matter, sun = (benchmarks.RAMI_MOLECULES, benchmarks.RAMI_AEROSOL, benchmarks.RAMI_ALBEDO), benchmarks.RAMI_SZA

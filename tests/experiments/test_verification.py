@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 import fifesim
 from fifesim.base import files
 from fifesim.cli import app
-from fifesim.experiments.verification import QUANTITIES, Deviation, listing
+from fifesim.experiments.verification import COMPARED, Deviation, listing
 
 TABLE = files.table("verification.csv")
 AREAS = (
@@ -47,22 +47,22 @@ def test_installation_is_within_all_bounds():
 
 def test_rows_cover_all_areas_and_use_all_quantities():
     assert tuple(TABLE["area"].unique()) == AREAS
-    assert set(TABLE["quantity"]) == set(QUANTITIES)
+    assert set(TABLE["quantity"]) == set(COMPARED)
     assert not TABLE.duplicated(["area", "compared"]).any()
 
 
-@pytest.mark.parametrize("quantity", QUANTITIES)
+@pytest.mark.parametrize("quantity", COMPARED)
 def test_results_that_are_2_percent_too_large_are_noticed(monkeypatch, only, quantity):
     """5 % for the variance of a sample, and 25 % for crowns, whose model has an error of 14 %."""
-    rows, right, factor = only(quantity), QUANTITIES[quantity], {"noise variance": 1.05, "crowns": 1.25}
-    monkeypatch.setitem(QUANTITIES, quantity, lambda **inputs: factor.get(quantity, 1.02) * right(**inputs))
+    rows, right, factor = only(quantity), COMPARED[quantity], {"noise variance": 1.05, "crowns": 1.25}
+    monkeypatch.setitem(COMPARED, quantity, lambda **inputs: factor.get(quantity, 1.02) * right(**inputs))
     found = fifesim.verify()
     assert len(found) == len(rows) and not all(each.within for each in found)
 
 
 def test_broken_kernel_is_named_with_exit_code_1(monkeypatch, only):
     only("Ross-Li")
-    monkeypatch.setitem(QUANTITIES, "Ross-Li", lambda **inputs: np.nan)
+    monkeypatch.setitem(COMPARED, "Ross-Li", lambda **inputs: np.nan)
     result = run()
     assert result.exit_code == 1
     last = "1 comparisons, 1 beyond their bounds: analysis: reflectance of Ross and Li"
@@ -77,7 +77,7 @@ def test_blas_has_one_thread(monkeypatch, only):
         found.extend(each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas")
         return np.nan
 
-    monkeypatch.setitem(QUANTITIES, "Ross-Li", threads)
+    monkeypatch.setitem(COMPARED, "Ross-Li", threads)
     fifesim.verify()
     assert found and set(found) == {1}
 

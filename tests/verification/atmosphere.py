@@ -19,10 +19,10 @@ from fifesim.atmosphere.coupling import (
 from fifesim.atmosphere.engines import band_terms, scattering
 from fifesim.atmosphere.lookup import varying_diffuse_fraction, varying_reflectance
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base import files
 from fifesim.base.bands import Band
 from fifesim.base.geometry import relative_azimuth
 from fifesim.sensor.description.instruments import instrument
+from verification import tables
 from verification.deviations import Deviation, largest, rms_percent
 
 _deviation = partial(Deviation, "atmosphere", source="6SV1.1")
@@ -54,7 +54,7 @@ def _terms(table, engine):
 
 
 def _columns():
-    table = files.table("verification/sixs_columns.csv")
+    table = tables.table("sixs_columns.csv")
     atmospheres = [Atmosphere(profile=row.profile, altitude=row.altitude) for row in table.itertuples()]
     for name in ("pressure", "water_vapour", "ozone"):
         found = [getattr(atmosphere, name) for atmosphere in atmospheres]
@@ -63,24 +63,24 @@ def _columns():
 
 
 def _optical_depths():
-    table = files.table("verification/sixs_molecules.csv")
+    table = tables.table("sixs_molecules.csv")
     found = [
         float(Atmosphere(profile=row.profile, altitude=row.altitude).rayleigh_optical_depth(row.wavelength))
         for row in table.itertuples()
     ]
     worst = 100 * largest(found, table["optical_depth"], relative=True)
     yield _deviation("optical depth of the molecules", worst, 1.0, "%")
-    for aerosol, rows in files.table("verification/sixs_aerosol.csv").groupby("aerosol"):
+    for aerosol, rows in tables.table("sixs_aerosol.csv").groupby("aerosol"):
         found = Atmosphere(aerosol=aerosol, aot=1.0).aerosol_optical_depth(rows["wavelength"].to_numpy())
         worst = 100 * largest(found, rows["relative_optical_depth"], relative=True)
         yield _deviation(f"optical depth of {aerosol} aerosol", worst, 1.0, "%")
-    table = files.table("verification/sixs_visibility.csv")
+    table = tables.table("sixs_visibility.csv")
     found = [Atmosphere(visibility=visibility).aot for visibility in table["visibility"]]
     yield _deviation("optical thickness by visibility", 100 * largest(found, table["aot"], relative=True), 1.0, "%")
 
 
 def _five_s_at_fife():
-    table = files.table("verification/sixs_fife.csv")
+    table = tables.table("sixs_fife.csv")
     found = apparent_reflectance(table["surface_reflectance"].to_numpy(), **_terms(table, "5S").uniform)
     for band, bound in zip(_BANDS, _FIFE_BOUNDS, strict=True):
         rows = (table["band"] == band).to_numpy()
@@ -89,7 +89,7 @@ def _five_s_at_fife():
 
 
 def _five_s():
-    table = files.table("verification/sixs_grid.csv")
+    table = tables.table("sixs_grid.csv")
     terms = _terms(table, "5S")
     found, expected = apparent_reflectance(0.3, **terms.uniform), table["toa_reflectance"].to_numpy()
     # The closed forms are best in clear air, below a high sun and near nadir.
@@ -108,7 +108,7 @@ def _five_s():
 
 
 def _successive_orders():
-    table = files.table("verification/sixs_grid.csv")
+    table = tables.table("sixs_grid.csv")
     rows = table[table["band"].isin(_VISIBLE)]
     terms = _terms(rows, "successive-orders")
     found = {
@@ -123,7 +123,7 @@ def _successive_orders():
 
 def _light():
     """Check the parts of the transmittances; 5S adds the albedos of molecules and aerosol, an error of 0.05 in haze."""
-    table = files.table("verification/sixs_adjacency.csv")
+    table = tables.table("sixs_adjacency.csv")
     hazy = table[table["visibility"] == 10]
     names = ("transmittance_down", "direct_transmittance_up", "diffuse_up_molecules", "diffuse_up_aerosol")
     for engine, albedo, bound in (("5S", 0.05, 0.004), ("successive-orders", 0.002, 0.0015)):

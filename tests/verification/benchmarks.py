@@ -7,9 +7,9 @@ from numpy.polynomial.legendre import leggauss
 
 from fifesim.atmosphere.column import matrix_moments
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance, stokes_reflectance
-from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
 from fifesim.ground.canopy.sail_model import sail, with_background
+from verification import tables
 from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "atmosphere")
@@ -24,8 +24,8 @@ HOTSPOT = 0.03  # of HOM45: see `flat_discs`
 
 def iprt(case):
     """Polarized light of an IPRT case, A1a to B1: table of MYSTIC, and I, Q and U of fifesim, shape (3, views). [1]"""
-    table = files.table("verification/iprt.csv").query("case == @case")
-    setup = files.table("verification/iprt_cases.csv").set_index("case").loc[case]
+    table = tables.table("iprt.csv").query("case == @case")
+    setup = tables.table("iprt_cases.csv").set_index("case").loc[case]
     particles = _spheres() if case == "A3" else None
     options = {"ground": setup["ground"], "depolarization": setup["depolarization"]}
     found = np.empty((3, len(table)))
@@ -38,7 +38,7 @@ def iprt(case):
 
 def molecules():
     """Table of Natraj et al. (2009) for molecules, and default and converged results, shape (3, views). [1]"""
-    table = files.table("verification/molecules_stokes.csv")
+    table = tables.table("molecules_stokes.csv")
     found, coarse, fine = np.empty((3, 3, len(table)))
     many = {"streams": 48, "tolerance": 1e-10}
     for (level, tau, albedo, mu_s), rows in table.groupby(["level", "tau", "albedo", "mu_s"]):
@@ -52,7 +52,7 @@ def molecules():
 
 def rami(case):
     """Scalar reflectance over Lambertian ground, "white" or "lambert": table of Eradiate, and fifesim. [1]"""
-    table = files.table("verification/rami4atm.csv").query("case == @case")
+    table = tables.table("rami4atm.csv").query("case == @case")
     path, down, up, albedo = _rami_air(table, RAMI_AEROSOL if case == "lambert" else 0.0)
     ground = RAMI_GROUND[case]
     gases = np.exp(-RAMI_GASES * _air_mass(table)) if case == "lambert" else 1.0
@@ -61,7 +61,7 @@ def rami(case):
 
 def hom45(hotspot=HOTSPOT):
     """Reflectance of the canopy HOM45 below its sky: table of Eradiate for discs, and SAIL. [1]"""
-    table = files.table("verification/rami4atm.csv").query("case == 'HOM45'")
+    table = tables.table("rami4atm.csv").query("case == 'HOM45'")
     _, down, _, _ = _rami_air(table, RAMI_AEROSOL)
     sunlight = np.exp(-(RAMI_MOLECULES + RAMI_AEROSOL) / np.cos(np.radians(RAMI_SZA))) / down
     angles = {"sza": RAMI_SZA, "vza": table["vza"].abs().to_numpy(), "raa": table["raa"].to_numpy()}
@@ -131,7 +131,7 @@ def _stokes(rows, tau, albedo, particles, sza, level, **options):
 
 def _spheres():
     """Moments of the scattering matrix of case A3, and its phase function and polarization, linear in the cosine."""
-    matrix = files.table("verification/iprt_matrix.csv").iloc[::-1]
+    matrix = tables.table("iprt_matrix.csv").iloc[::-1]
     knots = np.cos(np.radians(matrix["scattering_angle"].to_numpy()))
     nodes, weights = _between(knots, 12)
     f11, f12, f33 = (np.interp(nodes, knots, matrix[name]) for name in ("F11", "F12", "F33"))
@@ -146,7 +146,7 @@ def _spheres():
 
 def _rami_air(table, tau_aerosol):
     """Path reflectance, transmittances down and up, and spherical albedo at the views of a table. [1]"""
-    knots, phase = files.table("verification/rami4atm_phase.csv")[["scattering_cosine", "phase"]].to_numpy().T
+    knots, phase = tables.table("rami4atm_phase.csv")[["scattering_cosine", "phase"]].to_numpy().T
     nodes, weights = _between(knots, 4)
     moments = matrix_moments(np.interp(nodes, knots, phase), np.zeros(nodes.size), nodes, weights, 48)[:, 0]
     (vza, views), (raa, azimuths) = (np.unique(a, return_inverse=True) for a in (table["vza"].abs(), table["raa"]))
@@ -176,7 +176,7 @@ def _iprt():
     """Check the IPRT cases, within 3 times the noise of the intensity and 4 times the noise of Q and U."""
     # Of 590 numbers one or two exceed 3 times their noise by chance; with a probability of 27 in 28 none exceeds 4
     # times.
-    for case in files.table("verification/iprt_cases.csv")["case"]:
+    for case in tables.table("iprt_cases.csv")["case"]:
         table, found = iprt(case)
         noise = table[["sd_I", "sd_Q", "sd_U"]].to_numpy().T
         away = np.abs(found - table[STOKES].to_numpy().T) / noise

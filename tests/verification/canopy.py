@@ -8,7 +8,6 @@ from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from fifesim.base import files
 from fifesim.ground.canopy import layers
 from fifesim.ground.canopy.crowns import SHAPE, clumped, crown_shares, crown_terms, crowns_over_background
 from fifesim.ground.canopy.layers import light_budget, two_layers
@@ -21,6 +20,7 @@ from fifesim.ground.canopy.sail_model import (
     volume_scattering,
     with_background,
 )
+from verification import tables
 from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "canopy")
@@ -127,7 +127,7 @@ def _gap(depth, ks, ko, lai, apart):
 
 def _other_sail():
     """Check SAIL against another code, whose leaf angle classes come from an iteration that stops at 1e-8."""
-    table = files.table("verification/sail.csv")
+    table = tables.table("sail.csv")
     worst = 0.0
     for row in table.itertuples():
         leaves = leaf_angle_classes(("verhoef", row.a, row.b), classes=18)
@@ -141,7 +141,7 @@ def _other_sail():
 
 def _exact_transfer():
     """Check the four-stream model against exact transfer, within the model error that the documentation states."""
-    table = files.table("verification/canopy_transfer.csv")
+    table = tables.table("canopy_transfer.csv")
     angles = {name: table[name].to_numpy() for name in ("sza", "vza", "raa")}
     canopy = sail(table["lai"], table["leaf_reflectance"], table["leaf_transmittance"], **angles)
     found = 100 * (with_background(canopy, table["background"].to_numpy()).rso / table["reflectance"] - 1)
@@ -239,7 +239,7 @@ _VIEW = {"sza": 35.0, "vza": 20.0, "raa": 30.0, "hotspot": 0.1}
 
 def _other_layers():
     """Check two layers against another code, whose leaf angle classes come from an iteration that stops at 1e-8."""
-    table = files.table("verification/two_layers.csv")
+    table = tables.table("two_layers.csv")
     worst = 0.0
     for row in table.itertuples():
         leaves = leaf_angle_classes(row.leaf_angles, classes=18)
@@ -308,8 +308,8 @@ def known_crowns(scene):
     """Reflectance of a RAMI-3 scene whose crowns are known leaf by leaf: columns vza, raa [degree] and brf [1]."""
     # HET01, spheres, is from Eradiate; HET04, spheres and cylinders, from the Monte Carlo code of make_crown_scenes.py.
     if scene == "HET01":
-        return files.table("verification/spheres_of_leaves.csv")
-    return files.table("verification/crown_scenes.csv").query("scene == @scene")
+        return tables.table("spheres_of_leaves.csv")
+    return tables.table("crown_scenes.csv").query("scene == @scene")
 
 
 def crown_errors(scene, crown_cover=None):

@@ -16,10 +16,10 @@ from fifesim.atmosphere.gases import DEPOLARIZATION, rayleigh_phase
 from fifesim.atmosphere.lookup import once_on_nodes, scattered_once
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
-from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
 from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument
+from verification import tables
 from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "atmosphere")
@@ -80,7 +80,7 @@ def _polarized():
     """Check polarized light of molecules."""
     # 60 layers of constant source are good to 5e-4 at a grazing view, and to 1e-3 in the contribution of bright ground
     # there.
-    table = files.table("verification/polarized_molecules.csv")
+    table = tables.table("polarized_molecules.csv")
     mu_s = table["mu_s"][0]
     black, bright = table[table["ground"] == 0], table[table["ground"] > 0]
     found = mu_s * _reflectance(black, mu_s, 0.5, 1.0, _PURE_RAYLEIGH, lambda cosine: 0.75 * (1 + cosine**2))
@@ -94,10 +94,10 @@ def _polarized():
     added = bright["intensity"].to_numpy() - dark.to_numpy()
     worst = 100 * largest(found, added, relative=True)
     yield _deviation("and over bright ground", worst, 0.12, "%", "Natraj et al. (2009)")
-    series = files.table("verification/spheres_expansion.csv")
+    series = tables.table("spheres_expansion.csv")
     coefficients = series[["beta", "alpha", "zeta", "gamma"]].to_numpy()
     moments = coefficients / (2 * series["order"].to_numpy()[:, None] + 1)
-    table = files.table("verification/spheres_radiance.csv")
+    table = tables.table("spheres_radiance.csv")
     found = 0.6 * _reflectance(table, 0.6, 1.0, 0.973527, moments, lambda cosine: legval(cosine, coefficients[:, 0]))
     yield _deviation("polarized light of spheres", largest(found, table["intensity"]), 6e-5, "1", "Siewert (2000)")
 
@@ -140,11 +140,11 @@ _PATH_WEIGHTS = 0.3, 0.6  # of molecules and aerosol; a tenth is from the target
 
 def _functions():
     """Check the environment function against the published one and against 6S, the latter by its transmittances."""
-    nadir = files.table("verification/sixs_environment.csv")
+    nadir = tables.table("sixs_environment.csv")
     found = adjacency.environment_function(1000 * nadir["radius"].to_numpy())
     worst = largest(found, nadir[["molecules", "aerosol"]].to_numpy().T)
     yield _deviation("environment function, nadir", worst, 1e-6, "1", "6SV1.1")
-    table = {name: column.to_numpy() for name, column in files.table("verification/sixs_adjacency.csv").items()}
+    table = {name: column.to_numpy() for name, column in tables.table("sixs_adjacency.csv").items()}
     up = table["diffuse_up_molecules"], table["diffuse_up_aerosol"]
     share = adjacency.mixed_environment_function(1000 * table["radius"], table["vza"], *up)
     without_scattering = largest(adjacency.mixed_environment_function(60.0, 0.0, 0.0, 0.0), 1.0)
@@ -227,7 +227,7 @@ def _part_of_a_scene():
 
 def _discs():
     """Check discs against 6S by its transmittances; the middle of each disc is the centre of a block of 60 m."""
-    table = files.table("verification/sixs_adjacency.csv").query("0.3 <= radius <= 1.5").iloc[::5]
+    table = tables.table("sixs_adjacency.csv").query("0.3 <= radius <= 1.5").iloc[::5]
     worst = 0.0
     for row in table.itertuples():
         half = int(row.radius * 1000 / 20) + 7

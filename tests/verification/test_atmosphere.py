@@ -10,8 +10,7 @@ from broken import exceeded
 
 from fifesim.atmosphere import engines, lookup
 from fifesim.atmosphere.engines import mixed_scattering
-from fifesim.base import files
-from verification import atmosphere
+from verification import atmosphere, tables
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -19,10 +18,10 @@ DATA = Path(__file__).parents[1] / "data"
 @pytest.mark.slow
 def test_successive_orders_without_polarization_agree_with_scalar_6s(monkeypatch):
     """Scalar 6S is not always self-consistent, so its table has fewer cases."""
-    scalar, table = pd.read_csv(DATA / "sixs_scalar.csv", comment="#"), files.table
+    scalar, table = pd.read_csv(DATA / "sixs_scalar.csv", comment="#"), tables.table
     monkeypatch.setitem(engines.SCATTERING, "successive-orders", partial(mixed_scattering, polarized=False))
     monkeypatch.setattr(engines, "_band_terms", engines._band_terms.__wrapped__)
-    monkeypatch.setattr(files, "table", lambda name: scalar if name.endswith("sixs_grid.csv") else table(name))
+    monkeypatch.setattr(tables, "table", lambda name: scalar if name == "sixs_grid.csv" else table(name))
     assert len(list(atmosphere._successive_orders())) == 8
     assert exceeded(atmosphere._successive_orders) == []
 

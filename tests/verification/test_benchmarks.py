@@ -9,8 +9,7 @@ from broken import exceeded
 
 from fifesim.atmosphere import column as phase_expansion
 from fifesim.atmosphere import gases, successive_orders
-from fifesim.base import files
-from verification import benchmarks, canopy
+from verification import benchmarks, canopy, tables
 
 
 def test_all_views_of_the_references_are_compared():
@@ -32,16 +31,16 @@ def test_all_views_of_the_references_are_compared():
     ],
 )
 def test_reference_changed_in_one_place_is_named(monkeypatch, check, name, column, row, factor, said):
-    right = files.table
+    right = tables.table
 
     def wrong(path):
         table = right(path)
-        if path == f"verification/{name}.csv":
+        if path == f"{name}.csv":
             table = table.copy()
             table.loc[table.index[row], column] *= factor
         return table
 
-    monkeypatch.setattr(benchmarks.files, "table", wrong)
+    monkeypatch.setattr(tables, "table", wrong)
     assert said in exceeded(check)
 
 

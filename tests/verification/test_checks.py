@@ -11,6 +11,7 @@ from broken import exceeded, notices
 
 from fifesim.atmosphere import adjacency, column
 from verification import areas, atmosphere, canopy, scattering
+from verification.deviations import largest, rms_percent
 
 TABLE = Path(__file__).parents[1] / "data" / "broken_kernels.csv"
 BROKEN = pd.read_csv(TABLE, comment="#", keep_default_na=False, dtype=str)
@@ -79,3 +80,9 @@ def test_sum_over_blocks_of_the_wrong_sign_is_detected(monkeypatch):
     right = adjacency._add_moments
     monkeypatch.setattr(adjacency, "_add_moments", lambda values, *given: right(-values, *given))
     assert exceeded(scattering._direct_sums) == ["environment of cells"]
+
+
+def test_deviation_is_nan_where_a_result_is_nan():
+    assert np.isnan(largest([1.0, np.nan], 1.0))
+    assert largest([1.0, 4.0], [2.0, 2.0]) == 2.0 and largest([1.0, 4.0], [2.0, 4.0], relative=True) == 0.5
+    assert rms_percent([1.03, 0.96], 1.0) == pytest.approx(np.sqrt((9 + 16) / 2), rel=1e-12)

@@ -3,7 +3,8 @@ Comparison with published benchmarks
 ====================================
 
 The figures compare fifesim with published results of other codes: polarized sky light, surfaces below an atmosphere,
-and a canopy of discs. :doc:`/benchmarks` explains the results.
+and a canopy of discs. :doc:`/benchmarks` explains the results. The script runs in a checkout of the repository, with
+``tests`` on the path of Python: the comparisons are in ``tests/verification``.
 """
 
 # sphinx_gallery_thumbnail_number = 2

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from verification import tables
 
-from fifesim.base import files
 from fifesim.ground.canopy.crowns import check_crowns, clumped, crown_shares, lai_in_crowns
 from fifesim.ground.canopy.sail_model import sail, with_background
 
@@ -70,7 +70,7 @@ def test_crowns_are_reciprocal():
 
 def test_crowns_agree_with_rami_het01_better_than_a_plain_canopy():
     """Spheres of leaves by Eradiate: within 14 %, whereas a plain canopy is 14 to 36 % too bright."""
-    table = files.table("verification/spheres_of_leaves.csv")
+    table = tables.table("spheres_of_leaves.csv")
     angles = 20.0, table["vza"].to_numpy(), table["raa"].to_numpy()
     given = {"sza": 20.0, "vza": angles[1], "raa": angles[2], "hotspot": 0.01}
     canopy = sail(lai_in_crowns(2.356, 0.4712), 0.4957, 0.4409, **given)

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from verification import tables
 from verification.benchmarks import (
     RAMI_AEROSOL,
     RAMI_GROUND,
@@ -20,7 +21,7 @@ from fifesim.ground.canopy.leaf_transfer import discrete_ordinates
 from fifesim.ground.canopy.sail_model import sail, with_background
 
 TABLE = pd.read_csv(Path(__file__).parents[2] / "data" / "canopy_hemispherical.csv", comment="#")
-BRF = pd.read_csv(Path(__file__).parents[3] / "data" / "verification" / "canopy_transfer.csv", comment="#")
+BRF = tables.table("canopy_transfer.csv")
 GREEN = 0.45, 0.42
 
 

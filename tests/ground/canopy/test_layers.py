@@ -5,8 +5,8 @@ import pytest
 from oracles_canopy import turned_leaves
 from scipy.integrate import quad
 from scipy.linalg import expm
+from verification import tables
 
-from fifesim.base import files
 from fifesim.ground.canopy.layers import (
     FPAR_INF,
     beer_fpar,
@@ -45,7 +45,7 @@ def check_equal(found, expected, atol=1e-12):
 
 def test_two_layers_agree_with_4sail2():
     """Reference layers by prosail, added; seven decimals, and leaf angle fractions accurate to 1e-8."""
-    for row in files.table("verification/two_layers.csv").itertuples():
+    for row in tables.table("two_layers.csv").itertuples():
         canopy = two_layers(
             row.lai, row.rho_green, row.tau_green, row.rho_brown, row.tau_brown, brown=row.brown, sza=row.sza,
             dissociation=row.dissociation, vza=row.vza, raa=row.raa, hotspot=row.hotspot,

@@ -1,5 +1,5 @@
 """
-Make verification/sail.csv, canopies by another implementation of SAIL.
+Make sail.csv, canopies by another implementation of SAIL.
 
 Needs prosail. Leaf angles are Verhoef's, in 18 classes; there is no hot spot. Run it in this folder.
 """
@@ -38,6 +38,6 @@ if __name__ == "__main__":
     columns = ["a", "b", "leaf_reflectance", "leaf_transmittance", "lai", "sza", "vza", "raa", "background"]
     columns += ["rdd", "rsd", "rdo", "rso", "tss"]
     table = pd.DataFrame(canopies(60, seed=20), columns=columns)
-    with open("verification/sail.csv", "w", encoding="utf-8") as sink:
+    with open("sail.csv", "w", encoding="utf-8") as sink:
         sink.write(HEADER)
         table.to_csv(sink, index=False, float_format="%.12g", lineterminator="\n")

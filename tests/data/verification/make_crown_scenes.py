@@ -1,7 +1,7 @@
 """
-Make verification/crown_scenes.csv: crowns full of discs, leaf by leaf, by Monte Carlo.
+Make crown_scenes.csv: crowns full of discs, leaf by leaf, by Monte Carlo.
 
-Takes ten minutes. Run it in this folder. It reads the places of the crowns in verification/crown_places.csv.
+Takes ten minutes. Run it in this folder. It reads the places of the crowns in crown_places.csv.
 """
 
 import math
@@ -261,7 +261,7 @@ def scene_of(name, seed):
     """What `_reflectance` takes of a scene."""
     about, rng = SCENES[name], np.random.default_rng(seed)
     (width, top), shapes = about["size"], list(about["crowns"])
-    table = pd.read_csv("verification/crown_places.csv", comment="#").query("scene == @name")
+    table = pd.read_csv("crown_places.csv", comment="#").query("scene == @name")
     crowns = table[["x", "y", "z"]].to_numpy(float) + [width / 2, width / 2, 0]
     kinds = table["shape"].map(shapes.index).to_numpy()
     tables, optics = [], []
@@ -301,7 +301,7 @@ def reflectance(name, views=VIEWS, paths=100_000, seed=1):
 
 if __name__ == "__main__":
     found = pd.concat([reflectance(name).assign(scene=name) for name in SCENES])
-    with open("verification/crown_scenes.csv", "w", encoding="utf-8") as sink:
+    with open("crown_scenes.csv", "w", encoding="utf-8") as sink:
         sink.write(HEADER)
         columns = ["scene", "vza", "raa", "brf", "sd"]
         found[columns].to_csv(sink, index=False, float_format="%.5g", lineterminator="\n")
