@@ -89,6 +89,16 @@ def test_missing_table_is_named():
         files.path("no_such.csv")
 
 
+def test_file_is_on_the_disk_before_it_gets_its_name(tmp_path, monkeypatch):
+    """A power cut leaves the old file or the new one."""
+    done, flush, replace = [], os.fsync, os.replace
+    monkeypatch.setattr(os, "fsync", lambda number: (done.append(os.stat(number).st_ino), flush(number)))
+    monkeypatch.setattr(os, "replace", lambda new, path: (done.append("named"), replace(new, path)))
+    with whole_file(tmp_path / "a.txt") as new:
+        new.write_text("new")
+    assert done == [(tmp_path / "a.txt").stat().st_ino, "named", tmp_path.stat().st_ino]
+
+
 def test_file_is_replaced_by_a_complete_one_only(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("old")

@@ -387,7 +387,7 @@ def test_changed_bytes_of_a_file_are_rejected(tmp_path, retrieval):
     path, random = tmp_path / "mine.nc", np.random.default_rng(5)
     retrieval.to_netcdf(path)
     whole = path.read_bytes()
-    places = [*random.integers(0, len(whole), 40).tolist(), *range(len(whole) - 90, len(whole))]
+    places = [*range(len(whole) - 90, len(whole)), *random.integers(0, len(whole), 40).tolist()]
     damaged = [whole[:at] + bytes([whole[at] ^ 1 << int(random.integers(8))]) + whole[at + 1 :] for at in places]
     for content in (*damaged, whole[:-1], whole + b"0", whole[: len(whole) // 2], b""):
         path.write_bytes(content)

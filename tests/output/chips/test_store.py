@@ -1,6 +1,7 @@
 """Stores of chips: sharded Zarr that xarray opens."""
 
 import json
+import shutil
 import warnings
 from itertools import pairwise
 
@@ -96,6 +97,18 @@ def test_checksums_find_a_changed_byte_and_a_missing_file(made, tmp_path):
     path.unlink()
     with pytest.raises(OSError):
         checksums(tmp_path, names, 1)
+
+
+
+@pytest.mark.parametrize("name", ["chip/c/0", "sza/c/0", "lai/c/0/0/0"])
+def test_damaged_numbers_of_chips_are_not_read(made, tmp_path, name):
+    """Without checksums, many of these bits change numbers of the dataset."""
+    path = shutil.copytree(made[0], tmp_path / "chips") / name
+    whole = path.read_bytes()
+    for at in range(0, len(whole), max(len(whole) // 40, 1)):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+        with pytest.raises(ValueError, match=r"[Cc]hecksum"):
+            xr.open_zarr(tmp_path / "chips")[name.split("/")[0]].load()
 
 
 @pytest.mark.parametrize(
