@@ -137,6 +137,8 @@ def _check_finished(folder, chips):
             f"{folder} holds a finished dataset of {found} chips, not {len(chips)}: give that number, name another "
             "folder with -o, or make it again with --overwrite"
         )
+    if lacking := store.incomplete_variables(folder):
+        raise ValueError(f"{folder} lacks files of {', '.join(lacking)}: make it again with --overwrite")
 
 
 def _make(chips, layout, folder, as_json, makers):

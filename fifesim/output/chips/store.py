@@ -219,6 +219,18 @@ def chips_in(folder):
     return zarr.open_array(folder, path="chip", mode="r").shape[0]
 
 
+def incomplete_variables(folder):
+    """Names of the variables of chips without the file of a shard, whose numbers would be read as no data."""
+    import zarr  # slow, and few runs write chips
+
+    found = []
+    for name, array in zarr.open_group(folder, mode="r").arrays():
+        if "_FillValue" in array.attrs or str(array.fill_value) == "nan":
+            shards = range(-(-array.shape[0] // (array.shards or array.chunks)[0]))
+            found += [name] * (not all(_file(folder / name / "c" / str(shard)).is_file() for shard in shards))
+    return sorted(found)
+
+
 def write_shard(folder, first, arrays):
     """Write a shard."""
     import zarr  # slow, and few runs write chips

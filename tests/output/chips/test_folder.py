@@ -128,6 +128,11 @@ def test_resuming_a_finished_dataset_computes_nothing(study, whole, tmp_path, mo
     with pytest.raises(ValueError, match=r"of another scenario, with seed = 5.*--overwrite"):
         dataset_to_folder(other, folder, COUNT, resume=True)
     assert contents(folder) == contents(whole)
+    for name in ("dn", "lai"):
+        (folder / name / "c" / "1" / "0" / "0").rename(tmp_path / name)
+    shutil.rmtree(folder / "sza" / "c")
+    with pytest.raises(ValueError, match=r"lacks files of dn, lai, sza: make it again with --overwrite"):
+        dataset_to_folder(study, folder, COUNT, resume=True)
 
 
 def test_truncated_shards_are_ignored(study, whole, tmp_path, monkeypatch):
