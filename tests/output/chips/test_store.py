@@ -99,7 +99,6 @@ def test_checksums_find_a_changed_byte_and_a_missing_file(made, tmp_path):
         checksums(tmp_path, names, 1)
 
 
-
 @pytest.mark.parametrize("name", ["chip/c/0", "sza/c/0", "lai/c/0/0/0"])
 def test_damaged_numbers_of_chips_are_not_read(made, tmp_path, name):
     """Without checksums, many of these bits change numbers of the dataset."""
