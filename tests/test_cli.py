@@ -174,7 +174,7 @@ def test_sensors_check_summarizes_a_file(invoke, tmp_path):
         ),
         ('[terrain]\ndem = "missing.tif"\n', "missing.tif"),
         ("[ground\n", "not valid TOML"),
-        ("[grid]\ncell = 0.01\n", "too large for the memory"),
+        ("[grid]\ncell = 0.2\n", "too large for the memory"),
         ("[terrain]\nhorizon_reach = 100000\n", "50000"),
     ],
 )
