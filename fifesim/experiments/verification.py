@@ -190,8 +190,9 @@ def _moist_soil(dry, moisture, band):
     return moistened(np.array([dry]), np.array([moisture]), water_films((response,)))[..., 0].item()
 
 
-def _absorbed(part, **canopy):
-    return getattr(light_budget(**canopy), part)
+def _light_budget(part, **canopy):
+    budget = light_budget(**canopy)
+    return sum(budget) if part == "all" else getattr(budget, part)
 
 
 def _elevation(cells, cell=30.0):
@@ -353,7 +354,7 @@ COMPARED = {
     "two layers": _two_layers,
     "crowns": _crowns,
     "extinction": extinction_coefficient,
-    "light budget": _absorbed,
+    "light budget": _light_budget,
     "moist soil": _moist_soil,
     "plane": _tilted,
     "valley": _valley_sky,
@@ -383,7 +384,7 @@ COMPARED = {
     "line": _line,
     "Ross-Li": ross_li,
     "slope correction": _slope_corrected,
-    "NDVI curvature": lambda red, nir: ndvi_hessian(red, nir)[0, 0],
+    "NDVI curvature": lambda of, red, nir: ndvi_hessian(red, nir)[*of],
     "SL2P": _networks,
     "light-use production": light_use_gpp,
     "production of leaves": canopy_photosynthesis,
