@@ -49,7 +49,9 @@ def read_csv(path, what):
         try:
             return pd.read_csv(path, comment="#", skipinitialspace=True, index_col=False)
         except pd.errors.ParserWarning:
-            raise ValueError("rows have more values than the first line has names; name all columns") from None
+            raise ValueError(
+                "rows have more values than the first line has names; name all columns, and write decimals with a point"
+            ) from None
 
 
 @contextmanager

@@ -38,7 +38,7 @@ def test_aerosol_file_is_found_next_to_the_scenario(tmp_path, monkeypatch):
     for wrong, message in (
         ({"aerosol": "mine.nc"}, "must be given as aot"),
         ({"aerosol": "mine.nc", "visibility": 23}, "must be given as aot, from 0 to 2, got visibility=23"),
-        ({"aerosol": "other.nc", "aot": 0.3}, "other.nc' does not exist"),
+        ({"aerosol": "other.nc", "aot": 0.3}, "other.nc: there is no such file"),
     ):
         with pytest.raises(ValueError, match=message):
             fifesim.Scenario(atmosphere=wrong)

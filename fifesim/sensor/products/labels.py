@@ -214,7 +214,7 @@ def calibrate(
     out = directions.with_geometry(grids.place(out, grids.geobox(dn)), geometry)
     out = out.assign_coords(coordinates_of_bands(bands, scales))
     out = out if time is None or time.ndim else out.assign_coords(time=((), time.values, cf.TIME_ATTRIBUTES))
-    found = {} if saturated in (None, nodata) else sensor_labels.number_of_pixels(dn.variable == saturated)
+    found = {} if saturated in (None, nodata) else sensor_labels.number_of_pixels(dn.variable == saturated)  # type: ignore[operator]
     return sensor_labels.labelled(out, dn.assign_attrs(found), description, f"calibrate: {description.name}")
 
 
