@@ -369,7 +369,7 @@ class Range(NamedTuple):
     highest: float
     usual: tuple[float, float] = (-np.inf, np.inf)
     others: Mapping[str, float] = {}
-    note: str = ""  # what else the number may have been meant as
+    note: str = ""  # another meaning that the number may have
 
 
 def likely_units(name, value, known):

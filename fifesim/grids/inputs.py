@@ -60,7 +60,7 @@ def opened(value):
     if isinstance(value, xr.DataArray):
         return value if cf.is_counts(value) or _CODES & value.attrs.keys() else unpacked(value)
     if isinstance(value, xr.Dataset):
-        # The attributes of a variable have precedence over those of the Dataset.
+        # Attributes of a variable have precedence over attributes of the Dataset.
         shared = {key: value.attrs[key] for key in STORAGE if key in value.attrs}
         own = {key: each for key, each in value.data_vars.items() if each.ndim >= 2}
         own = {key: each.assign_attrs(shared | each.attrs) if shared else each for key, each in own.items()}
@@ -235,7 +235,7 @@ def check_reflectance(values):
 
 
 def _are_most(found, values, axis=None):
-    """Whether more than half of the known values, or of those of a band, are found."""
+    """Whether more than half of the known values, of the block or of a band, are found."""
     return np.any(2 * np.count_nonzero(found, axis) > np.count_nonzero(~np.isnan(values), axis))
 
 
