@@ -128,8 +128,8 @@ def test_undeclared_fill_values_next_to_the_grid_are_refused(tmp_path, fill, for
 @pytest.mark.parametrize(
     ("name", "attrs", "message"),
     [
-        ("ndvi", {}, "ndvi is named 'ndvi', where leaf area index is needed"),
-        ("NDVI_2020", {}, "named 'NDVI_2020'"),
+        ("ndvi", {}, "ndvi is (named 'ndvi'|normalized .* by its name), where leaf area index is needed"),
+        ("NDVI_2020", {}, "NDVI_2020 is (named 'NDVI_2020'|normalized .* by its name), where"),
         (None, {"long_name": "MOD15A2H Fpar_500m"}, "named 'MOD15A2H Fpar_500m'"),
         ("b1", {"standard_name": "surface_altitude"}, "named 'surface_altitude'"),
         ("b1", {"long_name": "Surface reflectance band 4"}, "named 'Surface reflectance band 4'"),
