@@ -12,21 +12,14 @@ from pathlib import Path
 import jinja2
 import numpy as np
 import paper_deviations
+import paper_effects as effects
+from paper_effects import PASSAGES, READINGS, Case
 
 from fifesim.analysis.scaling import linearity_correlation
 from fifesim.chain.driver import Driver, cell_block_means
 from fifesim.experiments.friedl1995 import case as friedl1995
-from fifesim.experiments.friedl1995 import effects, table
-from fifesim.experiments.friedl1995.case import (
-    ALIGNED,
-    ARPS,
-    CELL,
-    NATIVE,
-    PASSAGES,
-    READINGS,
-    VARIABLES,
-    Case,
-)
+from fifesim.experiments.friedl1995 import table
+from fifesim.experiments.friedl1995.case import ALIGNED, ARPS, CELL, NATIVE, VARIABLES
 from fifesim.experiments.friedl1995.reproduction import SEED, reproduce_case
 from fifesim.experiments.friedl1995.table import cells_of
 from fifesim.output.report import fixed
@@ -71,7 +64,7 @@ def scenes(case):
         "run": {"realisations": REALISATIONS, "few": FEW, "seed": SEED, "cells": case.cells, "drift": case.drift,
                 "interval": case.interval, "pixels": int(found["pixel_lai"][0, 0].count())},
         "table2": {name: each.to_dict("records") for name, each in tables.items()},
-        "agreement": {name: table.agreement(each) for name, each in tables.items()},
+        "agreement": {name: effects.agreement(each) for name, each in tables.items()},
         "limits": effects.limits(*tables.values()),
         "text": {name: table.text_table(each).to_dict("records") for name, each in by_reading.items()},
         "spread": spread(case, range(SEED, SEED + REALISATIONS)),

@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+from paper_effects import READINGS, Case
 
 import fifesim
 from fifesim.analysis.scaling_labels import aggregate_blocks
@@ -13,7 +14,7 @@ from fifesim.base.times import SITE_ALTITUDE, SITE_LATITUDE, SITE_LONGITUDE, SIT
 from fifesim.chain.setup import image_of, reflectance_of
 from fifesim.chain.steps import ndvi
 from fifesim.experiments.friedl1995 import case as friedl1995
-from fifesim.experiments.friedl1995.case import CELL, READINGS, Case
+from fifesim.experiments.friedl1995.case import CELL
 from fifesim.experiments.friedl1995.table import line, paired
 from fifesim.ground.canopy import labels as canopy
 from fifesim.ground.canopy import optics_labels

@@ -9,7 +9,7 @@ live, are the lines of ``__init__.pyi``.
 from importlib import import_module
 from importlib.metadata import version
 
-from fifesim.accessor import PUBLIC, find
+from fifesim.accessor import PUBLIC, REMOVED, find
 from fifesim.base.messages import nearest
 
 __version__ = version("fifesim")
@@ -20,6 +20,8 @@ __all__ = ["__version__", *sorted(PUBLIC)]
 def __getattr__(name):
     if name == "atmosphere":
         return import_module("fifesim.atmosphere")
+    if name in REMOVED:
+        raise AttributeError(f"fifesim.{name} was removed: {REMOVED[name]}")
     if name not in PUBLIC:
         raise AttributeError(f"module 'fifesim' has no attribute {name!r}: {nearest(name, PUBLIC)}dir(fifesim) has all")
     globals()[name] = find(name)

@@ -158,7 +158,6 @@ from .scenario.studies import Study as Study
 from .scenario.studies import read_study as read_study
 from .scenario.chips import chips_of as chips_of
 from .experiments.friedl1995.reproduction import reproduce as reproduce
-from .experiments.friedl1995.figures import plot_reproduction as plot_reproduction
 from .experiments.verification import verify as verify
 from .chain.setup import Setup as Setup
 from .base.caches import clear_caches as clear_caches

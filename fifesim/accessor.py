@@ -48,6 +48,11 @@ def _table():
 
 PUBLIC = _table()
 
+# Removed public names and their replacements.
+REMOVED = {
+    "plot_reproduction": "fifesim.reproduce returns the data of Figures 3 to 9, and docs/paper_figures.py draws them",
+}
+
 
 @cache
 def find(name):
@@ -84,7 +89,9 @@ class _Accessor:
         return "\n".join(lines)
 
     def __getattr__(self, name):
-        if name in PUBLIC:
+        if name in REMOVED:
+            message = f"{name} was removed: {REMOVED[name]}"
+        elif name in PUBLIC:
             kinds = " or ".join(f"an xarray.{kind}" for kind in PUBLIC[name].methods_of)
             what = f"a method of {kinds}" if kinds else "no method of a raster"
             function = f"fifesim.{name} is the function"

@@ -194,9 +194,7 @@ def dataset_command(
 @app.command("reproduce")
 def reproduce_command(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("friedl1995"),
-    reading: Annotated[
-        str, typer.Option(help="Interpretation of Table 1: native, aligned, narrow, offset, blur-40.8 or blur-48.6.")
-    ] = "native",
+    reading: Annotated[str, typer.Option(help="Interpretation of Table 1: native or aligned.")] = "native",
     dem: Annotated[str, typer.Option(help="Elevation: flat, flint-hills (synthetic), or a raster file.")] = "flat",
     densities: Annotated[
         Path | None, typer.Option(help="Folder of LAI samples: burned-grazed.csv and so on; inferred by default.")
@@ -219,13 +217,13 @@ def reproduce_command(
     cells: Annotated[int | None, typer.Option(help="Cells (3.33 m) along the edge of a scene; 333 for TM.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the first realisation; the others count up.")] = 1995,
     scenes: Annotated[
-        bool, typer.Option("--scenes", help="Also write image, truth and scene of each scenario.")
+        bool, typer.Option("--scenes", help="Also simulate each scenario: image, truth and scene.")
     ] = False,
     overwrite: _Overwrite = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Reproduce Friedl et al. (1995). Writes table2.csv, figures 3 to 9, nine scenarios, report.html."""
+    """Reproduce Friedl et al. (1995). Writes table2.csv, data of Figures 3 to 9, nine scenarios, report.html."""
     start = time.monotonic()
 
     with importing():

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 import xarray as xr
 
 import fifesim
@@ -79,3 +80,11 @@ def test_repr_lists_methods_by_group(lai):
     assert "compare" in said and "comparison_table" not in said
     assert max(map(len, said.splitlines())) <= 100
     assert "to_geotiff" in repr(lai.to_dataset(name="lai").fifesim)
+
+
+def test_removed_name_states_its_replacement(lai):
+    for name, replacement in accessor.REMOVED.items():
+        for holder in (fifesim, lai.fifesim, lai.to_dataset(name="lai").fifesim):
+            with pytest.raises(AttributeError, match=rf"{name} was removed: {re.escape(replacement)}"):
+                getattr(holder, name)
+        assert name not in PUBLIC

@@ -190,7 +190,6 @@ def valid_calls(tmp_path_factory):
         "dataset": {"folder": folder / "chips.zarr", "n": 1, "overwrite": True},
         "explore": {"path": folder / "page.html", "overwrite": True},
         "reproduce": {"realisations": 1, "cells": 135},
-        "plot_reproduction": {"number": 6, "found": fifesim.reproduce(realisations=1, cells=135)},
         "read_study": {"path": "study.toml"},
         "read_scenario": {"path": "scenario.toml"},
         "read_instrument": {"path": "tm.toml"},

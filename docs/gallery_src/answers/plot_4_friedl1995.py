@@ -14,6 +14,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import paper_figures
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import fifesim
@@ -125,14 +126,15 @@ axes[0].invert_yaxis()
 # sphinx_gallery_end_ignore
 
 # %%
-# **Figures 3 to 9** for the first realisation. Figure 3 shows the leaf area distributions.
+# **Figures 3 to 9** for the first realisation, from the variables ``density``, ``cell_...`` and ``pixel_...`` of the
+# result. ``docs/paper_figures.py`` draws them. Figure 3 shows the leaf area distributions.
 
 # sphinx_gallery_start_ignore
 
 
 def show(number, reading="native"):
-    """Show a figure of the package in the gallery."""
-    canvas = FigureCanvasAgg(fifesim.plot_reproduction(number, found, reading=reading))
+    """Show a figure in the gallery."""
+    canvas = FigureCanvasAgg(paper_figures.plot(number, found, reading))
     canvas.figure.set_dpi(100)
     canvas.draw()
     plt.figure(figsize=canvas.figure.get_size_inches(), dpi=100).figimage(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -10,21 +11,17 @@ from typing import Annotated, Literal, TypeAlias
 import numpy as np
 import xarray as xr
 
-from fifesim.base.arguments import FilePath, FrozenDistribution, Kind, WholeNumber, is_path
+from fifesim.base.arguments import FilePath, FrozenDistribution, Kind, WholeNumber
 from fifesim.base.lattice import check_seed
 from fifesim.chain.driver import Driver, cell_block_means
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.case import ARPS, TABLE_1, VARIABLES, beside
+from fifesim.experiments.friedl1995.case import ALIGNED, ARPS, NATIVE, VARIABLES
 from fifesim.experiments.friedl1995.table import COEFFICIENTS, realise_scenes
-from fifesim.grids.files import to_geotiff
-from fifesim.ground.canopy.labels import canopy_fpar
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
 from fifesim.output import stac
-from fifesim.output.maps import write_style
 from fifesim.output.progress import steps
-from fifesim.scenario.scenario import read_scenario
-from fifesim.scenario.simulation import setup_of, simulate
+from fifesim.output.run_folder import simulate_to_folder
 from fifesim.scenario.toml import write_scenario
 
 # Values of leaf area at which densities are given.
@@ -111,12 +108,12 @@ REALISATIONS = 20
 
 def reproduce(
     *,
-    reading: Literal["native", "aligned", "narrow", "offset", "blur-40.8", "blur-48.6"] = "native",
+    reading: Literal["native", "aligned"] = "native",
     dem: LandPath = "flat",
     densities: Densities | None = None,
     optics: Annotated[FilePath | Mapping[str, tuple[float, float]], FILE_BY_BAND] | None = None,
     background: Annotated[FilePath | Mapping[str, float], FILE_BY_BAND] | None = None,
-    sensor: FilePath = TABLE_1,
+    sensor: FilePath = "TM",
     realisations: int = REALISATIONS,
     cells: int | None = None,
     seed: WholeNumber = SEED,
@@ -132,8 +129,8 @@ def reproduce(
 
     Parameters
     ----------
-    reading : {"native", "aligned", "narrow", "offset", "blur-40.8", "blur-48.6"}, optional
-        Interpretation of Table 1: position and spatial response of the pixels.
+    reading : {"native", "aligned"}, optional
+        Interpretation of Table 1: position of the pixels.
     dem : str or path, optional
         "flat", "flint-hills" (synthetic), or a raster file of elevation.
     densities : str, path or mapping of str, optional
@@ -176,7 +173,7 @@ def reproduce(
 
     See Also
     --------
-    fifesim.plot_reproduction
+    fifesim.budget
 
     Examples
     --------
@@ -185,8 +182,10 @@ def reproduce(
     >>> found["r2"].sel(reading="aligned", variable="lai").dims
     ('realisation', 'distribution', 'arp')
     """
-    given = {"dem": dem, "densities": densities, "optics": optics, "background": background}
-    case = friedl1995.case_of(reading, sensor=sensor, cells=cells, west=west, north=north, **given)
+    case = friedl1995.case_of(
+        reading=reading, dem=dem, densities=densities, optics=optics, background=background, sensor=sensor,
+        cells=cells, west=west, north=north,
+    )  # fmt: skip
     return reproduce_case(case, realisations, seed, each=lambda label: partial(steps, label=label))
 
 
@@ -195,7 +194,7 @@ def reproduce_case(case, realisations, seed, each=lambda label: iter):
     if realisations < 1:
         raise ValueError(f"realisations must be at least 1, got {realisations}")
     check_seed(seed)
-    pair = beside(case.reading)
+    pair = [case.reading, NATIVE if case.reading == ALIGNED else ALIGNED]
     found = realise_scenes(case, range(seed, seed + realisations), readings=pair, each=each("nine scenes"))
     scenes = shown_scenes(case, pair, seed, each=each("scenes of the figures"))
     out = found.merge(scenes).merge(_paper()).assign(density=densities(case))
@@ -221,55 +220,15 @@ def _paper():
 
 
 def write_scenarios(case, folder, seed, scenes=False, each=iter):
-    """Write the nine scenarios of a realisation, each into a folder such as ``burned-grazed-0.05``."""
-    check_named(case)
+    """Write the nine scenarios of a realisation, each into a folder such as ``burned-grazed-0.05``, or runs of them."""
     items = {}
     for treatment, arp in each(friedl1995.scenes()):
-        own = folder / f"{treatment}-{arp:g}"
-        own.mkdir(parents=True)
-        (own / "scenario.toml").write_text(scenario_text(case, own, treatment, arp, seed), encoding="utf-8")
+        own, scenario = folder / f"{treatment}-{arp:g}", case.scenario(treatment, arp, seed).complete()
         if scenes:
-            found = read_scenario(own / "scenario.toml")
-            _write_rasters(own, found)
-            items[f"{own.name}/item.json"] = stac.item(
-                found, own, f"{treatment}, arp {arp:g}, seen by {case.instrument.name}"
-            )
+            simulate_to_folder(scenario, own, scene=True)
+            items[f"{own.name}/item.json"] = json.loads((own / "item.json").read_text(encoding="utf-8"))
+        else:
+            own.mkdir(parents=True)
+            (own / "scenario.toml").write_text(write_scenario(scenario), encoding="utf-8")
     if items:
         stac.write_collection(folder, "friedl1995", "The nine scenes of Friedl et al. (1995), reproduced.", items)
-
-
-def scenario_text(case, own, treatment, arp, seed):
-    """TOML text of one of the nine scenarios; any instrument file of its reading is written to the same folder."""
-    scenario = case.scenario(treatment, arp, seed)
-    if not case.reading.other_response:
-        return write_scenario(scenario.complete())
-    name = f"{case.reading.name}.toml"
-    (own / name).write_text(case.reading.instrument_file(), encoding="utf-8")
-    sensor = scenario.sensor.model_copy(update={"instrument": str(own / name)})
-    complete = scenario.model_copy(update={"sensor": sensor}).complete()
-    # Relative path, so that both files can be moved together.
-    beside = complete.sensor.model_copy(update={"instrument": name})
-    return write_scenario(complete.model_copy(update={"sensor": beside}))
-
-
-def check_named(case):
-    """Raise ValueError for densities that are not files, because a scenario can only refer to files."""
-    for treatment, source in case.densities.items():
-        if not is_path(source):
-            raise ValueError(
-                f"densities: the density of {treatment} is not a file, as a scenario needs: write its samples to a CSV "
-                "file, or call fifesim.reproduce"
-            )
-
-
-def _write_rasters(own, scenario):
-    """Write image, truth and cells of a scenario, with styles."""
-    run, setup = simulate(scenario, chunks=None), setup_of(scenario)
-    lai, reflectance = run["scene"]["lai"], run["scene"]["surface_reflectance"]
-    fpar = canopy_fpar(lai, setup.canopy, geometry=setup.geometry, fpar_inf=scenario.ground.fpar_inf)
-    cells = {"lai": lai, "fpar": fpar}
-    for band in reflectance["band"].values:
-        cells[str(band)] = reflectance.sel(band=band).drop_vars(["band", "wavelength"], errors="ignore")
-    rasters = {"image": run["image"]["dn"], "truth": run["truth"].to_dataset(), "scene": xr.Dataset(cells)}
-    for name, raster in rasters.items():
-        write_style(to_geotiff(raster if name == "image" else raster.astype(np.float32), own / f"{name}.tif"))

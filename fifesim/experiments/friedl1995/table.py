@@ -1,4 +1,4 @@
-"""Table 2 of Friedl et al. (1995) over realisations, and its agreement with the published values."""
+"""Table 2 of Friedl et al. (1995) over realisations, compared with the published values."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -115,30 +115,6 @@ def table2(found):
     order = [name + suffix for suffix in ("", "_deviation", "_deviation_200") for name in COEFFICIENTS]
     columns = {name: columns[name] for name in ("variable", "distribution", "arp", *order)}
     return pd.DataFrame(columns | {f"paper_{name}": paper[name] for name in COEFFICIENTS})
-
-
-def agreement(table):
-    """Measures of the difference between a table and the published one, by variable and statistic."""
-    found = {}
-    for variable, rows in table.groupby("variable"):
-        r2 = rows["r2"] - rows["paper_r2"]
-        ratio = rows["slope"] / rows["paper_slope"]
-        factor = np.exp(np.log(ratio).mean()) if (ratio > 0).all() else np.nan
-        found |= {
-            f"{variable}_r2_rms": np.sqrt(np.mean(r2**2)),
-            f"{variable}_r2_largest": r2.abs().max(),
-            f"{variable}_r2_largest_long": r2[rows["arp"] == max(ARPS)].abs().max(),
-            f"{variable}_slope_rms": np.sqrt(np.mean((ratio - 1) ** 2)),
-            f"{variable}_slope_mean": (ratio - 1).mean(),
-            f"{variable}_slope_largest": (ratio - 1).abs().max(),
-            f"{variable}_slope_factor": factor,
-            f"{variable}_slope_rest": np.sqrt(np.mean((ratio / factor - 1) ** 2)),
-            f"{variable}_intercept_largest": (rows["intercept"] - rows["paper_intercept"]).abs().max(),
-        }
-    for name, suffix in (("if_sampled", "_deviation_200"), ("if_all", "_deviation")):
-        scores = [(table[each] - table[f"paper_{each}"]) / table[each + suffix] for each in COEFFICIENTS]
-        found[name] = np.sqrt(np.mean(np.square(scores)))
-    return {name: float(value) for name, value in found.items()}
 
 
 def text_table(found):

@@ -1,24 +1,11 @@
 """The default experiment with few realisations, and small scenes."""
 
-import jinja2
+import paper_effects as effects
 import pytest
 
 import fifesim
-from fifesim.experiments.friedl1995 import effects
-from fifesim.experiments.friedl1995.case import READINGS, case_of
-from fifesim.experiments.friedl1995.report import _TEMPLATE
+from fifesim.experiments.friedl1995.case import case_of
 from fifesim.experiments.friedl1995.reproduction import reproduce_case
-from fifesim.output.report import fixed
-
-
-@pytest.fixture(scope="session")
-def sentence():
-    """A function that renders a macro of the report's sentences."""
-    folder = jinja2.FileSystemLoader(_TEMPLATE.parent)
-    environment = jinja2.Environment(loader=folder, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["fixed"] = fixed
-    macros = environment.get_template("sentences.j2").module
-    return lambda name, *arguments: getattr(macros, name)(*arguments).strip()
 
 
 @pytest.fixture(scope="session")
@@ -37,11 +24,11 @@ def small():
 def effect_tables():
     """Effects of four readings, one size and an unchanged case, for one realisation of scenes of 10 x 10 pixels."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(effects, "SIZES", (333,))
+        patch.setattr(effects, "SIZES", (90,))
         few = ("native", "aligned", "offset", "blur-48.6")
-        patch.setattr(effects, "READINGS", {name: READINGS[name] for name in few})
+        patch.setattr(effects, "READINGS", {name: effects.READINGS[name] for name in few})
         patch.setattr(effects, "changes", lambda case: [effects.Change("itself", "1", "1", case)])
-        case = case_of(cells=90)
+        case = effects.Case(cells=90)
         made = {"readings": effects.readings, "sizes": effects.sizes, "sensitivity": effects.effects_of_numbers}
         return {name: function(case, [1]) for name, function in made.items()}
 

@@ -1,15 +1,12 @@
 """Table 2 over realisations, compared with the published values."""
 
-from dataclasses import replace
-
 import numpy as np
+import paper_effects as effects
 import pytest
 from scipy import stats
 
-from fifesim.chain.setup import image_of
-from fifesim.experiments.friedl1995 import effects
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.case import READINGS, Case
+from fifesim.experiments.friedl1995.case import ALIGNED, Case
 from fifesim.experiments.friedl1995.table import cells_of, paired, periodic_scene
 from fifesim.grids import grid as grids
 from fifesim.ground.landscape.distribution import lai_distribution
@@ -32,7 +29,7 @@ def test_regression_line_agrees_with_scipy():
 
 def test_table_2_agrees_with_the_paper(tables):
     """
-    Table 2 is within the limits that the report states.
+    Table 2 is within the limits that the page on the paper states.
 
     Three realisations of 1296 pixels leave standard errors of 0.012 in R2 and 2 % in slopes. The limits of single rows
     cover these errors in addition to the differences found over twenty realisations, 0.10 and 12 %.
@@ -80,32 +77,7 @@ def test_samples_of_all_pixels_have_no_scatter():
 def test_aligned_pixels_do_not_explain_the_paper(tables):
     """A literal reading leaves R2 near 0.8 and above, compared with 0.38 to 0.81 in the paper."""
     assert (tables["aligned"]["r2"] > 0.78).all()
-    assert friedl1995_table.agreement(tables["aligned"])["lai_r2_rms"] > 0.3
-
-
-def test_readings_share_their_ground():
-    """A reading gives the same numbers alone and together with other readings."""
-    options = {"distributions": ["burned-grazed"], "arps": [0.15]}
-    several = friedl1995_table.realise_scenes(Case(cells=90), [5], [READINGS["aligned"], READINGS["narrow"]], **options)
-    alone = friedl1995_table.realise_scenes(Case(cells=90, reading=READINGS["narrow"]), [5], **options)
-    np.testing.assert_array_equal(several["r2"].sel(reading="narrow"), alone["r2"].sel(reading="narrow"))
-    assert (several["r2"].sel(reading="aligned") != several["r2"].sel(reading="narrow")).all()
-
-
-def test_agreement_is_in_standard_deviations_and_includes_a_common_factor(tables):
-    """Published numbers with slopes 1.5 times as high, and R2 two standard deviations of a sample off."""
-    table = tables["native"].copy()
-    for name in friedl1995_table.COEFFICIENTS:
-        table[name] = table[f"paper_{name}"]
-        table[f"{name}_deviation_200"], table[f"{name}_deviation"] = 0.1, 0.02
-    table["r2"] += 0.2
-    found = friedl1995_table.agreement(table)
-    assert found["if_sampled"] == pytest.approx(np.sqrt(4 / 3), rel=1e-9)
-    assert found["if_all"] == pytest.approx(np.sqrt(100 / 3), rel=1e-9)
-    table["slope"] *= 1.5
-    found = friedl1995_table.agreement(table)
-    assert found["lai_slope_factor"] == pytest.approx(1.5) and found["lai_slope_rest"] == pytest.approx(0, abs=1e-12)
-    assert found["lai_slope_rms"] == pytest.approx(0.5) and found["fpar_slope_largest"] == pytest.approx(0.5)
+    assert effects.agreement(tables["aligned"])["lai_r2_rms"] > 0.3
 
 
 SCENE = ("burned-ungrazed", 0.24, 3)
@@ -136,21 +108,7 @@ def test_native_pixels_drift_from_the_truth_with_the_interval():
     drift = (native.affine * (15.5, 15.5))[0] - (blocks.affine * (15.5, 15.5))[0]
     assert drift == pytest.approx(15.5 * 0.315, rel=1e-6)
     assert case.drift == pytest.approx((native.shape.x - 1) * 0.315, rel=1e-9)
-    assert Case(cells=180, reading=READINGS["aligned"]).drift == 0
-
-
-def test_offset_pixels_see_the_ground_to_the_south_east():
-    """
-    The offset is two cells each way, so the image equals the aligned image of the scene without its first two rows and
-    columns.
-    """
-    case, scene = Case(cells=180, reading=READINGS["offset"]), Case(cells=180, reading=READINGS["aligned"])
-    reflectance = simulate(case.scenario(*SCENE))["scene"]["surface_reflectance"].compute()
-    moved = image_of(case.setup, reflectance)
-    aligned = image_of(replace(scene.setup, onto=None), reflectance[:, 2:, 2:])
-    # Sums over another window round differently, so that a value may cross the boundary between two counts.
-    off = abs(moved[:, :19, :19].values.astype(int) - aligned[:, :19, :19].values)
-    assert off.max() <= 1 and (off > 0).mean() < 0.005
+    assert Case(cells=180, reading=ALIGNED).drift == 0
 
 
 def test_pixels_are_paired_by_row_and_column_without_missing_data():

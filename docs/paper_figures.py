@@ -1,18 +1,12 @@
-"""Figures 3 to 9 of Friedl et al. (1995) and the numbers in their captions, from `fifesim.reproduce`."""
-
-from __future__ import annotations
-
-from typing import Annotated, TypeAlias
+"""Figures 3 to 9 of Friedl et al. (1995), from the result of `fifesim.reproduce`, for the gallery."""
 
 import numpy as np
-import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from fifesim.analysis import regression, scaling
-from fifesim.base.arguments import Kind
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.case import ALIGNED, NATIVE, VARIABLES
+from fifesim.experiments.friedl1995.case import VARIABLES
 
 # Colours of Okabe and Ito, suitable for colour-blind readers; dashes and markers differ in grey too.
 _COLORS = ("#0072B2", "#D55E00", "#009E73")
@@ -20,117 +14,59 @@ _DASHES = ("-", "--", ":")
 _BLACK, _GREY = "#222222", "#767676"
 _DOT = {"s": 9, "linewidths": 0, "alpha": 0.75}
 
-# Marker and colour of the first and of the second reading.
-_OF_READINGS = (("o", "#0072B2"), ("x", "#D55E00"))
-
 _LABELS = {"lai": "LAI [m² m⁻²]", "fpar": "FPAR", "ndvi": "NDVI"}
 _FIGURE_WIDTH = 7.2
 
-Reproduced: TypeAlias = Annotated[
-    xr.Dataset,
-    Kind(
-        "an xarray.Dataset, as fifesim.reproduce gives it",
-        lambda value: isinstance(value, xr.Dataset) and "paper_slope" in value.variables,
-        numbers=None,
-    ),
-]
-
 FIGURE_NUMBERS = range(3, 10)
-"""Numbers of the available figures."""
-
-BY_READING = (5, 6, 7, 9)
-"""Numbers of the figures that depend on the reading of Table 1."""
 
 
-def plot_reproduction(number: int, found: Reproduced, *, reading: str | None = None) -> Figure:
+def plot(number, found, reading="native"):
     """
-    Plot a figure of Friedl et al. (1995) from the reproduced experiment.
+    Plot a figure of the paper.
 
     Parameters
     ----------
     number : int
         3, densities of LAI; 4, LAI of the ground; 5, LAI and FPAR against NDVI; 6, densities of cells and pixels;
         7, relative equivalent noise; 8, scaling of NDVI; 9, reflectance of image and ground.
-    found : dataset
-        Result of `reproduce`.
+    found : xarray.Dataset
+        Result of `fifesim.reproduce`.
     reading : str, optional
-        Reading of Table 1 in ``found``; by default the first.
+        Reading of Table 1 in ``found``.
 
     Returns
     -------
     figure : matplotlib.figure.Figure
-
-    Raises
-    ------
-    ValueError
-        If the figure or reading is unknown.
-
-    See Also
-    --------
-    fifesim.reproduce
-
-    Examples
-    --------
-    >>> import fifesim
-    >>> found = fifesim.reproduce(reading="aligned", realisations=1, cells=90)
-    >>> figure = fifesim.plot_reproduction(9, found)
-    >>> len(figure.axes)
-    6
     """
-    if number not in FIGURE_NUMBERS:
-        raise ValueError(
-            f"number must be one of {', '.join(map(str, FIGURE_NUMBERS))}, the paper's figures, got {number}"
-        )
-    names = [str(name) for name in found["reading"].values]
-    reading = names[0] if reading is None else reading
-    if reading not in names:
-        raise ValueError(f"reading must be one of {', '.join(names)}, which were computed, got {reading!r}")
     return _DRAWN[number](found, reading)
-
-
-def table2_figure(tables):
-    """Figure of Table 2 by reading, compared with the published values."""
-    first = next(iter(tables.values()))
-    figure = Figure(figsize=(_FIGURE_WIDTH, 5.2), layout="constrained")
-    axes = figure.subplots(2, 3, sharey=True)
-    scenes = first[first["variable"] == "lai"]
-    labels = [f"{row.distribution.replace('-', ', ')}, {row.arp:g}" for row in scenes.itertuples()]
-    for line, variable in zip(axes, VARIABLES, strict=True):
-        for axis, name in zip(line, friedl1995_table.COEFFICIENTS, strict=True):
-            for (reading, table), (marker, color) in zip(tables.items(), _OF_READINGS, strict=True):
-                rows = table[table["variable"] == variable]
-                spread = rows[f"{name}_deviation"].fillna(0)
-                axis.errorbar(rows[name], range(len(rows)), xerr=spread, fmt=marker, color=color, ms=4, label=reading)
-            paper = first[first["variable"] == variable][f"paper_{name}"]
-            axis.plot(paper, range(len(paper)), "s", color=_BLACK, mfc="none", ms=7, label="paper")
-            axis.set_title(f"{variable.upper()}: {'R²' if name == 'r2' else name}", fontsize="medium")
-            axis.grid(axis="y", color="0.92")
-            axis.spines[["top", "right"]].set_visible(False)
-    axes[0, 0].invert_yaxis()
-    for axis in axes[:, 0]:
-        axis.set_yticks(range(len(labels)), labels, fontsize=8)
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
-    return figure
 
 
 def sample(found, reading, arp):
     """Sample of 200 pixels of a scene of the figures, by name, shape (n,)."""
     scene = found.sel(reading=reading, arp=arp)
     chosen = scene["sampled"].values.astype(bool)
-    return {name[6:]: scene[name].values[chosen] for name in scene.data_vars if str(name).startswith("pixel_")}
+    return {
+        name[6:]: scene[name].values[chosen]
+        for name in scene.data_vars
+        if str(name).startswith("pixel_")
+    }
 
 
 def _figure3(found, reading):
     """Densities of LAI of the three treatments."""
     figure = Figure(figsize=(4.6, 3.2), layout="constrained")
     axis = figure.subplots()
-    for (name, each), color, dash in zip(found["density"].groupby("distribution"), _COLORS, _DASHES, strict=True):
+    for (name, each), color, dash in zip(
+        found["density"].groupby("distribution"), _COLORS, _DASHES, strict=True
+    ):
         known = each.squeeze().dropna("leaf_area")
         at, low = known["leaf_area"].values, known.values[0]
         # Draw the density down to zero at its cutoff.
         axis.plot([at[0], *at, at[-1]], [0 if at[0] > 0 or low else low, *known.values, 0], dash, color=color,
                   label=str(name).replace("-", ", "))  # fmt: skip
-    _finish(axis, xlabel=_LABELS["lai"], ylabel="density [m² m⁻²]⁻¹", xlim=(0, None), ylim=(0, None))
+    _finish(
+        axis, xlabel=_LABELS["lai"], ylabel="density [m² m⁻²]⁻¹", xlim=(0, None), ylim=(0, None)
+    )
     axis.legend(frameon=False, fontsize=8)
     return figure
 
@@ -143,7 +79,9 @@ def _figure4(found, reading):
     for axis, arp in zip(axes, found["arp"].values, strict=True):
         shown = found["cell_lai"].sel(arp=arp).values[:120, :120]
         extent = np.array([0, shown.shape[1], 0, shown.shape[0]]) * size
-        drawn = axis.imshow(shown, cmap="YlGn", vmin=0, vmax=high, extent=extent, interpolation="nearest")
+        drawn = axis.imshow(
+            shown, cmap="YlGn", vmin=0, vmax=high, extent=extent, interpolation="nearest"
+        )
         axis.set(xlabel="easting [m]", title=f"arp {arp:g}")
         axis.title.set_fontsize(9)
         axis.xaxis.set_major_locator(MaxNLocator(4))
@@ -167,11 +105,17 @@ def _figure5(found, reading):
             fit = regression.fit(regression.row_sums(truth[None], toa[None], truth.mean(), toa.mean()), truth.mean(),
                                  toa.mean())  # fmt: skip
             at = np.linspace(toa.min(), toa.max(), 60)
-            axis.plot(at, fit.predict(at), "--", color=_BLACK, linewidth=1.3, label="line through TOA")
-            for limit, name in zip(fit.confidence_interval(at), ("95 % confidence", None), strict=True):
+            axis.plot(
+                at, fit.predict(at), "--", color=_BLACK, linewidth=1.3, label="line through TOA"
+            )
+            for limit, name in zip(
+                fit.confidence_interval(at), ("95 % confidence", None), strict=True
+            ):
                 axis.plot(at, limit, color=_BLACK, linewidth=0.9, label=name)
             low, high = fit.prediction_interval(at)
-            axis.fill_between(at, low, high, color=_GREY, alpha=0.2, linewidth=0, label="95 % prediction")
+            axis.fill_between(
+                at, low, high, color=_GREY, alpha=0.2, linewidth=0, label="95 % prediction"
+            )
             title = f"arp {arp:g}: R² = {fit.r2:.2f} (TOA), {np.corrcoef(boa, truth)[0, 1] ** 2:.3f} (BOA)"
             _finish(axis, xlabel=_LABELS["ndvi"], ylabel=_LABELS[variable], title=title)
     _legend_below(figure, axes[0, 0])
@@ -188,8 +132,12 @@ def _figure6(found, reading):
         options = {"reflect": variable != "ndvi"}
         at = np.linspace(cells.min(), cells.max(), 500)
         counts, edges = np.histogram(cells, bins=400)
-        bandwidth = scaling.silverman_bandwidth(cells.std(), np.subtract(*np.percentile(cells, (75, 25))), cells.size)
-        of_cells = scaling.gaussian_density((edges[1:] + edges[:-1]) / 2, at, bandwidth, counts, **options)
+        bandwidth = scaling.silverman_bandwidth(
+            cells.std(), np.subtract(*np.percentile(cells, (75, 25))), cells.size
+        )
+        of_cells = scaling.gaussian_density(
+            (edges[1:] + edges[:-1]) / 2, at, bandwidth, counts, **options
+        )
         axis.plot(at, of_cells, color=_BLACK, linewidth=1, label="cells")
         for arp, color, dash in zip(found["arp"].values, _COLORS, _DASHES, strict=True):
             values = sample(found, reading, arp)
@@ -197,7 +145,13 @@ def _figure6(found, reading):
             axis.plot(at, of_pixels, dash, color=color, label=f"pixels, arp {arp:g}")
             if variable == "ndvi":
                 smooth = scaling.sample_density(values["analogue_ndvi"], at)
-                axis.plot(at, smooth, color=_GREY, linewidth=0.9, label="before quantisation" if arp == first else None)
+                axis.plot(
+                    at,
+                    smooth,
+                    color=_GREY,
+                    linewidth=0.9,
+                    label="before quantisation" if arp == first else None,
+                )
         unit = " [m² m⁻²]⁻¹" if variable == "lai" else ""
         _finish(axis, xlabel=_LABELS[variable], ylabel=f"density {unit}", ylim=(0, None))
     _legend_below(figure, figure.axes[-1])
@@ -208,12 +162,19 @@ def _figure7(found, reading):
     """Relative equivalent noise by increments of LAI and FPAR."""
     figure = Figure(figsize=(_FIGURE_WIDTH, 3.0), layout="constrained")
     for axis, variable in zip(figure.subplots(1, 2), VARIABLES, strict=True):
-        for arp, color, dash, marker in zip(found["arp"].values, _COLORS, _DASHES, "osD", strict=True):
-            values, increment = sample(found, reading, arp), friedl1995_table.INCREMENTS[variable]
+        for arp, color, dash, marker in zip(
+            found["arp"].values, _COLORS, _DASHES, "osD", strict=True
+        ):
+            values, increment = (
+                sample(found, reading, arp),
+                friedl1995_table.INCREMENTS[variable],
+            )
             at, noise = friedl1995_table.mean_noise(values[variable], values["ndvi"], increment)
             axis.plot(at, noise, dash, color=color, marker=marker, markersize=4, linewidth=1.2,
                       label=f"arp {arp:g}, mean {noise.mean():.2f}")  # fmt: skip
-        _finish(axis, xlabel=_LABELS[variable], ylabel=f"REN of {variable.upper()}", ylim=(0, None))
+        _finish(
+            axis, xlabel=_LABELS[variable], ylabel=f"REN of {variable.upper()}", ylim=(0, None)
+        )
         axis.legend(frameon=False, fontsize=8)
     return figure
 
@@ -224,14 +185,18 @@ def _figure8(found, reading):
     axes = figure.subplots(2, found.sizes["arp"], height_ratios=(1.25, 1))
     for column, arp in zip(axes.T, found["arp"].values, strict=True):
         values = sample(found, reading, arp)
-        mean, of_mean, red, nir = (values[name] for name in ("boa_ndvi", "ndvi_of_mean", "boa_red", "boa_nir"))
+        mean, of_mean, red, nir = (
+            values[name] for name in ("boa_ndvi", "ndvi_of_mean", "boa_red", "boa_nir")
+        )
         column[0].scatter(mean, of_mean, color=_COLORS[0], **_DOT)
         ends = np.array([mean.min(), mean.max()])
         column[0].plot(ends, ends, color=_BLACK, linewidth=0.9)
         column[0].set_title(f"arp {arp:g}")
         column[0].set_aspect("equal", "datalim")
         mixed = values["red_nir"] - red * nir
-        covariance = np.array([[values["red_red"] - red**2, mixed], [mixed, values["nir_nir"] - nir**2]])
+        covariance = np.array(
+            [[values["red_red"] - red**2, mixed], [mixed, values["nir_nir"] - nir**2]]
+        )
         predicted = -scaling.second_order_bias(scaling.ndvi_hessian(red, nir), covariance)
         column[1].axhline(0, color=_BLACK, linewidth=0.9)
         column[1].scatter(mean, of_mean - mean, color=_COLORS[0], label="simulated", **_DOT)
@@ -257,7 +222,9 @@ def _figure9(found, reading):
             boa, toa, clear = (values[f"{kind}_{name}"] for kind in ("boa", "toa", "clear"))
             axis.scatter(boa, toa, color=_COLORS[1], label="simulated image", **_DOT)
             at, order = np.array([boa.min(), boa.max()]), np.argsort(boa)
-            axis.plot(boa[order], clear[order], color=_BLACK, linewidth=1.1, label="atmosphere alone")
+            axis.plot(
+                boa[order], clear[order], color=_BLACK, linewidth=1.1, label="atmosphere alone"
+            )
             axis.plot(at, at, ":", color=_GREY, linewidth=1, label="1 : 1")
             title = f"arp {arp:g}: R² = {np.corrcoef(boa, toa)[0, 1] ** 2:.2f}"
             _finish(axis, xlabel=f"{words}, ground", title=title)
@@ -266,13 +233,21 @@ def _figure9(found, reading):
     return figure
 
 
-_DRAWN = dict(zip(FIGURE_NUMBERS, (_figure3, _figure4, _figure5, _figure6, _figure7, _figure8, _figure9), strict=True))
+_DRAWN = dict(
+    zip(
+        FIGURE_NUMBERS,
+        (_figure3, _figure4, _figure5, _figure6, _figure7, _figure8, _figure9),
+        strict=True,
+    )
+)
 
 
 def _legend_below(figure, axis):
     """One legend for all panels, below the figure."""
     names = axis.get_legend_handles_labels()
-    figure.legend(*names, loc="outside lower center", ncols=len(names[0]), frameon=False, fontsize=8)
+    figure.legend(
+        *names, loc="outside lower center", ncols=len(names[0]), frameon=False, fontsize=8
+    )
 
 
 def _finish(axis, **properties):
@@ -284,38 +259,3 @@ def _finish(axis, **properties):
         each.label.set_fontsize(9)
         each.set_major_locator(MaxNLocator(5))
     axis.spines[["top", "right"]].set_visible(False)
-
-
-# Minimum height of a peak relative to the highest.
-_PEAK = 0.05
-
-
-def peaks(values):
-    """Number of peaks of the density of a sample."""
-    found = scaling.sample_density(values, np.linspace(values.min(), values.max(), 500))
-    rises = (found[1:-1] > found[:-2]) & (found[1:-1] >= found[2:]) & (found[1:-1] > _PEAK * found.max())
-    return int(rises.sum())
-
-
-def scatter(found, reading, band):
-    """Scatter, 1 - R2, of the reflectance of all pixels about its line on the surface reflectance, shape (arp,). [1]"""
-    scenes = found.sel(reading=reading)
-    pairs = zip(scenes[f"pixel_boa_{band}"].values, scenes[f"pixel_toa_{band}"].values, strict=True)
-    return np.array([1 - np.corrcoef(boa[np.isfinite(toa)], toa[np.isfinite(toa)])[0, 1] ** 2 for boa, toa in pairs])
-
-
-def drift_share(found):
-    """Share of the scatter of reflectance removed by co-registration of pixels and blocks, shape (band, arp). [1]"""
-    return np.array(
-        [1 - scatter(found, ALIGNED.name, band) / scatter(found, NATIVE.name, band) for band in ("red", "nir")]
-    )
-
-
-def caption_numbers(found, reading):
-    """Numbers in the captions: peaks of the densities at the smallest arp, and the share of drift in the scatter."""
-    arp = float(found["arp"].values[0])
-    values = sample(found, reading, arp)
-    numbers = {"arp": arp, "values": np.unique(values["ndvi"]).size, "drift": found.attrs["drift"]}
-    numbers |= {f"{name}_peaks": peaks(values[name]) for name in ("lai", "ndvi", "analogue_ndvi")}
-    both = {NATIVE.name, ALIGNED.name} <= set(found["reading"].values.tolist())
-    return numbers | {"share": drift_share(found) if both else None}
