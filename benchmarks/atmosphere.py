@@ -11,7 +11,7 @@ import xarray as xr
 from timing import both_times, seconds
 
 import fifesim
-from fifesim.atmosphere import engines, six_s
+from fifesim.atmosphere import engines
 
 CELLS = 3000
 
@@ -23,7 +23,6 @@ def terms_of_a_band(engine, band, repeat):
     def call():
         engines.band_terms(fifesim.Atmosphere(visibility=next(visibilities), engine=engine), (band,), 35.0, 10.0, 60.0)
 
-    # 6S runs in a separate process.
     return both_times(call, repeat)[1]
 
 
@@ -50,10 +49,7 @@ def modis_year(count=24):
 def main():
     band = fifesim.instrument("TM").select("TM1")[0].response
     print("| terms of TM1, one geometry | ms |\n|---|---|")
-    for engine, repeat in (("5S", 9), ("successive-orders", 5), ("6S", 3)):
-        if engine == "6S" and six_s.Py6S is None:
-            print("| 6S | not installed |")
-            continue
+    for engine, repeat in (("5S", 9), ("successive-orders", 5)):
         print(f"| {engine} | {1e3 * terms_of_a_band(engine, band, repeat):.1f} |")
     grid = fifesim.fife_site(30 / 9, window=((0, CELLS), (0, CELLS)))
     lai = fifesim.lai_scene(grid, arp=0.15, seed=7)

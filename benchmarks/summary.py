@@ -23,7 +23,7 @@ RUNS = {
 LANDSAT = list(RUNS)[-1]
 EACH = "SAIL in each cell: radiative-transfer-models"
 INTERPOLATED = "SAIL interpolated in LAI: radiative-transfer-models and numpy.interp"
-ENGINES = ("5S", "successive-orders", "6S")
+ENGINES = ("5S", "successive-orders")
 
 
 def sections(text):

@@ -4,7 +4,7 @@ from importlib import import_module
 
 from fifesim.base.arguments import Range
 
-ENGINES = ("5S", "successive-orders", "6S")
+ENGINES = ("5S", "successive-orders")
 """Schemes of radiative transfer by name, in the order of messages. Importing the list loads no physics."""
 
 RANGES = {

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from scipy.linalg import eigvalsh_tridiagonal
 
-from fifesim.atmosphere import aerosols, six_s
+from fifesim.atmosphere import aerosols
 from fifesim.atmosphere.column import matrix_moments
 from fifesim.atmosphere.coupling import BandTerms, Scattering, band_mean_terms, nodes_of
 from fifesim.atmosphere.five_s import five_s_scattering
@@ -132,7 +132,7 @@ SCATTERING = {
 }
 
 
-def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
+def band_terms(atmosphere, bands, sza, vza, raa):
     """
     Terms of the coupling equation in each band, by the engine of the atmosphere.
 
@@ -145,8 +145,6 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
         0 to 75. [degree]
     raa : float
         0 has sun and sensor on the same side. [degree]
-    each : callable, optional
-        Wrapper of the sequence of 6S runs (one per band), for example a progress bar.
 
     Returns
     -------
@@ -157,11 +155,7 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
     ----------
     [Tanre1990]_
     """
-    if atmosphere.engine != "6S":
-        return _band_terms(atmosphere, tuple(bands), float(sza), float(vza), float(raa))
-    check_zenith("sza", sza)
-    check_zenith("vza", vza)
-    return six_s.sixs_band_terms(atmosphere, bands, sza, vza, raa, each=each)
+    return _band_terms(atmosphere, tuple(bands), float(sza), float(vza), float(raa))
 
 
 def light_at_ground(atmosphere, bands, sza, photons=True):
@@ -228,8 +222,6 @@ def terms_at(atmosphere, bands, sza, vza, raa):
 
 def scattering(atmosphere, wavelength, sza, vza, raa):
     """Scattering at some wavelengths, by the engine of the atmosphere; views of shape (V,) and (R,). [1]"""
-    if atmosphere.engine not in SCATTERING:
-        raise ValueError(f"engine must be one of {', '.join(SCATTERING)} here, got {atmosphere.engine!r}")
     return SCATTERING[atmosphere.engine](atmosphere, wavelength, sza, vza, raa)
 
 

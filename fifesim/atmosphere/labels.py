@@ -48,8 +48,7 @@ def spectrum(atmosphere: Atmosphere | None = None, geometry: Directions | None =
     Raises
     ------
     ValueError
-        If sun or sensor are too low or vary, if the engine is 6S, which computes bands only, or if the tables of a
-        user-defined aerosol do not cover the wavelengths.
+        If sun or sensor are too low or vary, or if the tables of a user-defined aerosol do not cover the wavelengths.
 
     See Also
     --------
@@ -159,11 +158,6 @@ def _check_cells(reflectance, geometry, elevation, adjacency):
 
 def _varying(to_toa, reflectance, atmosphere, bands, geometry, elevation):
     """Reflectance through an atmosphere whose geometry or altitude varies from cell to cell."""
-    if atmosphere.engine == "6S":
-        raise ValueError(
-            "engine='6S' runs for one geometry and one altitude: average the angles and leave elevation out, "
-            "or use engine='successive-orders'"
-        )
     if elevation is None:
         altitude = xr.DataArray(atmosphere.altitude)
     else:

@@ -86,8 +86,7 @@ class Atmosphere:
     o3 : float, optional
         Column of ozone, 0 to 1; by default from the profile. [cm-atm]
     engine : str, optional
-        "5S" (closed-form equations), "successive-orders" (multiple scattering with polarization) or "6S" (6SV, an
-        optional dependency).
+        "5S" (closed-form equations) or "successive-orders" (multiple scattering with polarization).
 
     Raises
     ------
@@ -97,9 +96,8 @@ class Atmosphere:
     Notes
     -----
     A higher ground removes the lower part of the profile; the aerosol column starts at the ground and keeps its amount.
-    A user-defined aerosol needs ``aot``, because visibility refers to the standard haze at the ground. 6S does not
-    support user-defined aerosols, because Py6S does not accept phase functions. Given columns scale the profile at all
-    levels. The attribute `aot` is always set; `visibility` is None if `aot` was given.
+    A user-defined aerosol needs ``aot``, because visibility refers to the standard haze at the ground. Given
+    columns scale the profile at all levels. The attribute `aot` is always set; `visibility` is None if `aot` was given.
 
     References
     ----------
@@ -143,11 +141,6 @@ class Atmosphere:
             raise ValueError(
                 f"the amount of the user-defined aerosol {name} must be given as aot, from 0 to 2, got {given}: "
                 "give for example aot=0.2, because visibility refers to the standard haze"
-            )
-        if self.engine == "6S":
-            raise ValueError(
-                f"engine must be one of {', '.join(ENGINES[:-1])} with the user-defined aerosol {name}, got '6S', "
-                "which does not support phase functions: use engine='successive-orders'"
             )
 
     def _set_amount(self):

@@ -14,7 +14,6 @@ import xarray as xr
 from dask.utils import format_bytes, format_time
 
 from fifesim.analysis.regression_labels import matched, regress
-from fifesim.atmosphere import engines
 from fifesim.base.messages import LOG, warn
 from fifesim.chain.steps import ndvi
 from fifesim.grids import grid as grids
@@ -24,23 +23,12 @@ from fifesim.grids.reductions import computed
 from fifesim.output import identity, products, report, stac, workers
 from fifesim.output.folders import check_folder, errors_with_their_file, move_files, results
 from fifesim.output.maps import write_style
-from fifesim.output.progress import Progress, memory, spinner, steps
+from fifesim.output.progress import Progress, memory, spinner
 from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.simulation import simulate
 from fifesim.scenario.sweeps import VARIABLES
 from fifesim.scenario.toml import write_scenario
-from fifesim.sensor.description.instruments import instrument
-
-
-def run_engine(scenario):
-    """Run the engine for the atmosphere of a scenario, whose results are cached."""
-    bands = [band.response for band in instrument(scenario.sensor.instrument).select(scenario.sensor.bands)]
-    atmosphere, light = scenario.model_atmosphere(), scenario.sun_and_view()
-    # Skylight on the canopy does not depend on the view.
-    for vza, raa in ((0.0, 0.0), (light.vza, light.raa)):
-        engines.band_terms(atmosphere, bands, light.sza, vza, raa, each=lambda runs: steps(runs, "6S, band by band"))
-
 
 FILES = (
     "image.tif", "image.qml", "truth.tif", "truth.qml", "quicklook.png", "report.html", identity.SCENARIO, "item.json",
@@ -87,7 +75,6 @@ def simulate_to_folder(
     kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=products.has_blocks, stale=stale)
     with errors_with_their_file(folder), kept as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
         identity.begin(unfinished, state)
-        run_engine(complete)
         tree = simulate(complete)
         found = products.products_of(tree, unfinished / SCENE if scene else None)
         threads = threads or workers.usable_cores()

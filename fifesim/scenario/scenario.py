@@ -9,7 +9,6 @@ import numpy as np
 from odc.geo.geobox import GeoBox
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
-from fifesim.atmosphere import six_s
 from fifesim.atmosphere.engines import check_zenith
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base import files, geometry
@@ -329,8 +328,6 @@ class Scenario(Keys):
         ValueError
             If the image would have fewer than 2 x 2 pixels, or pixels smaller than cells; if the grid, sun, optics or
             bands are not possible, or a file is missing.
-        ImportError
-            If the engine is not installed.
         """
         for place, path in self.files.items():
             if not os.path.exists(path) and not path.startswith("/vsi"):
@@ -339,8 +336,6 @@ class Scenario(Keys):
         bands = [band.response for band in own.description.select(own.bands)]
         self._check_image(box)
         check_zenith("sza", self.sun_and_view().sza)
-        if self.atmosphere.engine == "6S":
-            six_s.check_installed()
         self._check_fields()
         check_leaf_area(self)
         ground = self.ground.model_copy(update=self.ground.complete_optics(bands))

@@ -236,10 +236,9 @@ def test_impossible_table_raises(case):
     [
         ({"visibility": 23}, "must be given as aot, from 0 to 2, got visibility=23: give for example aot=0.2"),
         ({}, "must be given as aot, from 0 to 2, got nothing"),
-        ({"aot": 0.2, "engine": "6S"}, "got '6S'.*use engine='successive-orders'"),
     ],
 )
-def test_tables_need_aot_and_an_engine_other_than_6s(haze, options, message):
+def test_tables_need_aot(haze, options, message):
     with pytest.raises(ValueError, match=message):
         Atmosphere(aerosol=haze, **options)
 

@@ -49,7 +49,7 @@ def test_factors_of_the_fife_case_agree_with_6s():
         assert terms.diffuse_fraction == pytest.approx(diffuse, abs=2e-3)
 
 
-@pytest.mark.parametrize("engine", ["5S", "6S"])
+@pytest.mark.parametrize("engine", ["5S", "successive-orders"])
 @pytest.mark.parametrize(
     "angles, name", [((76.0, 0.0), "sza"), ((30.0, 80.0), "vza"), ((np.nan, 0.0), "sza"), ((0.0, -1.0), "vza")]
 )

@@ -122,9 +122,6 @@ def test_adjacency_follows_the_raster_rules_and_is_invertible(ground):
     np.testing.assert_allclose(back, ground, rtol=0, atol=1e-4)
 
 
-SIX_S = fifesim.Atmosphere(engine="6S")
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -132,7 +129,6 @@ SIX_S = fifesim.Atmosphere(engine="6S")
         (lambda rho, swath: downward(rho.drop_attrs().assign_attrs(units="percent")), "has units 'percent'"),
         (lambda rho, swath: upward(rho.assign_attrs(units="W m-2 sr-1 um-1")), "surface_reflectance needs '1'"),
         (lambda rho, swath: upward(rho, adjacency=True, elevation=ramp(rho, 0, 9)), "single geometry.*got elevation"),
-        (lambda rho, swath: toa_from_surface(rho, SIX_S, BANDS, swath), "engine='6S' runs for one geometry"),
         (
             lambda rho, swath: toa_from_surface(rho, AIR, BANDS, swath, adjacency=True),
             "adjacency needs a single geometry and altitude, got rasters of sza, vza",
@@ -143,7 +139,6 @@ SIX_S = fifesim.Atmosphere(engine="6S")
             ),
             "has units 'radian', vza needs 'degree'",
         ),
-        (lambda rho, swath: fifesim.atmosphere.spectrum(SIX_S), "engine must be one of 5S, successive-orders"),
     ],
 )
 def test_wrong_units_and_incompatible_options_raise(ground, swath, call, message):

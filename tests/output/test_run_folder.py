@@ -14,16 +14,12 @@ import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 import zarr
 from elevations import write
-from typer.testing import CliRunner
 
 import fifesim
-from fifesim.atmosphere import engines, six_s
-from fifesim.cli import app
 from fifesim.output import report, run_folder
 from fifesim.output.folders import UNFINISHED
-from fifesim.output.run_folder import FILES, estimate, estimate_in_words, run_engine, simulate_to_folder
+from fifesim.output.run_folder import FILES, estimate, estimate_in_words, simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario, read_scenario
-from fifesim.scenario.simulation import simulate
 
 FLAT = {"dem": "flat"}
 SMALL = {"grid": {"width": 900, "height": 600}, "ground": {"arp": 0.24, "seed": 3}, "terrain": FLAT}
@@ -282,26 +278,6 @@ def test_unfinished_run_refuses_another_scenario_and_recomputes_a_changed_chunk(
 
 
 TINY = {"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}}
-
-
-def test_engine_runs_in_advance_cover_the_simulation(monkeypatch):
-    scenario = parse_scenario(TINY | {"atmosphere": {"visibility": 17.0}}).complete()
-    run_engine(scenario)
-    monkeypatch.setitem(engines.SCATTERING, "5S", None)
-    assert "image" in simulate(scenario).children
-
-
-@pytest.mark.parametrize("command", ["simulate", "budget"])
-def test_missing_engine_gives_one_line_and_exit_code_1(command, monkeypatch, tmp_path):
-    monkeypatch.setattr(six_s, "Py6S", None)
-    (tmp_path / "6s.toml").write_text('[atmosphere]\nengine = "6S"\n[grid]\nwidth = 300\nheight = 300\n')
-    result = CliRunner().invoke(app, [command, str(tmp_path / "6s.toml"), "-o", str(tmp_path / "out")])
-    assert result.exit_code == 1
-    assert result.stderr.strip().splitlines() == [
-        "fifesim: engine='6S' needs the 6S engine: type pip install 'fifesim[sixs]' (wheels for Linux x86_64, Windows "
-        "and Intel Mac), or use engine='successive-orders'"
-    ]
-    assert not (tmp_path / "out").exists()
 
 
 FOUND = {"cells": 72900, "pixels": 900, "tasks": 12, "threads": 2, "memory": 2**30, "disk": 2**20, "seconds": 90.0}

@@ -14,7 +14,6 @@ from affine import Affine
 from mistakes import check_message, lines, mistakes
 
 import fifesim
-from fifesim.atmosphere import six_s
 from fifesim.base import files
 from fifesim.base.geometry import earth_sun_distance, sun_geometry
 from fifesim.base.times import SITE_TIME
@@ -187,13 +186,6 @@ def test_mapped_leaf_area_defaults_to_flat_terrain():
     given = {"ground": {"lai_file": "lai.tif"}, "terrain": {"dem": "flint-hills"}}
     assert parse_scenario(given).terrain.dem == "flint-hills"
     assert Scenario(ground=Ground(lai_file="lai.tif")).terrain.dem == "flat"
-
-
-def test_missing_engine_is_reported_before_the_run(monkeypatch):
-    monkeypatch.setattr(six_s, "Py6S", None)
-    engine = parse_scenario(SMALL | {"atmosphere": {"engine": "6S"}})
-    with pytest.raises(ImportError, match="engine='6S' needs the 6S engine: type pip install"):
-        engine.complete()
 
 
 def test_class_without_leaf_area_takes_it_from_the_ground():

