@@ -221,7 +221,6 @@ def steps():
         "ndvi": ndvi,
         "aggregate": truth,
         "regress": [fit.slope, fit.intercept, fit.r2],
-        "invert": ndvi.fifesim.invert(fit),
         "variogram": lai.fifesim.variogram(60),
         "as_seen_by": rho.fifesim.as_seen_by("OLI", bands=["OLI4", "OLI5"]),
         "sense_swath": swath.fifesim.sense_swath("TM", **away),

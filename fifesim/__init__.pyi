@@ -100,8 +100,6 @@ from .analysis.index_labels import composite as composite  # method
 from .analysis.regression_labels import regress as regress  # method
 from .analysis.regression import Regression as Regression
 from .analysis.regression_labels import relative_equivalent_noise as relative_equivalent_noise  # method
-from .analysis.regression_labels import invert as invert  # method
-from .analysis.score_labels import inversion_error as inversion_error  # method, of a Dataset too
 from .analysis.score_labels import score as score  # method, of a Dataset too
 from .analysis.scaling_labels import share_kept as share_kept  # method
 from .analysis.scaling_labels import density as density  # method

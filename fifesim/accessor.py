@@ -50,6 +50,8 @@ PUBLIC = _table()
 
 # Removed public names and their replacements.
 REMOVED = {
+    "invert": "the line is fit.predict(ndvi.values); fifesim.train and retrieve map LAI with intervals and flags",
+    "inversion_error": "use fifesim.score(estimate, truth)",
     "plot_reproduction": "fifesim.reproduce returns the data of Figures 3 to 9, and docs/paper_figures.py draws them",
 }
 

@@ -87,8 +87,8 @@ def analysis(lai: xr.DataArray, rho: xr.DataArray, dn: xr.DataArray) -> float:
     ndvi, truth = fifesim.ndvi(dn), fifesim.aggregate(lai, 30.0)
     fit = fifesim.regress(truth, ndvi, pair="coordinates")
     low, high = fit.prediction_interval([0.5, 0.6])
-    estimate = fifesim.invert(ndvi, fit, "lai")
-    print(low[0], high[-1], fit.predict(0.5), estimate["lai"], fifesim.score(estimate, truth)["rmse"])
+    estimate = truth.copy(data=fit.predict(ndvi.values))
+    print(low[0], high[-1], fit.predict(0.5), fifesim.score(estimate, truth)["rmse"])
     print(fifesim.relative_equivalent_noise(truth, ndvi, min_count=2), fifesim.share_kept(truth, lai))
     print(fifesim.scale_bias(fifesim.ndvi, rho)["bias"].mean(), fifesim.ndvi_bias(rho).mean())
     print(fifesim.regularized_variance(lai, 30, fifesim.instrument("TM", response="paper").line_spread))
@@ -132,7 +132,6 @@ def wrong(lai: xr.DataArray, dn: xr.DataArray, fit: fifesim.Regression) -> None:
     fifesim.snr("TM", "TM3", "50")  # type: ignore[arg-type]
     fifesim.compare(lai, 5)  # type: ignore[arg-type]
     fifesim.regress(lai, dn, pair="place")  # type: ignore[arg-type]
-    fifesim.invert(dn, 4.0)  # type: ignore[arg-type]
     fifesim.index(dn, "ndvi")  # type: ignore[arg-type]
     fifesim.to_geotiff("tm.tif", dn)  # type: ignore[arg-type]
     fifesim.simulate("scenario.toml")  # type: ignore[arg-type]

@@ -87,7 +87,7 @@ class Regression:
         Returns
         -------
         y : float or array, shape of x
-            Not limited to the physical range of y; `fifesim.invert` clips and flags.
+            Not limited to the physical range of y.
 
         Examples
         --------

@@ -1,10 +1,9 @@
-"""Regression of labelled rasters: pairs of pixels, uncertainty, and maps inverted from images."""
+"""Regression of labelled rasters: pairs of pixels, and relative equivalent noise."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -12,7 +11,7 @@ import xarray as xr
 from fifesim.analysis import regression
 from fifesim.analysis.regression import Regression
 from fifesim.base.arguments import Pairing
-from fifesim.grids import cf, chunks, swaths
+from fifesim.grids import cf
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import with_crs_of
 from fifesim.grids.reductions import computed, extremes, sums_by_row
@@ -277,120 +276,3 @@ def relative_equivalent_noise(
     attrs = {"long_name": f"middle of increments of {variable.name}"}
     out = out.assign_coords(increment=("increment", middle, attrs))
     return out.assign_attrs(slope=float(slope), width=float(increment))
-
-
-_LIMITS = ("low", "high")
-
-# Physical range by quantity; maps above an LAI of 20 are refused elsewhere as wrongly scaled.
-_RANGES = {"lai": (0.0, 20.0), "fpar": (0.0, 1.0)}
-
-# Meanings of the flag by value.
-_FLAGS = {-1: "no_data", 0: "as_fitted", 1: "extrapolated", 2: "clipped_to_minimum", 3: "clipped_to_maximum"}
-
-
-def invert(
-    ndvi: xr.DataArray, fit: Regression, quantity: Literal["lai", "fpar"] = "lai", *, level: float = 0.95
-) -> xr.Dataset:
-    """
-    Map a variable from an index with a regression, including its prediction interval.
-
-    The line may leave the physical range, 0 to 20 for LAI and 0 to 1 for FPAR. Such values and the ends of their
-    interval are clipped to it and flagged.
-
-    Parameters
-    ----------
-    ndvi : xarray.DataArray, dims (y, x)
-        Index on which the variable was regressed.
-    fit : fifesim.analysis.regression.Regression
-        From `regress`, of the variable on the index.
-    quantity : {"lai", "fpar"}, optional
-        The variable.
-    level : float, optional
-        Level of the prediction interval. [1]
-
-    Returns
-    -------
-    estimate : xarray.Dataset, dims (y, x)
-        The variable, ``low`` and ``high``, the ends of its interval, and ``flag``. Lazy if ``ndvi`` is. The flag is 2
-        or 3 if the variable was clipped to its minimum or maximum, 1 if the index is more than 3 standard deviations
-        from the mean of the fitted data, -1 for no data, and 0 otherwise, as described by the CF attributes
-        ``flag_values`` and ``flag_meanings``.
-
-    Raises
-    ------
-    ValueError
-        If the quantity or the level is invalid, or the fit is for another quantity or index.
-
-    See Also
-    --------
-    fifesim.analysis.regression.Regression.prediction_interval,
-    fifesim.analysis.regression.Regression.extrapolates
-
-    Examples
-    --------
-    >>> import fifesim
-    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
-    >>> lai = fifesim.lai_scene(grid, seed=7)
-    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
-    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
-    >>> ndvi, truth = image.fifesim.ndvi(), lai.fifesim.aggregate(30)
-    >>> estimate = ndvi.fifesim.invert(fifesim.regress(truth, ndvi))
-    >>> sorted(estimate.data_vars)
-    ['flag', 'high', 'lai', 'low']
-    >>> clear = estimate["lai"].where(estimate["flag"] == 0)  # without clipped and extrapolated pixels
-    """
-    _check_names(ndvi, fit, quantity)
-    ndvi = sound_cells(ndvi)
-    if not 0 < level < 1:
-        raise ValueError(f"level must be between 0 and 1, got {level:g}: 0.95 holds 95 % of new values")
-    line = f"invert: {fit.intercept:.6g} + {fit.slope:.6g} x {ndvi.name or 'index'}"
-    allowed = _RANGES[quantity]
-    found: dict = {quantity: chunks.pointwise(_clipped, ndvi, fit=fit, allowed=allowed)}
-    for end, name in enumerate(_LIMITS):
-        found[name] = chunks.pointwise(_limit, ndvi, fit=fit, allowed=allowed, end=end, level=level)
-    for name, values in found.items():
-        found[name] = cf.label(swaths.placed_as(values, ndvi), quantity, source=ndvi, history=line).rename(name)
-        # The ends of an interval are not the quantity itself, so they have no standard name.
-        if name in _LIMITS:
-            found[name].attrs.pop("standard_name", None)
-            found[name].attrs["long_name"] += f", {name} end of the {100 * level:g} % prediction interval"
-            found[name] = found[name].assign_coords(level=level)
-    flag = swaths.placed_as(chunks.pointwise(_flag, ndvi, dtype=np.int8, fit=fit, allowed=allowed), ndvi).rename("flag")
-    flag.attrs = {
-        "standard_name": f"{found[quantity].attrs['standard_name']} status_flag",
-        "long_name": f"flag of the {found[quantity].attrs['long_name']}",
-        "flag_values": np.array(list(_FLAGS), np.int8),
-        "flag_meanings": " ".join(_FLAGS.values()),
-        "history": found[quantity].attrs["history"],
-    }
-    found[quantity].attrs["ancillary_variables"] = "flag"
-    return xr.Dataset(found | {"flag": flag})
-
-
-def _check_names(ndvi, fit, quantity):
-    """Raise ValueError if a regression does not relate the quantity to the index, by standard names."""
-    wanted, given = cf.QUANTITIES[quantity].standard_name, ndvi.attrs.get("standard_name", "")
-    if fit.y_name and fit.y_name != wanted:
-        raise ValueError(
-            f"fit must be of {wanted}, got one of {fit.y_name} on {fit.x_name or 'an index'}: exchange the arguments "
-            "of regress, or name the quantity"
-        )
-    if fit.x_name and given and fit.x_name != given:
-        raise ValueError(f"ndvi must be {fit.x_name}, as in the fit, got {given}: give the raster of the index")
-
-
-def _clipped(index, fit, allowed):
-    """Prediction of the line, clipped to its physical range."""
-    return np.clip(fit.predict(index), *allowed)
-
-
-def _limit(index, fit, allowed, end, level):
-    """One end of the prediction interval, clipped to the physical range."""
-    return np.clip(fit.prediction_interval(index, level)[end], *allowed)
-
-
-def _flag(index, fit, allowed):
-    """Flag of each pixel, a key of `_FLAGS`."""
-    line, (lowest, highest) = fit.predict(index), allowed
-    reasons = [np.isnan(line), line < lowest, line > highest, fit.extrapolates(index)]
-    return np.select(reasons, [-1, 2, 3, 1], 0)

@@ -13,8 +13,7 @@ from fifesim.analysis import scores
 from fifesim.analysis.regression import totals
 from fifesim.analysis.regression_labels import check_same_quantity, matched, sound_cells
 from fifesim.base.arguments import RASTER, Kind, Pairing, described, is_a
-from fifesim.base.messages import warn
-from fifesim.grids.inputs import MASKS_TOO, RasterOrDataset
+from fifesim.grids.inputs import MASKS_TOO
 from fifesim.grids.reductions import computed, sums_by_row
 
 _BINS = 10
@@ -141,64 +140,6 @@ def _mask_scores(mask, truth, by, pair):
 
 def _group_name(by, truth):
     return str(by.name or "group") if isinstance(by, xr.DataArray) else f"{truth.name or 'truth'}_bin"
-
-
-def inversion_error(estimate: RasterOrDataset, truth: xr.DataArray, *, pair: Pairing = "coordinates") -> xr.Dataset:
-    """
-    Error of an estimated map against the truth; computes.
-
-    Deprecated: use `fifesim.score`, which also has standard errors and groups. It will be removed in the next release.
-
-    Parameters
-    ----------
-    estimate : xarray.Dataset or xarray.DataArray, dims (y, x)
-        From `invert`, or a map alone.
-    truth : xarray.DataArray, dims (y, x)
-    pair : {"coordinates", "index"}, optional
-        As in `regress`.
-
-    Returns
-    -------
-    error : xarray.Dataset
-        ``bias``, mean of estimate minus truth; ``rmse``, root mean square difference; ``n``, number of pixels; and for
-        a Dataset ``coverage``, the fraction of true values within the interval. Identical for any chunks.
-
-    Raises
-    ------
-    ValueError
-        If the rasters do not match, no pixel has both values, or a Dataset is not a result of `invert`.
-
-    See Also
-    --------
-    fifesim.score
-
-    Examples
-    --------
-    >>> import fifesim
-    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
-    >>> lai = fifesim.lai_scene(grid, seed=7)
-    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
-    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
-    >>> ndvi, truth = image.fifesim.ndvi(), lai.fifesim.aggregate(30)
-    >>> estimate = ndvi.fifesim.invert(fifesim.regress(truth, ndvi))
-    >>> error = estimate.fifesim.inversion_error(truth)
-    >>> abs(round(float(error.bias), 6)), round(float(error.coverage), 2)
-    (0.0, 0.94)
-    """
-    warn("inversion_error is deprecated and will be removed: use fifesim.score(estimate, truth)", FutureWarning)
-    dataset = isinstance(estimate, xr.Dataset)
-    if dataset:
-        variables = [name for name in estimate.data_vars if name not in ("low", "high", "flag")]
-        if len(variables) != 1 or not {"low", "high"} <= set(estimate.data_vars):
-            raise ValueError(
-                f"an estimate has one variable with low and high, as invert gives it, got {list(estimate.data_vars)}: "
-                "give a single map as a DataArray"
-            )
-        # The coverage does not depend on the level.
-        estimate = estimate if "level" in estimate.coords else estimate.assign_coords(level=0.5)
-    found = score(estimate, truth, pair=pair)
-    error = {name: found[name].item() for name in ("bias", "rmse", "n")}
-    return xr.Dataset(error | ({"coverage": found["coverage"].item()} if dataset else {}))
 
 
 def _parts(estimate, truth):

@@ -183,16 +183,19 @@ def test_ensemble_is_scored_from_its_members(truth):
 
 
 def test_maps_are_paired_by_location(lai):
-    """Scores of `invert` equal `inversion_error`, on the common area of both maps."""
+    """Scores of a line on the fitted pixels: bias 0, the residual deviation apart from n - 2, and 90 % coverage."""
     image = (
         lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa().fifesim.sense("TM", min_valid=0.1)
     )
     ndvi, true = image.fifesim.ndvi(), lai.fifesim.aggregate(30, min_valid=0.1)
-    estimate = ndvi.fifesim.invert(fifesim.regress(true, ndvi), level=0.9)
-    found, old = estimate.fifesim.score(true), estimate.fifesim.inversion_error(true)
-    for name in ("bias", "rmse", "n"):
-        assert float(found[name]) == pytest.approx(float(old[name]), rel=1e-12, abs=1e-15)
-    assert float(found.coverage.sel(level=0.9)) == pytest.approx(float(old.coverage), rel=1e-12)
+    fit = fifesim.regress(true, ndvi)
+    low, high = fit.prediction_interval(ndvi.values, level=0.9)
+    maps = {"lai": fit.predict(ndvi.values), "low": low, "high": high}
+    estimate = xr.Dataset({name: ndvi.copy(data=each).drop_attrs() for name, each in maps.items()}, {"level": 0.9})
+    found = estimate.fifesim.score(true)
+    assert float(found.bias) == pytest.approx(0, abs=1e-9) and int(found.n) == fit.n
+    assert float(found.rmse) == pytest.approx(fit.residual_deviation * np.sqrt((fit.n - 2) / fit.n), rel=1e-9)
+    assert float(found.coverage.sel(level=0.9)) > 0.85
     part = in_chunks(true[1:], {"y": 2, "x": 3})
     assert int(estimate.fifesim.score(part).n) < int(found.n)
     with pytest.raises(ValueError, match=r"has dimensions .*: select one"):

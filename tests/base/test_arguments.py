@@ -131,6 +131,7 @@ def valid_calls(tmp_path_factory):
     horizon = fifesim.horizon(dem, directions=16, reach=50.0)
     file = fifesim.to_geotiff(lai, folder / "lai.tif")
     fit = fifesim.regress(lai, ndvi)
+    estimate = xr.Dataset({"lai": lai, "low": lai - 0.5, "high": lai + 0.5}, {"level": 0.9})
     tiny = fifesim.Scenario(grid={"width": 60, "height": 60}, terrain={"dem": "flat"}, sensor={"response": "paper"})
     study = fifesim.Study(tiny, {"visibility": {"uniform": [10, 60]}}, landscapes=1, split={"train": 1.0})
     counts = image.drop_vars(["gain", "offset"])
@@ -164,7 +165,7 @@ def valid_calls(tmp_path_factory):
         "surface": fifesim.RossLi(0.3, 0.15, 0.03), "axes": {"visibility": [20.0, 40.0]}, "draws": study.draws,
         "aerosol": "continental", "instruments": ["TM"], "swath": samples, "name": "TM", "thermal": 1.0, "shot": 0.1,
         "y": lai, "x": ndvi, "variable": lai, "reach": 30.0, "algorithm": np.sqrt, "extinction": 0.5, "n": 1,
-        "scores": fifesim.score(fifesim.invert(ndvi, fit), lai), "retrieval": retrieval, "margin": 0.0,
+        "scores": fifesim.score(estimate, lai), "retrieval": retrieval, "margin": 0.0,
         "wavelength": (0.6, 0.65, 0.7), "response": (0.0, 1.0, 0.0),
     }  # fmt: skip
     on_hills = {"dem": dem, "horizon": horizon}
@@ -222,7 +223,7 @@ def valid_calls(tmp_path_factory):
         "NoiseModel": {"detectors": 16},
         "train": {"source": chips, "method": "line", "bands": ["TM3", "TM4"], "quantities": ["lai"], "levels": [0.5]},
         "retrieve": {"image": rho.drop_attrs(), "intervals": [0.5]},
-        "score": {"estimate": fifesim.invert(ndvi, fit), "truth": lai.isel(y=slice(6), x=slice(6)), "pair": "index"},
+        "score": {"estimate": estimate, "truth": lai.isel(y=slice(6), x=slice(6)), "pair": "index"},
         "noise_std": {"instrument": "TM", "noise_models": fifesim.NoiseModel(1.0, 0.1)},
         "density": {"points": 32},
     }  # fmt: skip
@@ -515,7 +516,7 @@ def test_class_error_names_the_function_that_returns_its_objects(lai):
     ):
         fifesim.simulate(5)
     with pytest.raises(TypeError, match=r"^fit must be a fifesim\.Regression, as fifesim\.regress gives it, got 5$"):
-        fifesim.invert(lai, 5)
+        fifesim.plot_fit(5)
     with pytest.raises(TypeError, match=r"^setup must be a fifesim\.Setup, got 5$"):
         fifesim.compare(lai, ["TM"], 5)
 

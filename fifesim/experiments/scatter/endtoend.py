@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from fifesim.analysis.regression_labels import invert, regress
+from fifesim.analysis.regression_labels import regress
 from fifesim.analysis.scaling_labels import aggregate_blocks
 from fifesim.chain.steps import ndvi as ndvi_of
 from fifesim.experiments.scatter import errors
@@ -33,6 +33,7 @@ _TEMPLATE = Path(__file__).with_name("endtoend.html.j2")
 ENDTOEND_FILES = ("budget.csv", "budget.png", "maps.png", "report.html", "scenario.toml")
 _DPI = 160
 _COLOURS = {"bias": "#0072B2", "variance": "#E69F00"}
+_LAI = (0.0, 20.0)
 LEVEL = 0.8
 """Level of the interval of retrieved leaf area on the page. [1]"""
 
@@ -149,8 +150,9 @@ def estimated(image, truth, retrieval):
         found = retrieve(to_reflectance(image), retrieval, [level])
         return found["lai"], (found["lai_high"] - found["lai_low"]).isel(level=0)
     seen = ndvi_of(image)
-    found = invert(seen, regress(truth, seen, pair="index"), level=LEVEL)
-    return found["lai"], found["high"] - found["low"]
+    line = regress(truth, seen, pair="index")
+    low, high = np.clip(line.prediction_interval(seen.values, LEVEL), *_LAI)
+    return seen.copy(data=np.clip(line.predict(seen.values), *_LAI)), seen.copy(data=high - low)
 
 
 def endtoend_page(case, budget, table, target, retrieval, maps, chart):
