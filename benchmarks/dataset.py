@@ -1,4 +1,4 @@
-"""Chips a second of `fifesim dataset`, with all that it does from its start to its datasheet, and memory."""
+"""Chips a second of `fifesim dataset`, with all that it does from its start to its end, and memory."""
 
 import argparse
 import subprocess

@@ -164,7 +164,7 @@ def dataset_command(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Create a training set. Writes images and truth of many chips as sharded Zarr, with a datasheet."""
+    """Create a training set. Writes images and truth of many chips as sharded Zarr, with the study."""
     start = time.monotonic()
     with importing():
         from fifesim.output.chips.folder import WHOLE, dataset_to_folder, study_to_resume
@@ -188,7 +188,7 @@ def dataset_command(
         files = dataset_to_folder(
             found, output, count, overwrite=overwrite, resume=resume, workers=workers, client=client, as_json=as_json
         )
-    report(files, time.monotonic() - start, f"{output / 'datasheet.html'} in a browser", as_json, finished)
+    report(files, time.monotonic() - start, f"{output} with xarray.open_zarr", as_json, finished)
 
 
 @app.command("reproduce")

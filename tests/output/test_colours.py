@@ -14,7 +14,6 @@ import fifesim
 from fifesim.base.bands import colour_composite
 from fifesim.experiments.explorer import layer_words
 from fifesim.grids import cf
-from fifesim.output.chips.datasheet import contact_sheet
 from fifesim.output.colours import (
     axis_label,
     colours_of,
@@ -57,8 +56,6 @@ def test_quantity_words_come_from_the_table(clumping, whole):
     assert axis.get_ylabel() == "True clumping [m² m⁻²]" and axis.get_ylim()[0] >= CLUMPING.lowest
     assert "of true clumping about" in main_results(truth, image, truth, {"clumping": fit})[0][2]
     assert layer_words(["clumping"])["clumping"]["axis"] == "clumping [m² m⁻²]"
-    sheet = contact_sheet(chips(clumping), ["train"])
-    assert [axis.get_ylabel() for axis in sheet.axes if axis.get_ylabel()] == ["image: TM4", "clumping"]
 
 
 def test_quantity_colours_come_from_the_table(clumping, tmp_path):
@@ -73,16 +70,6 @@ def test_quantity_colours_come_from_the_table(clumping, tmp_path):
     assert [item.get("color") for item in shown] == magma
     ends = [float(shown[end].get("value")) for end in (0, -1)]
     assert ends == pytest.approx([0.25, high], rel=1e-5)
-    row = contact_sheet(chips(clumping), ["train"]).axes[1].images[0]
-    assert row.get_cmap().name == "magma" and row.get_clim() == pytest.approx((low, high))
-
-
-def chips(raster):
-    """A Dataset of one chip with a one-band image and the raster as truth."""
-    reflectance = ("chip", "band", "y", "x"), raster.values[None, None]
-    coordinates = {"band": ["TM4"], "wavelength": ("band", [0.83]), "split": ("chip", ["train"])}
-    truth = {str(raster.name): (("chip", "y", "x"), raster.values[None])}
-    return xr.Dataset({"toa_reflectance": reflectance} | truth, coordinates)
 
 
 def test_quantities_have_short_name_range_and_colour_map():

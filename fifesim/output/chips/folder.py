@@ -15,7 +15,7 @@ from fifesim.base.messages import warn
 from fifesim.grids.chunks import found_client
 from fifesim.ground.landscape.autoregression import FIELD_TILE
 from fifesim.output import identity
-from fifesim.output.chips import datasheet, store
+from fifesim.output.chips import store
 from fifesim.output.chips.makers import made_shards, processes, workers_of
 from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, errors_with_their_file, results
 from fifesim.output.products import has_blocks, save_block, saved_block
@@ -24,9 +24,9 @@ from fifesim.scenario.chips import chips_of
 from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.studies import Study, StudyLike, read_study
 
-_FILES = DATASHEET, CONTACT_SHEET, STUDY = "datasheet.html", "contact_sheet.png", "study.toml"
+STUDY = "study.toml"
 
-WHOLE = (*_FILES, store.ROOT)
+WHOLE = (STUDY, store.ROOT)
 """Files that mark a dataset as complete."""
 
 # Name under which the checksums of written shards are saved.
@@ -53,7 +53,7 @@ def dataset(
     ----------
     study : str, path or fifesim.Study
     folder : str or path
-        Folder for the Zarr store, datasheet.html, contact_sheet.png and study.toml. It is created if needed.
+        Folder for the Zarr store and study.toml. It is created if needed.
     n : int, optional
         Number of chips.
     overwrite : bool, optional
@@ -103,11 +103,11 @@ def dataset(
 
 
 def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, workers=None, client=None, as_json=False):
-    """Make the chips of a study in a folder; return the paths of the folder and its documentation."""
+    """Make the chips of a study in a folder; return the paths of the folder and its study."""
     folder = Path(folder)
     if check_folder(folder, overwrite, resume, WHOLE):
         _check_finished(folder, chips_of(study, count))
-        return [folder, *(folder / name for name in _FILES)]
+        return [folder, folder / STUDY]
     # One worker is this process.
     own = workers is not None and workers > 1
     client = None if own else client or found_client()
@@ -117,7 +117,7 @@ def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, wo
         _warn_of_empty_parts(chips)
         layout = store.layout_of(chips)
         # The root marks the folder as a store and is therefore moved last.
-        names = [*store.stored_names(chips, layout), *_FILES, store.ROOT]
+        names = [*store.stored_names(chips, layout), STUDY, store.ROOT]
         earlier = folder.iterdir() if folder.is_dir() and (overwrite or resume) else ()
         # Arrays of an earlier dataset that the new one does not have.
         stale = [
@@ -126,7 +126,7 @@ def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, wo
         kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks, stale=stale)
         with errors_with_their_file(folder), kept as unfinished:
             _make(chips, layout, unfinished, as_json, makers)
-    return [folder, *(folder / name for name in _FILES)]
+    return [folder, folder / STUDY]
 
 
 def _check_finished(folder, chips):
@@ -156,7 +156,6 @@ def _make(chips, layout, folder, as_json, makers):
     shards = store.Shards(len(chips), layout.size, together)
     store.make_store(folder, chips, layout, shards)
     _compute(chips, layout, shards, folder, as_json, makers)
-    datasheet.write_datasheet(folder, chips, shards, DATASHEET, CONTACT_SHEET)
     (folder / STUDY).write_text(study.to_toml(), encoding="utf-8")
     identity.check_inputs(json.loads(state[identity.STATE])["inputs"], _inputs(chips))
 
