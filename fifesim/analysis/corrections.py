@@ -11,37 +11,6 @@ from fifesim.analysis.regression import row_sums
 LEAST_COSINE = 0.1
 
 
-def illumination_cosine(sza, saa, slope, aspect):
-    r"""
-    Cosine of the angle between the sun and the normal of a slope.
-
-    .. math:: \cos i = \cos \theta_s \cos S + \sin \theta_s \sin S \cos(\varphi_s - A)
-
-    Parameters
-    ----------
-    sza, saa : array
-        Solar zenith and azimuth angles. [degree]
-    slope, aspect : array
-        Slope, and azimuth down the slope. [degree]
-
-    Returns
-    -------
-    cosine : array, shape of the broadcast inputs
-        Negative where the slope faces away. [1]
-
-    References
-    ----------
-    [Teillet1982]_
-
-    Examples
-    --------
-    >>> float(round(illumination_cosine(30.0, 180.0, 30.0, 180.0), 12))
-    1.0
-    """
-    sza, saa, slope, aspect = map(np.radians, (sza, saa, slope, aspect))
-    return np.cos(sza) * np.cos(slope) + np.sin(sza) * np.sin(slope) * np.cos(saa - aspect)
-
-
 def cosine_correction(reflectance, cos_i, sza):
     r"""
     Cosine correction.
@@ -53,7 +22,7 @@ def cosine_correction(reflectance, cos_i, sza):
     reflectance : array
         Reflectance relative to the irradiance of level ground. [1]
     cos_i : array
-        From `illumination_cosine`. [1]
+        Cosine of the angle between the sun and the normal of the slope. [1]
     sza : array
         [degree]
 
@@ -85,7 +54,7 @@ def c_correction(reflectance, cos_i, sza, c):
     reflectance, cos_i, sza
         As in `cosine_correction`.
     c : array
-        From `regression_constant`. [1]
+        Intercept over slope of the regression of reflectance on illumination, by `line_constant`. [1]
 
     Returns
     -------
@@ -175,7 +144,7 @@ def minnaert_correction(reflectance, cos_i, sza, k):
     reflectance, cos_i, sza
         As in `cosine_correction`.
     k : array
-        1 is the cosine correction, from `minnaert_exponent`. [1]
+        1 is the cosine correction, from `line_constant`. [1]
 
     Returns
     -------
@@ -215,68 +184,6 @@ def line_constant(sums, logarithmic=False, level=1.0):
         squares = xx - x * x / n
         slope = np.where(squares > _ROUNDING * n, xy - x * y / n, np.nan) / squares
         return slope if logarithmic else (y / n - slope * (level + x / n)) / slope
-
-
-def regression_constant(reflectance, cos_i):
-    r"""
-    Constant of the C correction of a scene: intercept over slope of its regression on illumination.
-
-    .. math:: \rho = b + m \cos i, \qquad c = b / m
-
-    Parameters
-    ----------
-    reflectance : array, shape (..., rows, columns)
-        [1]
-    cos_i : array, shape (rows, columns)
-        [1]
-
-    Returns
-    -------
-    c : array, shape (...)
-        NaN where all cells have the same illumination. [1]
-
-    References
-    ----------
-    [Teillet1982]_
-
-    Examples
-    --------
-    >>> cos_i = np.array([[0.2, 0.4, 0.8]])
-    >>> float(round(regression_constant(0.1 + 0.2 * cos_i, cos_i), 12))
-    0.5
-    """
-    return line_constant(line_sums(reflectance, cos_i))
-
-
-def minnaert_exponent(reflectance, cos_i):
-    r"""
-    Exponent of the Minnaert correction of a scene: slope of its logarithmic regression on illumination.
-
-    .. math:: \ln \rho = a + k \ln \cos i
-
-    Parameters
-    ----------
-    reflectance : array, shape (..., rows, columns)
-        Cells at or below 0 are left out. [1]
-    cos_i : array, shape (rows, columns)
-        [1]
-
-    Returns
-    -------
-    k : array, shape (...)
-        [1]
-
-    References
-    ----------
-    [Minnaert1941]_
-
-    Examples
-    --------
-    >>> cos_i = np.array([[0.2, 0.4, 0.8]])
-    >>> float(round(minnaert_exponent(0.3 * cos_i**0.7, cos_i), 12))
-    0.7
-    """
-    return line_constant(line_sums(reflectance, cos_i, logarithmic=True), logarithmic=True)
 
 
 def c_factor(at_view, at_target):

@@ -121,13 +121,6 @@ def beer_bias(mean, variance, extinction, fpar_inf):
     return second_order_bias(fpar_curvature(mean, extinction, fpar_inf)[None, None], np.asarray(variance)[None, None])
 
 
-def pixel_shares(pixels, cells):
-    """Share of the range and of the variance of cells that pixels keep, [Friedl1995]_, Fig. 6. [1]"""
-    pixels, cells = np.asarray(pixels, float), np.asarray(cells, float)
-    pixels, cells = pixels[np.isfinite(pixels)], cells[np.isfinite(cells)]
-    return float(np.ptp(pixels) / np.ptp(cells)), float(pixels.var() / cells.var())
-
-
 # Number of sums over pairs.
 LAG_SUMS = 6
 

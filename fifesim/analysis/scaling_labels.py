@@ -248,10 +248,6 @@ def share_kept(pixels: AnyDimensions, cells: xr.DataArray) -> xr.Dataset:
     ----------
     [Friedl1995]_, Fig. 6
 
-    See Also
-    --------
-    fifesim.analysis.scaling.pixel_shares
-
     Examples
     --------
     >>> import fifesim

@@ -56,50 +56,6 @@ class GroundStreams(NamedTuple):
     air_air: np.ndarray
 
 
-def four_stream_coupling(
-    rso, rdo, rsd, rdd, tss, tsd, too, tdo, spherical_albedo, path_reflectance=0.0, gas_transmittance=1.0
-):
-    r"""
-    Reflectance at the top of the atmosphere over ground with four reflectances, under an isotropic sky.
-
-    .. math::
-
-        \rho^* &= T_g \left[ \rho_a + (\tau_{ss} r_{so} + E^- r_{do}) \, \tau_{oo} + E^+ \tau_{do} \right] \\
-        E^+ &= \frac{\tau_{ss} r_{sd} + \tau_{sd} r_{dd}}{1 - r_{dd} S}, \qquad E^- = \tau_{sd} + S E^+
-
-    Parameters
-    ----------
-    rso, rdo, rsd, rdd : array
-        Reflectance of the ground: s sun, o observer, d diffuse; in, then out. [1]
-    tss, tsd : array
-        Direct and diffuse transmittance from the sun. [1]
-    too, tdo : array
-        Direct and diffuse transmittance to the sensor. [1]
-    spherical_albedo, path_reflectance, gas_transmittance : array
-        :math:`S, \rho_a, T_g`. [1]
-
-    Returns
-    -------
-    toa_reflectance : array, shape of the broadcast inputs
-        [1]
-
-    Notes
-    -----
-    An aerosol sky is bright around the sun, where the isotropic sky is not: `directional_coupling`.
-
-    References
-    ----------
-    [VerhoefBach2007]_
-
-    Examples
-    --------
-    >>> float(four_stream_coupling(0.2, 0.3, 0.3, 0.4, 1.0, 0.0, 1.0, 0.0, 0.0))
-    0.2
-    """
-    streams = GroundStreams(rso, rdo, rdo, rsd, rdd, rdd, rsd, rdd, rdd)
-    return directional_coupling(streams, tss, tsd, too, tdo, spherical_albedo, path_reflectance, gas_transmittance)
-
-
 def directional_coupling(
     streams, tss, tsd, too, tdo, spherical_albedo, path_reflectance=0.0, gas_transmittance=1.0, around=None
 ):
@@ -118,8 +74,12 @@ def directional_coupling(
     ----------
     streams : GroundStreams
         [1]
-    tss, tsd, too, tdo, spherical_albedo, path_reflectance, gas_transmittance : array
-        As in `four_stream_coupling`. [1]
+    tss, tsd : array
+        Direct and diffuse transmittance from the sun. [1]
+    too, tdo : array
+        Direct and diffuse transmittance to the sensor. [1]
+    spherical_albedo, path_reflectance, gas_transmittance : array
+        :math:`S, \rho_a, T_g`. [1]
     around : GroundStreams, optional
         Mean streams of the surroundings, which exchange light with the atmosphere; by default the ground itself. The
         three streams to the view are of the ground alone. [1]

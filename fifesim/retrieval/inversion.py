@@ -124,10 +124,6 @@ class Solution(NamedTuple):
         """Degrees of freedom for signal, shape (n,)."""
         return np.trace(self.averaging_kernel, axis1=-2, axis2=-1)
 
-    def information(self, prior_covariance):
-        """Information content, shape (n,). [nat]"""
-        return 0.5 * (np.linalg.slogdet(prior_covariance)[1] - np.linalg.slogdet(self.covariance)[1])
-
 
 # Relative rounding error of the cost, above which a step counts as worse.
 _ROUNDING = 1e-12

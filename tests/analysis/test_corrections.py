@@ -26,6 +26,12 @@ def scene(dem=None, lai=LAI):
     return lai.fifesim.surface_reflectance("TM", bands=BANDS, dem=dem)
 
 
+def illumination_cosine(sza, saa, slope, aspect):
+    """Cosine of the angle between the sun and the normal of a slope [Teillet1982]."""
+    sza, turn, slope = np.radians(sza), np.radians(saa - aspect), np.radians(slope)
+    return np.cos(sza) * np.cos(slope) + np.sin(sza) * np.sin(slope) * np.cos(turn)
+
+
 def test_ross_li_kernels():
     t = table("ross_li.csv")
     np.testing.assert_allclose(ross_thick(t.sza, t.vza, t.raa), t.volume, rtol=0, atol=1e-9)
@@ -38,7 +44,7 @@ def test_ross_li_kernels():
 
 def test_topographic_corrections():
     t = table("topographic_correction.csv")
-    cos_i = corrections.illumination_cosine(t.sza, t.saa, t.slope, t.aspect)
+    cos_i = illumination_cosine(t.sza, t.saa, t.slope, t.aspect)
     rho = t.reflectance, cos_i, t.sza
     found = {
         "cos_i": cos_i,
@@ -61,7 +67,7 @@ def test_kernels_are_reciprocal():
 
 def test_illumination_cosine_agrees_with_the_terrain_function():
     sun = fifesim.Geometry(sza=50.0, saa=117.0)
-    cos_i = corrections.illumination_cosine(sun.sza, sun.saa, DEM.fifesim.slope(), DEM.fifesim.aspect())
+    cos_i = illumination_cosine(sun.sza, sun.saa, DEM.fifesim.slope(), DEM.fifesim.aspect())
     lit = DEM.fifesim.illumination(sun)
     # Aspect is relative to true north at each cell; the illumination uses the convergence at the centre of the grid.
     np.testing.assert_allclose(cos_i, lit.where(lit > 0, cos_i), rtol=0, atol=1e-4)
@@ -129,9 +135,17 @@ def test_corrections_end_where_the_divisor_is_below_a_tenth(method):
     assert found.attrs["masked_cells"] == ((cos_i > 0) & ~kept).sum() > 10
 
 
+def test_constants_of_exact_scenes():
+    """0.1 + 0.2 cos i has c = 0.5, and 0.3 (cos i)**0.7 the exponent 0.7."""
+    cos_i = np.array([[0.2, 0.4, 0.8]])
+    assert corrections.line_constant(corrections.line_sums(0.1 + 0.2 * cos_i, cos_i)) == pytest.approx(0.5, rel=1e-12)
+    sums = corrections.line_sums(0.3 * cos_i**0.7, cos_i, logarithmic=True)
+    assert corrections.line_constant(sums, logarithmic=True) == pytest.approx(0.7, rel=1e-12)
+
+
 def test_constant_of_level_ground_is_unknown():
     cos_i = np.full((4, 5), 0.7) + 1e-16 * np.arange(20).reshape(4, 5)
-    assert np.isnan(corrections.regression_constant(0.2 + cos_i, cos_i))
+    assert np.isnan(corrections.line_constant(corrections.line_sums(0.2 + cos_i, cos_i)))
 
 
 def test_brdf_normalise_converts_between_views():

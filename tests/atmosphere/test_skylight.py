@@ -16,7 +16,6 @@ from fifesim.atmosphere.skylight import (
     GroundStreams,
     atmospheric_sky,
     directional_coupling,
-    four_stream_coupling,
     ground_streams,
     mixed_sky,
 )
@@ -35,8 +34,8 @@ def sky(sza):
 
 def test_four_stream_coupling_solves_the_flux_equations():
     t = pd.read_csv(DATA / "four_stream.csv", comment="#")
-    ground = t.rso, t.rdo, t.rsd, t.rdd
-    found = four_stream_coupling(*ground, t.tss, t.tsd, t.too, t.tdo, t.spherical_albedo, t.path)
+    ground = GroundStreams(t.rso, t.rdo, t.rdo, t.rsd, t.rdd, t.rdd, t.rsd, t.rdd, t.rdd)
+    found = directional_coupling(ground, t.tss, t.tsd, t.too, t.tdo, t.spherical_albedo, t.path)
     np.testing.assert_allclose(found, t.toa, rtol=0, atol=1e-12)
 
 
@@ -45,7 +44,6 @@ def test_equal_reflectances_give_the_lambertian_result():
     r, tss, tsd, too, tdo, albedo, path, gas = rng.uniform(0.05, 0.45, (8, 50))
     expected = apparent_reflectance(r, path, tss + tsd, too + tdo, albedo, gas)
     air = tss, tsd, too, tdo, albedo, path, gas
-    np.testing.assert_allclose(four_stream_coupling(r, r, r, r, *air), expected, rtol=1e-12)
     np.testing.assert_allclose(directional_coupling(GroundStreams(*[r] * 9), *air), expected, rtol=1e-12)
 
 

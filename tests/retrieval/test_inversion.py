@@ -33,7 +33,6 @@ def test_linear_problems_agree_with_the_closed_form():
         assert found.covariance[0] == pytest.approx(own["S_hat"], abs=1e-9)
         assert found.averaging_kernel[0] == pytest.approx(own["A"], abs=1e-9)
         assert found.degrees_of_freedom[0] == pytest.approx(own["dof"][0, 0], abs=1e-9)
-        assert found.information(own["Sa"])[0] == pytest.approx(own["information_nat"][0, 0], abs=1e-9)
         assert found.chi_square[0] == pytest.approx(own["cost"][0, 0], abs=1e-9)
 
 
