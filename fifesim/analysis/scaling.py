@@ -90,35 +90,17 @@ def ndvi_hessian(red, nir):
     return np.array([[4.0 * nir / cubed, mixed], [mixed, -4.0 * red / cubed]])
 
 
-def fpar_curvature(lai, extinction, fpar_inf):
-    r"""
-    Second derivative of FPAR by Beer's law.
-
-    .. math:: \frac{d^2 \mathrm{FPAR}}{d \mathrm{LAI}^2} = -\mathrm{FPAR}_\infty K^2 e^{-K\,\mathrm{LAI}}
-
-    Parameters
-    ----------
-    lai : array
-        [m2 m-2]
-    extinction : float
-        :math:`K`. [1]
-    fpar_inf : float
-        FPAR of an infinitely thick canopy. [1]
-
-    Returns
-    -------
-    curvature : array, shape of lai
-
-    References
-    ----------
-    [Friedl1995]_, Eq. 6
-    """
-    return -fpar_inf * extinction**2 * np.exp(-extinction * np.asarray(lai, float))
-
-
 def beer_bias(mean, variance, extinction, fpar_inf):
-    """Mean FPAR minus the FPAR of the mean LAI, to second order. [1]"""
-    return second_order_bias(fpar_curvature(mean, extinction, fpar_inf)[None, None], np.asarray(variance)[None, None])
+    r"""
+    Mean FPAR minus the FPAR of the mean LAI, to second order. [1]
+
+    .. math:: \tfrac12 \, \frac{d^2 \mathrm{FPAR}}{d \mathrm{LAI}^2} \, \mathrm{var}(\mathrm{LAI}), \qquad
+        \frac{d^2 \mathrm{FPAR}}{d \mathrm{LAI}^2} = -\mathrm{FPAR}_\infty K^2 e^{-K\,\mathrm{LAI}}
+
+    from [Friedl1995]_, Eq. 6.
+    """
+    curvature = -fpar_inf * extinction**2 * np.exp(-extinction * np.asarray(mean, float))
+    return second_order_bias(curvature[None, None], np.asarray(variance)[None, None])
 
 
 # Number of sums over pairs.

@@ -262,7 +262,9 @@ def axes_of(states, names, angles):
 
 def simulated_tables(study, level, bands, quantities, axes, angles):
     """Chebyshev coefficients of reflectance and quantities, shapes (nodes of each axis, bands or quantities)."""
-    nodes = {name: _nodes(_NODES[name], *ends) for name, ends in axes.items()}
+    nodes = {
+        name: low + 0.5 * (high - low) * (1 + chebyshev.chebpts1(_NODES[name])) for name, (low, high) in axes.items()
+    }
     shape = tuple(map(len, nodes.values()))
     light, values = np.empty((*shape, len(bands))), np.empty((*shape, len(quantities)))
     base = {key.path: drawn.usual for key, drawn in study.drawn.items() if key.path[0] not in ("landscape", "sensor")}
@@ -294,11 +296,6 @@ def _direction(angles):
     """Keys of the geometry with these zenith angles and this relative azimuth."""
     found = {"sza": angles["sza"], "saa": 0.0, "vza": angles["vza"], "vaa": angles["raa"]}
     return {("geometry", name): float(value) for name, value in found.items()}
-
-
-def _nodes(count, low, high):
-    """Chebyshev nodes of an interval."""
-    return low + 0.5 * (high - low) * (1 + chebyshev.chebpts1(count))
 
 
 def _coefficients(values):

@@ -167,12 +167,7 @@ def _sl2p_networks():
 @cached(1, "domain of SL2P")
 def _sl2p_cells():
     """Sorted numbers of the cells of the training data of SL2P, whose digits go from 1 to 10."""
-    return np.sort(np.array([_cell_number(cell) for cell in files.table("sl2p/domain_cells.csv").cell.astype(str)]))
-
-
-def _cell_number(cell):
-    """Number of a cell that is written with one character for each band."""
-    return int(sum(int(character, 16) * 11**place for place, character in enumerate(reversed(cell))))
+    return np.sort(np.array([int(cell, 11) for cell in files.table("sl2p/domain_cells.csv").cell.astype(str)]))
 
 
 def sl2p(reflectance, cos_vza, cos_sza, cos_raa, quantity):
