@@ -92,12 +92,8 @@ def ndvi_hessian(red, nir):
 
 def beer_bias(mean, variance, extinction, fpar_inf):
     r"""
-    Mean FPAR minus the FPAR of the mean LAI, to second order. [1]
-
-    .. math:: \tfrac12 \, \frac{d^2 \mathrm{FPAR}}{d \mathrm{LAI}^2} \, \mathrm{var}(\mathrm{LAI}), \qquad
-        \frac{d^2 \mathrm{FPAR}}{d \mathrm{LAI}^2} = -\mathrm{FPAR}_\infty K^2 e^{-K\,\mathrm{LAI}}
-
-    from [Friedl1995]_, Eq. 6.
+    Mean FPAR minus the FPAR of the mean LAI, to second order, [Friedl1995]_, Eq. 6. [1] The second derivative of FPAR is
+    :math:`-\mathrm{FPAR}_\infty K^2 e^{-K\,\mathrm{LAI}}`.
     """
     curvature = -fpar_inf * extinction**2 * np.exp(-extinction * np.asarray(mean, float))
     return second_order_bias(curvature[None, None], np.asarray(variance)[None, None])

@@ -79,18 +79,6 @@ class Distribution:
         return list(self.values) if self.kind == "choice" else list(self.within or self.values)
 
     @property
-    def in_words(self):
-        """Name and parameters of the distribution as text."""
-        listed = ", ".join(map(_plain, self.values))
-        if self.kind == "normal":
-            return f"normal, mean and deviation {listed}, within {_plain(self.within[0])} to {_plain(self.within[1])}"
-        if self.kind == "choice":
-            weights = f", weights {', '.join(map(_plain, self.weights))}" if self.weights else ""
-            return f"one of {listed}{weights}"
-        low, high = map(_plain, self.values)
-        return f"{self.kind}, {low} to {high}"
-
-    @property
     def table(self):
         """TOML table of the distribution."""
         beside = {name: list(found) for name in _BESIDE.values() if (found := getattr(self, name))}
@@ -159,7 +147,3 @@ def _weights(values, weights):
 
 def _is_number(value):
     return isinstance(value, int | float | np.number) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _plain(value):
-    return f"{value:g}" if _is_number(value) else str(value)

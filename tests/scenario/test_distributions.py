@@ -45,14 +45,13 @@ def test_draws_stay_within_the_limits():
     assert distribution_of({"integers": [3, 7]}).quantile(almost) == [3, 7]
 
 
-def test_table_and_description_state_the_parameters():
-    tables = {
-        "log-uniform, 5 to 45": {"log-uniform": [5, 45]},
-        "normal, mean and deviation 0.2, 0.1, within 0 to 1": {"normal": [0.2, 0.1], "within": [0.0, 1.0]},
-        "one of a, b, weights 1, 2": {"choice": ["a", "b"], "weights": [1.0, 2.0]},
-    }
-    for words, table in tables.items():
-        assert (distribution_of(table).table, distribution_of(table).in_words) == (table, words)
+def test_table_states_the_parameters():
+    for table in (
+        {"log-uniform": [5, 45]},
+        {"normal": [0.2, 0.1], "within": [0.0, 1.0]},
+        {"choice": ["a", "b"], "weights": [1.0, 2.0]},
+    ):
+        assert distribution_of(table).table == table
 
 
 @pytest.mark.parametrize("sequence", ["sobol", "random"])
