@@ -92,7 +92,7 @@ def ndvi_hessian(red, nir):
 
 def beer_bias(mean, variance, extinction, fpar_inf):
     r"""
-    Mean FPAR minus the FPAR of the mean LAI, to second order, [Friedl1995]_, Eq. 6. [1] The second derivative of FPAR is
+    Mean FPAR minus the FPAR of the mean LAI, to second order. [1] FPAR of [Friedl1995]_, Eq. 6, has the curvature
     :math:`-\mathrm{FPAR}_\infty K^2 e^{-K\,\mathrm{LAI}}`.
     """
     curvature = -fpar_inf * extinction**2 * np.exp(-extinction * np.asarray(mean, float))

@@ -191,7 +191,8 @@ def test_maps_are_paired_by_location(lai):
     fit = fifesim.regress(true, ndvi)
     low, high = fit.prediction_interval(ndvi.values, level=0.9)
     maps = {"lai": fit.predict(ndvi.values), "low": low, "high": high}
-    estimate = xr.Dataset({name: ndvi.copy(data=each).drop_attrs() for name, each in maps.items()}, {"level": 0.9})
+    bare = ndvi.drop_attrs(deep=False)
+    estimate = xr.Dataset({name: bare.copy(data=each) for name, each in maps.items()}, {"level": 0.9})
     found = estimate.fifesim.score(true)
     assert float(found.bias) == pytest.approx(0, abs=1e-9) and int(found.n) == fit.n
     assert float(found.rmse) == pytest.approx(fit.residual_deviation * np.sqrt((fit.n - 2) / fit.n), rel=1e-9)
