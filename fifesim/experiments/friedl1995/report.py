@@ -21,6 +21,8 @@ _OF_READINGS = (("o", "#0072B2"), ("x", "#D55E00"))
 
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
 _DPI = 200
+# Files of version 0.2.0, which must not stay next to a new run.
+_EARLIER = ("readings.csv", "sizes.csv", "sensitivity.csv", "figure*.png")
 REPRODUCED = ("table2.csv", "reproduction.nc", "scenarios", "report.html")
 
 
@@ -32,7 +34,8 @@ def reproduce_to_folder(
     check_folder(folder, overwrite)
     case = case_of(cells=cells, **inputs)
     check_memory_of_cells(case.cells)
-    with results(folder, REPRODUCED, overwrite=overwrite) as unfinished:
+    stale = [path.name for pattern in _EARLIER for path in folder.glob(pattern)]
+    with results(folder, REPRODUCED, overwrite=overwrite, stale=stale) as unfinished:
         found = reproduce_case(case, realisations, seed, each=lambda label: partial(steps, label=label))
         tables = {str(each): friedl1995_table.table2(found.sel(reading=each)) for each in found["reading"].values}
         (first, other), second = tables.values(), str(found["reading"].values[1])

@@ -25,6 +25,8 @@ from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.studies import Study, StudyLike, read_study
 
 STUDY = "study.toml"
+# Files of version 0.2.0, which must not stay next to a new dataset.
+_EARLIER = ["datasheet.html", "contact_sheet.png"]
 
 WHOLE = (STUDY, store.ROOT)
 """Files that mark a dataset as complete."""
@@ -120,9 +122,10 @@ def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, wo
         names = [*store.stored_names(chips, layout), STUDY, store.ROOT]
         earlier = folder.iterdir() if folder.is_dir() and (overwrite or resume) else ()
         # Arrays of an earlier dataset that the new one does not have.
-        stale = [
+        arrays = (
             path.name for path in earlier if path.name not in (UNFINISHED, *names) and (path / store.ROOT).is_file()
-        ]
+        )
+        stale = [*arrays, *_EARLIER]
         kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks, stale=stale)
         with errors_with_their_file(folder), kept as unfinished:
             _make(chips, layout, unfinished, as_json, makers)

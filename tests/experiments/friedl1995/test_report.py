@@ -53,6 +53,10 @@ def test_command_writes_table_data_scenarios_and_page(quick, small, tmp_path):
     assert "slope: native</th>" in page and "aligned</th>" in page
     assert "The text of the paper suggests aligned pixels" in page
     assert quick("-o", "out").exit_code == 2
+    for name in ("readings.csv", "figure5_aligned.png", "mine.txt"):
+        (tmp_path / "out" / name).write_text("of another version, and of the user")
+    assert quick("-o", "out", "--overwrite").exit_code == 0
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {*report.REPRODUCED, "mine.txt"}
 
 
 def test_page_states_the_reading_and_the_inputs(quick, tmp_path, folders):

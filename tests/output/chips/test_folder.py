@@ -159,6 +159,7 @@ def test_earlier_dataset_is_replaced_completely(whole, study, tmp_path):
     dataset_to_folder(sun, folder, 3)
     assert (folder / "geometry.vza").is_dir()
     (folder / "notes.txt").write_text("mine")
+    (folder / "datasheet.html").write_text("of an earlier version")
     with pytest.raises(ValueError, match="is not empty"):
         dataset_to_folder(study, folder, COUNT)
     dataset_to_folder(study, folder, COUNT, overwrite=True)
