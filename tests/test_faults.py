@@ -26,17 +26,17 @@ SIGNALLED = f"""
 {HEARS_CTRL_C}
 import os
 from fifesim.cli import app
-from fifesim.output import products
+from fifesim.output import blocks
 
-save = products.save_block
+save = blocks.save_block
 
-def and_signal(blocks, name, *given):
-    save(blocks, name, *given)
-    if name == "image":
-        products.save_block = save
+def and_signal(array, *given):
+    save(array, *given)
+    if array.path == "image":
+        blocks.save_block = save
         os.kill(os.getpid(), SIGNAL)
 
-products.save_block = and_signal
+blocks.save_block = and_signal
 app()
 """
 SCENARIO = """
@@ -68,7 +68,7 @@ def start(*arguments):
 
 
 def saved(folder):
-    return list((folder / UNFINISHED / "blocks" / "image").glob("*.npy"))
+    return [path for path in (folder / UNFINISHED / "blocks" / "image" / "c").rglob("*") if path.is_file()]
 
 
 def wait_for_a_block(folder, process):

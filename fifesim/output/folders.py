@@ -157,17 +157,6 @@ def _empty(hidden):
             shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
 
 
-def move_files(fresh, folder):
-    """Move the files of a new store into a begun one, whose own files of other names stay."""
-    # Complete files replace earlier ones, which are identical unless they are damaged, one by one.
-    for path in sorted(fresh.rglob("*")):
-        if path.is_file():
-            target = folder / path.relative_to(fresh)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(path, target)
-    shutil.rmtree(fresh)
-
-
 def _move_into_place(hidden, folder, names, stale):
     """Replace earlier results with new ones, the mark of completeness last; an error undoes all moves."""
     # After a power cut, the mark must not stand for files that are not on the disk.

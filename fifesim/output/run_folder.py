@@ -20,8 +20,8 @@ from fifesim.grids import grid as grids
 from fifesim.grids.chunks import found_client
 from fifesim.grids.files import to_geotiff
 from fifesim.grids.reductions import computed
-from fifesim.output import identity, products, report, stac, workers
-from fifesim.output.folders import check_folder, errors_with_their_file, move_files, results
+from fifesim.output import blocks, identity, products, report, stac, workers
+from fifesim.output.folders import check_folder, errors_with_their_file, results
 from fifesim.output.maps import write_style
 from fifesim.output.progress import Progress, memory, spinner
 from fifesim.scenario.ground import warn_of_canopy
@@ -72,21 +72,20 @@ def simulate_to_folder(
     workers.check_size(complete, folder)
     state = identity.state_of(identity.inputs_of(complete), write_scenario(complete), scene=bool(scene))
     stale = () if scene else (SCENE,)
-    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=products.has_blocks, stale=stale)
+    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=blocks.has_blocks, stale=stale)
     with errors_with_their_file(folder), kept as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
         identity.begin(unfinished, state)
         tree = simulate(complete)
-        found = products.products_of(tree, unfinished / SCENE if scene else None)
+        rasters = products.products_of(tree, scene)
         threads = threads or workers.usable_cores()
-        if scene:
-            products.make_scene_store(unfinished / f"{SCENE}.partial", found.scene)
-            move_files(unfinished / f"{SCENE}.partial", unfinished / SCENE)
         LOG.info("simulating %s into %s", grids.in_words(complete.geobox()), folder)
-        _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads, as_json)
+        store = blocks.block_store(unfinished / "blocks", {name: raster.data for name, raster in rasters.items()})
+        _compute(rasters, tree["scene"]["lai"], store, client or found_client(), threads, as_json)
         # The function instead of its name, with which dask would import distributed.
         scheduler = {"scheduler": dask.threaded.get, "num_workers": threads}
         with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}), spinner("writing files and report"):
-            _write_files(complete, tree, found, unfinished, folder if home is None else home)
+            saved = {name: raster.copy(data=blocks.saved_array(store[name])) for name, raster in rasters.items()}
+            _write_files(complete, tree, saved, unfinished, folder if home is None else home)
         identity.check_inputs(json.loads(state[identity.STATE])["inputs"], identity.inputs_of(complete))
     LOG.info("wrote %s into %s", ", ".join(names), folder)
     return [folder / name for name in names], False
@@ -113,51 +112,38 @@ def _changed_files(scenario, folder, names):
     return changed
 
 
-def _compute(found, lai, folder, client, threads, as_json):
+def _compute(rasters, lai, store, client, threads, as_json):
     """Compute and save the missing blocks."""
-    blocks = folder / "blocks"
-    saved = {name: products.saved_blocks(blocks, name, array) for name, array in found.arrays.items()}
-    for name in found.scene:
-        saved[f"scene-{name}"] = {index for index in saved[f"scene-{name}"] if _is_in_store(folder, name, index)}
-    image = found.arrays["image"]
-    wanted = products.wanted_blocks(found, lai)
-    wanted = [(name, index) for name, index in wanted if index not in saved[name]]
+    ordered, image = products.wanted_blocks(rasters, lai), rasters["image"]
+    wanted = [(name, index) for name, index in ordered if not blocks.is_saved(store[name], index)]
     per_pixel = lai.size / (image.shape[-1] * image.shape[-2])
     rows, columns = image.chunks[-2:]
-    sizes = {index: round(per_pixel * (rows[index[-2]] * columns[index[-1]])) for index in np.ndindex(image.numblocks)}
-    done = sum(sizes[index] for index in saved["image"])
-    LOG.info("%d blocks to make, %d are saved", len(wanted), sum(map(len, saved.values())))
-    with Progress("simulating", "cells", sum(sizes.values()), done, as_json) as progress:
+    sizes = {
+        index: round(per_pixel * (rows[index[-2]] * columns[index[-1]])) for index in np.ndindex(image.data.numblocks)
+    }
+    left = sum(sizes[index] for name, index in wanted if name == "image")
+    LOG.info("%d blocks to make, %d are saved", len(wanted), len(ordered) - len(wanted))
+    total = sum(sizes.values())
+    with Progress("simulating", "cells", total, total - left, as_json) as progress:
 
         def deliver(name, index, block):
-            products.save_block(blocks, name, index, block)
+            blocks.save_block(store[name], index, block)
             LOG.debug("saved block %s of %s", index, name)
             if name == "image":
                 progress.advance(sizes[index])
 
-        tasks = workers.tasks_of(found.arrays, wanted)
+        tasks = workers.tasks_of({name: raster.data for name, raster in rasters.items()}, wanted)
         if client is None:
             workers.run_on_threads(*tasks, deliver, threads)
         else:
             workers.run_on_client(*tasks, deliver, client)
 
 
-def _is_in_store(folder, name, index):
-    """Whether the chunk of a saved block has its checksum in the store."""
-    try:
-        return products.chunk_checksum(folder / SCENE, name, index) == products.saved_block(
-            folder / "blocks", f"scene-{name}", index
-        )
-    except (OSError, ValueError, RuntimeError):
-        return False
-
-
-def _write_files(scenario, tree, found, folder, home):
+def _write_files(scenario, tree, saved, folder, home):
     """Write the files of a run from its saved blocks."""
-    saved = {
-        name: raster.copy(data=products.saved_array(folder / "blocks", name, found.arrays[name]))
-        for name, raster in found.rasters.items()
-    }
+    cells = {name: saved.pop(f"{products.SCENE}{name}", None) for name in tree["scene"].data_vars}
+    if cells["lai"] is not None:
+        products.write_scene(folder / SCENE, xr.Dataset(cells))
     if sum(raster.nbytes for raster in saved.values()) <= _IN_MEMORY:
         saved = dict(zip(saved, computed(*saved.values()), strict=True))
     _check_some_data(scenario, saved["image"])
@@ -243,8 +229,9 @@ def estimate(scenario, folder=".", *, threads=None, scene=False, start=0.0):
 def _run_tasks(scenario):
     """LAI and image of a run, and its tasks with their outputs."""
     tree = simulate(scenario)
-    lai, found = tree["scene"]["lai"], products.products_of(tree)
-    return lai, found.arrays["image"], workers.tasks_of(found.arrays, products.wanted_blocks(found, lai))
+    lai, rasters = tree["scene"]["lai"], products.products_of(tree)
+    arrays = {name: raster.data for name, raster in rasters.items()}
+    return lai, rasters["image"], workers.tasks_of(arrays, products.wanted_blocks(rasters, lai))
 
 
 def estimate_in_words(found, as_json=False):

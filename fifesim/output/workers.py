@@ -39,7 +39,7 @@ def disk_space(scenario, scene=False):
     """Disk space of a run [byte]: for blocks alone, and including files and scene products."""
     bands = len(scenario.sensor.bands)
     blocks = _pixels(scenario) * (bands * math.ceil(scenario.sensor.description.bits / 8) + _TRUTH)
-    return blocks, _COPIES * blocks + (_cells(scenario) * 8 * (bands + 2) if scene else 0)
+    return blocks, _COPIES * blocks + (2 * _cells(scenario) * 8 * (bands + 2) if scene else 0)
 
 
 def check_size(scenario, folder):

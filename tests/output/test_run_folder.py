@@ -12,7 +12,6 @@ import pytest
 import rasterio
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
-import zarr
 from elevations import write
 
 import fifesim
@@ -269,9 +268,15 @@ def test_unfinished_run_refuses_another_scenario_and_recomputes_a_changed_chunk(
         run_without_pictures(
             parse_scenario({**SMALL, "ground": {"seed": 4}}), tmp_path / "out", scene=True, resume=True
         )
-    zarr.open_array(str(tmp_path / "out" / UNFINISHED / "scene.zarr"), path="lai")[3, 4] = 9.0
-    for name in (".zmetadata", "x/0", "x/.zattrs"):
-        (tmp_path / "out" / UNFINISHED / "scene.zarr" / name).write_bytes(b"{}")
+    unfinished = tmp_path / "out" / UNFINISHED
+    block = unfinished / "blocks" / "scene-lai" / "c" / "0" / "0"
+    content = bytearray(block.read_bytes())
+    content[99] ^= 1
+    block.write_bytes(content)
+    (unfinished / "blocks" / "scene-lai" / "zarr.json").write_bytes(b"{}")
+    # Left by a run that was killed while it wrote the files.
+    (unfinished / "scene.zarr" / "lai").mkdir(parents=True)
+    (unfinished / "scene.zarr" / "lai" / "0.1").write_bytes(b"half")
     run_without_pictures(parse_scenario(SMALL), tmp_path / "out", scene=True, resume=True)
     found, whole = (xr.open_zarr(tmp_path / name / "scene.zarr").load() for name in ("out", "whole"))
     xr.testing.assert_identical(found, whole)

@@ -15,10 +15,10 @@ from fifesim.base.messages import warn
 from fifesim.grids.chunks import found_client
 from fifesim.ground.landscape.autoregression import FIELD_TILE
 from fifesim.output import identity
+from fifesim.output.blocks import has_blocks, is_saved, opened, save_block
 from fifesim.output.chips import store
 from fifesim.output.chips.makers import made_shards, processes, workers_of
 from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, errors_with_their_file, results
-from fifesim.output.products import has_blocks, save_block, saved_block
 from fifesim.output.progress import Progress
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.ground import warn_of_canopy
@@ -30,9 +30,6 @@ _EARLIER = ["datasheet.html", "contact_sheet.png"]
 
 WHOLE = (STUDY, store.ROOT)
 """Files that mark a dataset as complete."""
-
-# Name under which the checksums of written shards are saved.
-_SAVED = "chips"
 
 # Number of chips that are validated before the first is made, and number of these that are validated completely.
 _LOOKED_AT, _CLOSELY = 1000, 50
@@ -213,18 +210,10 @@ def _inputs(chips):
 
 def _compute(chips, layout, shards, folder, as_json, makers):
     """Make and write the missing shards."""
-    blocks, names = folder / "blocks", list(layout.variables)
-    wanted = [shard for shard in range(len(shards)) if not _is_written(folder, blocks, names, shard)]
+    arrays = {name: opened(folder, name) for name in layout.variables}
+    wanted = [shard for shard in range(len(shards)) if not all(is_saved(array, (shard,)) for array in arrays.values())]
     done = len(chips) - sum(np.diff(shards.range_of(shard)).item() for shard in wanted)
     with Progress("making chips", "chips", len(chips), done, as_json) as progress:
-        for shard, arrays in made_shards(chips, layout, shards, wanted, progress.advance, makers):
-            store.write_shard(folder, shards.range_of(shard)[0], arrays)
-            save_block(blocks, _SAVED, (shard,), store.checksums(folder, names, shard))
-
-
-def _is_written(folder, blocks, names, shard):
-    """Whether the files of a shard have their checksums."""
-    try:
-        return np.array_equal(saved_block(blocks, _SAVED, (shard,)), store.checksums(folder, names, shard))
-    except (OSError, ValueError):
-        return False
+        for shard, made in made_shards(chips, layout, shards, wanted, progress.advance, makers):
+            for name, values in made.items():
+                save_block(arrays[name], (shard,), values)

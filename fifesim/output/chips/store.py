@@ -1,15 +1,15 @@
 """Zarr store of chips: metadata written at once, and shards written one by one from chips in memory."""
 
-import shutil
 import warnings
-import zlib
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+import zarr
 
 from fifesim.grids import cf
-from fifesim.output.folders import move_files, versions
+from fifesim.output.blocks import CHECKSUM, block_file, fresh_store
+from fifesim.output.folders import versions
 from fifesim.scenario.ensemble import LIGHT, realise, realise_arrays
 from fifesim.sensor.response import calibration
 
@@ -170,41 +170,37 @@ class Shards:
 
 def make_store(folder, chips, layout, shards):
     """Create a store whose chips have no values yet, or repair its metadata; existing shards stay."""
-    import zarr  # slow, and few runs write chips
-
-    fresh = folder / "fresh.partial"
-    shutil.rmtree(fresh, ignore_errors=True)
     table = chips.table()
-    group = zarr.create_group(fresh, zarr_format=3, attributes=_global_attributes(chips, layout, table))
-    for name, (dims, values, attributes) in _known_variables(chips, layout, table).items():
-        dtype, shape = str if values.dtype == object else values.dtype, values.shape
-        array = group.create_array(
-            name, shape=shape, dtype=dtype, chunks=shape, dimension_names=dims, attributes=attributes,
-            compressors=(zarr.codecs.ZstdCodec(level=0, checksum=False), zarr.codecs.Crc32cCodec()),
-        )  # fmt: skip
-        array[...] = values
-    # A fifth smaller than bytes shuffled, in half the time of level 5.
-    blosc = zarr.codecs.BloscCodec(cname="zstd", clevel=3, shuffle="bitshuffle")
-    for name, (dims, dtype) in layout.variables.items():
-        inside, number = layout.shape(dims), dtype.kind != "f"
-        group.create_array(
-            name,
-            shape=(len(chips), *inside),
-            dtype=dtype,
-            # One number per chip is fast to read.
-            chunks=(shards.chunk if dims else shards.length, *inside),
-            shards=(shards.length, *inside) if dims else None,
-            # With the checksum, zarr refuses to read damaged numbers.
-            compressors=(blosc, zarr.codecs.Crc32cCodec()),
-            fill_value=0 if number else np.nan,
-            dimension_names=("chip", *dims),
-            attributes=layout.attributes(name) | ({"_FillValue": 0} if number else {}),
-        )
-    with warnings.catch_warnings():
-        # Readers of Zarr 3 ignore unknown fields.
-        warnings.filterwarnings("ignore", "Consolidated metadata is currently not part")
-        zarr.consolidate_metadata(fresh)
-    move_files(fresh, folder)
+    with fresh_store(folder) as fresh:
+        group = zarr.create_group(fresh, zarr_format=3, attributes=_global_attributes(chips, layout, table))
+        for name, (dims, values, attributes) in _known_variables(chips, layout, table).items():
+            dtype, shape = str if values.dtype == object else values.dtype, values.shape
+            array = group.create_array(
+                name, shape=shape, dtype=dtype, chunks=shape, dimension_names=dims, attributes=attributes,
+                compressors=(zarr.codecs.ZstdCodec(level=0, checksum=False), CHECKSUM),
+            )  # fmt: skip
+            array[...] = values
+        # A fifth smaller than bytes shuffled, in half the time of level 5.
+        blosc = zarr.codecs.BloscCodec(cname="zstd", clevel=3, shuffle="bitshuffle")
+        for name, (dims, dtype) in layout.variables.items():
+            inside, number = layout.shape(dims), dtype.kind != "f"
+            group.create_array(
+                name,
+                shape=(len(chips), *inside),
+                dtype=dtype,
+                # One number per chip is fast to read.
+                chunks=(shards.chunk if dims else shards.length, *inside),
+                shards=(shards.length, *inside) if dims else None,
+                # With the checksum, zarr refuses to read damaged numbers.
+                compressors=(blosc, CHECKSUM),
+                fill_value=0 if number else np.nan,
+                dimension_names=("chip", *dims),
+                attributes=layout.attributes(name) | ({"_FillValue": 0} if number else {}),
+            )
+        with warnings.catch_warnings():
+            # Readers of Zarr 3 ignore unknown fields.
+            warnings.filterwarnings("ignore", "Consolidated metadata is currently not part")
+            zarr.consolidate_metadata(fresh)
 
 
 def stored_names(chips, layout):
@@ -214,45 +210,17 @@ def stored_names(chips, layout):
 
 def chips_in(folder):
     """Number of chips in a store."""
-    import zarr  # slow, and few runs write chips
-
     return zarr.open_array(folder, path="chip", mode="r").shape[0]
 
 
 def incomplete_variables(folder):
     """Names of the variables of chips without the file of a shard, whose numbers would be read as no data."""
-    import zarr  # slow, and few runs write chips
-
     found = []
     for name, array in zarr.open_group(folder, mode="r").arrays():
         if "_FillValue" in array.attrs or str(array.fill_value) == "nan":
             shards = range(-(-array.shape[0] // (array.shards or array.chunks)[0]))
-            found += [name] * (not all(_file(folder / name / "c" / str(shard)).is_file() for shard in shards))
+            found += [name] * (not all(block_file(array, (shard,)).is_file() for shard in shards))
     return sorted(found)
-
-
-def write_shard(folder, first, arrays):
-    """Write a shard."""
-    import zarr  # slow, and few runs write chips
-
-    for name, values in arrays.items():
-        array = zarr.open_array(folder, path=name, mode="r+")
-        # A shard left by an interrupted run would be read and merged.
-        _file(folder / name / "c" / str(first // (array.shards or array.chunks)[0])).unlink(missing_ok=True)
-        array[first : first + len(values)] = values
-
-
-def checksums(folder, names, shard):
-    """Checksums of the files of a shard."""
-    files = (_file(folder / name / "c" / str(shard)) for name in names)
-    return np.array([zlib.crc32(file.read_bytes()) for file in files], np.uint32)
-
-
-def _file(path):
-    """File of a shard, which is nested as deep as its array has dimensions."""
-    while path.is_dir():
-        path = path / "0"
-    return path
 
 
 def _known_variables(chips, layout, table):
