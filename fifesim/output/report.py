@@ -74,24 +74,20 @@ _FEWEST_PIXELS = 10
 _PAPERS_INSTRUMENT = "TM"
 
 
-def pairing_rows(scenario, fits):
-    """Published R2 for the ground of a run, and the reason for the difference, as two rows or none."""
+def published(scenario, fits):
+    """Published R2 for the ground of a run, R2 here and with the paper's pairing; None if it is not comparable."""
     paper, own = _paper_r2(scenario), scenario.sensor
     of_paper = own.description.name == _PAPERS_INSTRUMENT and own.response == "paper"
     if paper is None or "lai" not in fits or own.interval != "product" or not of_paper:
-        return []
+        return None
     interval = own.description.ground_intervals(own.description.select(own.bands)[0])[0]
-    why = (
-        f"{paper:.2f}, and {fits['lai'].r2:.2f} here, where pixels coincide with the blocks of ground that they are "
-        f"compared with. In the paper, if Table 1 is read literally, they are {interval:.3f} m apart and drift from "
-        f"blocks of {own.size:g} m"
-    )
-    typed = f'use interval = "native" in [sensor] and width = height = {_EDGE:g} in [grid], or fifesim reproduce'
-    found = _papers_pairing(scenario)
-    if found is not None:
-        cells, r2 = found
-        typed = f"R² {r2:.2f} for {cells} x {cells} cells of this ground on level terrain: {typed}"
-    return [("R² of LAI in Table 2 of Friedl et al. (1995)", why), ("With drifting pixels", typed)]
+    return {
+        "r2": paper,
+        "here": fits["lai"].r2,
+        "interval": interval,
+        "edge": _EDGE,
+        "drifting": _papers_pairing(scenario),
+    }
 
 
 def _paper_r2(scenario):
@@ -210,27 +206,30 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
     shown, means = _thinned(image, step), _thinned(truth, step)
     whole, *close = _overview_maps(shown, image, detail)
     figures = {name: png(fit_figure(shown, means, name, fit), _DPI) for name, fit in fits.items()}
+    own, dn = scenario.sensor, image["dn"]
     html = page_html(
         _TEMPLATE,
+        scenario=scenario,
+        dn=dn,
         title=headline(scenario),
         ground=ground_in_words(scenario),
-        provenance=scenario.provenance(),
-        finding=finding(fits, reasons),
+        reasons={_label(name): why for name, why in reasons.items()},
         results=main_results(truth, shown, means, fits),
-        inputs=inputs_in_words(scenario, image),
-        cautions=cautions(scenario),
-        one_stand=scenario.landscape.is_one(),
-        pairing=pairing(scenario, image, truth),
-        published=pairing_rows(scenario, fits),
-        summary=_summary(scenario, image, truth, reasons) + _ground(terrain) + engine_rows(scenario),
-        seen={"whole": whole, "close": close, "colours": false_colour_names(image["dn"])},
+        too_sharp=[band.name for band in own.description.select(own.bands) if not knows_blur(own.description, band)],
+        engine=engine_rows(scenario),
+        pairing=_paired(scenario, image, truth),
+        published=published(scenario, fits),
+        valid=float((dn != 0).all("band").mean()),
+        saturated=(dn >= 2**own.description.bits - 1).any("band"),
+        words={"sensor": sensor_in_words, "blur": blur_in_words, "noise": noise_in_words, "origin": origins_in_words},
+        statistics=_statistics(image, truth),
+        seen={"whole": whole, "close": close, "colours": false_colour_names(dn)},
         maps=_maps(shown, means, fits),
+        relief=terrain,
         terrain=[] if terrain is None else _terrain_maps(image, terrain, level),
-        band=str(image["dn"]["band"].values[-1]),
         histograms=[png(figure, _DPI) for figure in histogram_figures(shown, means, detail)],
         fits=[(_label(name), fit, figures[name]) for name, fit in fits.items()],
         parameters=_parameters(scenario),
-        history=image["dn"].attrs.get("history", "").splitlines(),
     )
     return encoded(whole.pixels, lossless=True), html
 
@@ -243,14 +242,6 @@ def headline(scenario):
     place = "FIFE site" if is_on_site(scenario) else position(*projection.middle(scenario.geobox()))
     text = f"Simulated {scenario.sensor.description.title} image, {place}{when}"
     return f"{text} ({synthetic})" if synthetic else text
-
-
-def finding(fits, reasons):
-    """Reason for missing regressions; empty if there are some."""
-    if fits:
-        return ""
-    why = "; ".join(dict.fromkeys(reasons.values()))
-    return f"No line was fitted: {why}" if why else "No line was fitted, because the bands have no NDVI."
 
 
 def main_results(truth, shown, means, fits):
@@ -275,53 +266,13 @@ def _line_error(shown, means, fit):
     return error.copy(data=fit.predict(ndvi.values) - values.values)
 
 
-def inputs_in_words(scenario, image):
-    """Main inputs in one line: scene, pixels, sun, view and atmosphere."""
-    grid, air, dn = scenario.grid, scenario.model_atmosphere(), image["dn"]
-    aerosol = f"visibility {air.visibility:g} km" if air.visibility is not None else f"aerosol thickness {air.aot:g}"
-    view = f"view zenith {scenario.geometry.vza:g}°" if scenario.geometry.vza else "nadir view"
-    return (
-        f"{grid.width / 1000:g} km x {grid.height / 1000:g} km in cells of {grid.cell:.3g} m, pixels of "
-        f"{scenario.sensor.pixel:g} m; sun zenith {float(dn['sza']):.1f}°, {view}; {air.profile} atmosphere, "
-        f"{air.aerosol} aerosol, {aerosol}, {air.engine}."
-    )
-
-
-def cautions(scenario):
-    """Limitations of a run, each as a sentence."""
-    own, found = scenario.sensor, []
-    for _, text in engine_rows(scenario):
-        if "beyond" in text:
-            found.append(f"Error of 5S compared with successive orders: {text}.")
-    if not any(own.offset):
-        error = own.description.geolocation
-        size = f"; the product has a geolocation error of {error:g} m" if error else ""
-        found.append(f"Pixels are assumed to be perfectly registered{size}.")
-    if not own.noise:
-        found.append("No detector noise is simulated.")
-    unknown = [band.name for band in own.description.select(own.bands) if not knows_blur(own.description, band)]
-    if unknown:
-        found.append(f"Only the detector response of {', '.join(unknown)} is known, so the image is too sharp.")
-    return found
-
-
-def pairing(scenario, image, truth):
-    """Text on the ground with which each pixel is compared."""
+def _paired(scenario, image, truth):
+    """Cells along the edge of a block, and sizes of cells and blocks and the distance of pixels from them. [m]"""
     block, cell = grids.cell_size(grids.geobox(truth["lai"]))[1], grids.cell_size(scenario.geobox())[1]
     pairs = ((image[axis].values, truth[axis].values) for axis in ("y", "x"))
     apart = [np.abs(np.subtract(*(each[: min(map(len, pair))] for each in pair))).max() for pair in pairs]
-    text = (
-        "Each point is a pixel of the image and the block of ground in the same row and column of the truth: the "
-        f"mean of {block / cell:.3g} x {block / cell:.3g} cells of {cell:.3g} m, a square of {block:g} m. "
-    )
-    if max(apart) < 1e-3 * block:
-        text += "Pixels and blocks have the same centres"
-    else:
-        text += f"Their centres are up to {np.hypot(*apart):.1f} m apart"
-    if any(scenario.sensor.offset):
-        down, right = scenario.sensor.offset
-        text += f", and the footprints are {down:g} pixels further south and {right:g} further east"
-    return text + "."
+    far = float(np.hypot(*apart)) if max(apart) >= 1e-3 * block else 0.0
+    return {"cells": block / cell, "cell": cell, "block": block, "apart": far}
 
 
 def _overview_maps(shown, image, detail):
@@ -410,47 +361,10 @@ def _thinned(rasters, step):
     return rasters.isel({axis: slice(step // 2, None, step) for axis in ("y", "x")}).compute()
 
 
-def _summary(scenario, image, truth, reasons):
-    """Rows of a small table with the main facts of a run."""
-    grid, own, pixels = scenario.grid, scenario.sensor, image["dn"]
-    valid = float((pixels != 0).all("band").mean())
-    size = f"{pixels.sizes['y']} x {pixels.sizes['x']}"
-    rows = [
-        ("Scene", f"{grid.width / 1000:g} km x {grid.height / 1000:g} km in cells of {grid.cell:.3g} m, {grid.crs}"),
-        ("Image", f"{size} pixels of {own.pixel:g} m" + ("" if valid == 1 else f", {100 * valid:.1f} % with data")),
-        ("Sensor", sensor_in_words(own.description, own.bands)),
-        ("Blur", blur_in_words(own.description, own.bands)),
-        ("Noise", noise_in_words(own.description, own.bands, own.noise)),
-        ("Origin of the description", origins_in_words(own.description, own.bands)),
-        *_saturation(own.description, pixels),
-        ("Sun", f"zenith {float(pixels['sza']):.1f} degrees, azimuth {float(pixels['saa']):.1f} degrees from north"),
-    ]
-    for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:
-        label = f"{capital(_label(name))} of the pixels"
-        mean, deviation = (fixed(float(each), 3) for each in (values.mean(), values.std()))
-        rows.append((label, f"mean {mean}, standard deviation {deviation}"))
-    return rows + [(f"R² of {_label(name)} on NDVI", f"none, {why}") for name, why in reasons.items()]
-
-
-def _saturation(description, pixels):
-    """Table row on saturated pixels, none if there are none."""
-    saturated = (pixels >= 2**description.bits - 1).any("band")
-    count, share = int(saturated.sum()), 100 * float(saturated.mean())
-    text = f"{count} ({share:.2g} %), which have no NDVI: their radiance is above the range of the instrument"
-    return [("Saturated pixels", text)] if count else []
-
-
-def _ground(terrain):
-    """Table rows on the elevation."""
-    if terrain is None:
-        return [("Ground", "flat")]
-    dem, kt = terrain["dem"], terrain["kt"]
-    known = ", ".join(f"{side[6:]} {distance / 1000:.3g} km" for side, distance in terrain.attrs.items())
-    return [
-        ("Elevation of the pixels", f"{float(dem.min()):.0f} to {float(dem.max()):.0f} m"),
-        ("Elevation known beyond the scene, for horizons", known),
-        ("Kt of the pixels", f"{float(kt.min()):.3f} to {float(kt.max()):.3f}"),
-    ]
+def _statistics(image, truth):
+    """Label, mean and standard deviation of each quantity of the pixels."""
+    rasters = [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]
+    return [(capital(_label(name)), float(values.mean()), float(values.std())) for name, values in rasters]
 
 
 def _parameters(scenario):

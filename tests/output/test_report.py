@@ -1,6 +1,7 @@
 """Contents of a report page."""
 
 import base64
+import html
 import re
 from types import SimpleNamespace
 
@@ -53,17 +54,31 @@ def simulated_run(request):
     return run_of(**request.param)
 
 
-def test_pairing_reports_the_offset_between_pixels_and_blocks(simulated_run):
+def page_of(run, fits=None, reasons=None):
+    """Text of a report page without its tags and pictures."""
+    scenario, image, truth, detail = run
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "png", lambda figure, dpi: b"")
+        page = report.run_page(scenario, image, truth, detail, None, None, fits or {}, reasons or {})[1]
+    return " ".join(re.sub("<[^>]*>", " ", html.unescape(page)).split())
+
+
+@pytest.fixture(scope="module")
+def page(simulated_run):
+    _, image, truth, _ = simulated_run
+    return page_of(simulated_run, {"lai": regress(truth["lai"], image["ndvi"], pair="index")})
+
+
+def test_pairing_reports_the_offset_between_pixels_and_blocks(simulated_run, page):
     """Nineteen intervals of 30.315 m between the first and last pixel centre extend 6 m beyond as many 30 m blocks."""
     scenario, image, truth, _ = simulated_run
-    text = report.pairing(scenario, image, truth)
-    assert "9 x 9 cells of 3.33 m, a square of 30 m" in text
+    assert "9 x 9 cells of 3.33 m, a square of 30 m" in page
     native = scenario.sensor.interval == "native"
-    assert ("have the same centres" in text) is not native
+    assert ("have the same centres" in page) is not native
     if native:
         down, across = (float(abs(image[axis][-1] - truth[axis][image.sizes[axis] - 1])) for axis in ("y", "x"))
-        assert f"up to {(down**2 + across**2) ** 0.5:.1f} m apart" in text and across > 5
-    assert ("0.5 pixels further south and 0 further east" in text) is (scenario.sensor.offset == [0.5, 0.0])
+        assert f"up to {(down**2 + across**2) ** 0.5:.1f} m apart" in page and across > 5
+    assert ("0.5 pixels further south and 0 further east" in page) is (scenario.sensor.offset == [0.5, 0.0])
 
 
 def test_main_results_match_the_regression(simulated_run):
@@ -82,10 +97,11 @@ def test_main_results_match_the_regression(simulated_run):
 
 
 def test_finding_without_a_regression_gives_the_reason():
-    assert report.finding({}, {"lai": "NDVI does not vary", "fpar": "NDVI does not vary"}) == (
-        "No line was fitted: NDVI does not vary"
-    )
-    assert "no NDVI" in report.finding({}, {})
+    run = run_of()
+    page = page_of(run, reasons={"lai": "NDVI does not vary", "fpar": "NDVI does not vary"})
+    assert re.search("No line was fitted: NDVI does not vary (?!;)", page)
+    assert "R² of FPAR on NDVI none, NDVI does not vary" in page
+    assert "No line was fitted, because the bands have no NDVI." in page_of(run)
 
 
 def test_headline_names_instrument_place_and_time():
@@ -98,24 +114,20 @@ def test_headline_names_instrument_place_and_time():
     )
 
 
-def test_cautions_name_the_omitted_effects(simulated_run):
-    scenario, image, *_ = simulated_run
-    said = " ".join(report.cautions(scenario))
-    assert ("perfectly registered" in said) is not any(scenario.sensor.offset)
-    assert "No detector noise" in said
-    assert "visibility 45 km" in report.inputs_in_words(scenario, image) and "nadir view" in report.inputs_in_words(
-        scenario, image
-    )
+def test_page_names_inputs_and_omitted_effects(simulated_run, page):
+    scenario, *_ = simulated_run
+    assert ("perfectly registered" in page) is not any(scenario.sensor.offset)
+    assert "No detector noise" in page and "visibility 45 km" in page and "nadir view" in page
 
 
-def test_saturated_pixels_are_counted_in_the_summary(simulated_run):
+def test_saturated_pixels_are_counted_in_the_summary():
     """Only where there are some; a pixel counts once, in however many bands it is saturated."""
-    scenario, image, truth, _ = simulated_run
-    assert "Saturated pixels" not in dict(report._summary(scenario, image, truth, {}))
+    scenario, image, truth, detail = run_of()
+    assert "Saturated pixels" not in page_of((scenario, image, truth, detail))
     bright = image.copy(deep=True)
     bright["dn"][:, 3, 4] = bright["dn"][0, 5, 6] = 255
-    text = dict(report._summary(scenario, bright, truth, {}))["Saturated pixels"]
-    assert text.startswith(f"2 ({200 / bright['ndvi'].size:.2g} %), which have no NDVI")
+    text = page_of((scenario, bright, truth, detail))
+    assert f"Saturated pixels 2 ({200 / bright['ndvi'].size:.2g} %), which have no NDVI" in text
 
 
 PAPER = {"grid": {"width": 1110, "height": 1110}, "ground": {"distribution": "burned-grazed", "arp": 0.15}}
@@ -123,15 +135,15 @@ PAPER |= {"sensor": {"response": "paper"}}
 
 
 def compare_with_paper(fits=None, **sections):
-    return report.pairing_rows(
+    return report.published(
         parse_scenario(PAPER | sections).complete(), {"lai": SimpleNamespace(r2=0.931)} if fits is None else fits
     )
 
 
 def test_report_explains_the_difference_from_the_published_r2():
-    (_, why), (_, typed) = compare_with_paper()
-    assert why.startswith("0.61, and 0.93 here") and "30.315 m apart" in why
-    assert 'interval = "native" in [sensor]' in typed and "fifesim reproduce" in typed
+    found = compare_with_paper()
+    assert found["r2"] == 0.61 and found["here"] == 0.931 and found["interval"] == pytest.approx(30.315, abs=5e-4)
+    cells, drifting = found["drifting"]
     # The predicted R2 is reached by a run with that key, on level ground.
     sections = {"terrain": {"dem": "flat"}, "sensor": {"interval": "native", "response": "paper"}}
     run = simulate(parse_scenario(PAPER | sections), chunks=None)
@@ -139,8 +151,14 @@ def test_report_explains_the_difference_from_the_published_r2():
     n = min(len(truth), len(ndvi))
     pairs = np.stack([truth[:n, :n].ravel(), ndvi[:n, :n].ravel()])
     r2 = np.corrcoef(pairs[:, np.isfinite(pairs).all(axis=0)])[0, 1] ** 2
-    assert float(re.search(r"R² (0\.\d\d) for 333 x 333 cells", typed)[1]) == pytest.approx(r2, abs=0.0051)
+    assert cells == 333 and drifting == pytest.approx(r2, rel=1e-9)
     assert 0.45 < r2 < 0.7
+    _, image, truth, detail = run_of()
+    fit = regress(truth["lai"], image["ndvi"], pair="index")
+    page = page_of((parse_scenario(PAPER).complete(), image, truth, detail), {"lai": fit})
+    assert f"0.61, and {fit.r2:.2f} here" in page and "30.315 m apart" in page
+    assert f"R² {drifting:.2f} for 333 x 333 cells" in page
+    assert 'interval = "native" in [sensor]' in page and "fifesim reproduce" in page
 
 
 @pytest.mark.parametrize(
@@ -155,7 +173,7 @@ def test_report_explains_the_difference_from_the_published_r2():
     ids=str,
 )
 def test_other_runs_are_not_compared_with_the_paper(sections):
-    assert compare_with_paper(**sections) == []
+    assert compare_with_paper(**sections) is None
 
 
 def test_figures_show_the_regression_and_each_pixel():
