@@ -229,7 +229,6 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
         terrain=[] if terrain is None else _terrain_maps(image, terrain, level),
         histograms=[png(figure, _DPI) for figure in histogram_figures(shown, means, detail)],
         fits=[(_label(name), fit, figures[name]) for name, fit in fits.items()],
-        parameters=_parameters(scenario),
     )
     return encoded(whole.pixels, lossless=True), html
 
@@ -365,25 +364,3 @@ def _statistics(image, truth):
     """Label, mean and standard deviation of each quantity of the pixels."""
     rasters = [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]
     return [(capital(_label(name)), float(values.mean()), float(values.std())) for name, values in rasters]
-
-
-def _parameters(scenario):
-    """Key, value, unit and meaning of every parameter, by section."""
-    sections = []
-    for place, section in scenario.sections().items():
-        rows = []
-        for key, known in section.written.items():
-            value, unit = getattr(section, key), section.unit(key)
-            if isinstance(value, dict):
-                value = ", ".join(f"{band} {number:g}" for band, number in value.items())
-            elif isinstance(value, list):
-                value = ", ".join(map(str, value)) or "none"
-            elif isinstance(value, float):
-                value = f"{value:.10g}"
-            elif isinstance(value, bool):
-                value = "yes" if value else "no"
-            elif section.names_a_file(key, value):
-                value = Path(value).name
-            rows.append((key, "not given" if value is None else value, unit, known.description))
-        sections.append((".".join(place), rows))
-    return sections
