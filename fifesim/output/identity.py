@@ -6,6 +6,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from fifesim.base.files import whole_file
 from fifesim.grids.opening import archive_of, raster_file
 from fifesim.output.folders import BEGUN, UNFINISHED, versions
 from fifesim.scenario.scenario import read_scenario
@@ -111,11 +112,10 @@ def begin(unfinished, identity):
     if (unfinished / BEGUN).is_file():
         _check_same(unfinished, identity)
         return
-    for name, text in identity.items():
-        (unfinished / f"{name}.partial").write_text(text, encoding="utf-8")
     # The last file marks the run as begun.
-    for name in identity:
-        os.replace(unfinished / f"{name}.partial", unfinished / name)
+    for name, text in identity.items():
+        with whole_file(unfinished / name) as new:
+            new.write_text(text, encoding="utf-8")
 
 
 def kept_json(path):

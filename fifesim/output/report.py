@@ -214,7 +214,7 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
         title=headline(scenario),
         ground=ground_in_words(scenario),
         reasons={_label(name): why for name, why in reasons.items()},
-        results=main_results(truth, shown, means, fits),
+        error=np.nanpercentile(_line_error(shown, means, fits["lai"]), [5, 95]) if "lai" in fits else None,
         too_sharp=[band.name for band in own.description.select(own.bands) if not knows_blur(own.description, band)],
         engine=engine_rows(scenario),
         pairing=_paired(scenario, image, truth),
@@ -228,7 +228,7 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
         relief=terrain,
         terrain=[] if terrain is None else _terrain_maps(image, terrain, level),
         histograms=[png(figure, _DPI) for figure in histogram_figures(shown, means, detail)],
-        fits=[(_label(name), fit, figures[name]) for name, fit in fits.items()],
+        fits=[(_label(name), fit, figures[name], float(truth[name].mean())) for name, fit in fits.items()],
     )
     return encoded(whole.pixels, lossless=True), html
 
@@ -241,21 +241,6 @@ def headline(scenario):
     place = "FIFE site" if is_on_site(scenario) else position(*projection.middle(scenario.geobox()))
     text = f"Simulated {scenario.sensor.description.title} image, {place}{when}"
     return f"{text} ({synthetic})" if synthetic else text
-
-
-def main_results(truth, shown, means, fits):
-    """Main results, each as value, name and explanation."""
-    found = []
-    for name, fit in fits.items():
-        mean = float(truth[name].mean())
-        share = f", {100 * fit.residual_deviation / mean:.0f} % of the mean" if mean > 0 else ""
-        text = f"standard deviation of true {_label(name)} about a line on NDVI{share}; R² = {fit.r2:.3f}"
-        found.append((f"± {fit.residual_deviation:.3f}", _label(name), text))
-    if "lai" in fits:
-        low, high = np.nanpercentile(_line_error(shown, means, fits["lai"]), [5, 95])
-        text = "difference of LAI from the line and true LAI, 5th to 95th percentile of the pixels (map below)"
-        found.append((f"{fixed(low, 2, True)} to {fixed(high, 2, True)}", "LAI error", text))
-    return found
 
 
 def _line_error(shown, means, fit):

@@ -231,15 +231,10 @@ def _layer(found, at, image, name, history, what=""):
 
 def _flag(values, image, history):
     """Flag as whole numbers, -1 for no data."""
-    flag = chunks.pointwise(_whole, values, dtype=np.int8)
-    flag = swaths.placed_as(flag, image).rename("flag")
+    flag = swaths.placed_as(values.fillna(-1).astype(np.int8), image).rename("flag")
     flag.attrs = _FLAG | {"history": history}
     flag.encoding["_FillValue"] = np.int8(-1)
     return flag
-
-
-def _whole(values):
-    return np.where(np.isnan(values), -1, values)
 
 
 def _by_sl2p(image):
