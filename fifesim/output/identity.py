@@ -52,7 +52,11 @@ def scenario_to_resume(folder):
 
 def state_of(inputs, begun, **options):
     """Properties that must agree for the blocks of two runs to fit together, as texts of files by name."""
-    known = {"versions": versions(), "inputs": with_checksums(inputs), "scenario": _digest(begun)}
+    known = {
+        "versions": versions(),
+        "inputs": with_checksums(inputs),
+        "scenario": hashlib.blake2b("\n".join(_keys(begun)).encode()).hexdigest(),
+    }
     return {STATE: json.dumps(known | options), BEGUN: begun}
 
 
@@ -155,11 +159,6 @@ def _check_same(unfinished, identity):
 def _keys(text):
     """Lines of a TOML text without comments."""
     return [line.strip() for line in text.splitlines() if not line.startswith("#")]
-
-
-def _digest(text):
-    """Checksum of a TOML text without comments."""
-    return hashlib.blake2b("\n".join(_keys(text)).encode()).hexdigest()
 
 
 def _other_lines(old, new):

@@ -35,12 +35,12 @@ def wanted_blocks(rasters, lai):
     """Blocks of all products in the order of computation: by the chunk of the scene in which they are."""
     cells, edges, ranked = grids.geobox(lai), [np.cumsum(sizes) for sizes in lai.chunks], []
     for number, (name, raster) in enumerate(rasters.items()):
-        grid = grids.geobox(raster)
+        to_cells = ~cells.affine * grids.geobox(raster).affine
         for index in np.ndindex(raster.data.numblocks):
-            place = tuple(
-                int(np.searchsorted(edges[axis], _cell(grid, cells, axis, sum(sizes[:at]) + sizes[at] / 2), "right"))
-                for axis, (sizes, at) in enumerate(zip(raster.chunks[-2:], index[-2:], strict=True))
-            )
+            sides = zip(raster.chunks[-2:], index[-2:], strict=True)
+            row, column = (sum(sizes[:at]) + sizes[at] / 2 for sizes, at in sides)
+            column, row = to_cells * (column, row)
+            place = tuple(int(np.searchsorted(*each, "right")) for each in zip(edges, (row, column), strict=True))
             ranked.append((place, number, index, name))
     return [(name, index) for _, _, index, name in sorted(ranked)]
 
@@ -73,9 +73,3 @@ def _middle_cells(lai, image):
         part = _middle(image.sizes[axis], _DETAIL)
         cut[axis] = slice(round(part.start * pixel / cell), round(part.stop * pixel / cell))
     return lai.isel(cut)
-
-
-def _cell(grid, cells, axis, at):
-    """Row or column of the scene at a place in another grid."""
-    a, b = grid.affine, cells.affine
-    return (a.f + at * a.e - b.f) / b.e if axis == 0 else (a.c + at * a.a - b.c) / b.a
