@@ -39,10 +39,10 @@ def block_store(folder, arrays):
         for name, array in arrays.items():
             layout = {"shape": array.shape, "chunks": array.chunksize, "dtype": array.dtype, "fill_value": 0}
             zarr.create_array(fresh, name=name, compressors=CHECKSUM, **layout)
-    return {name: opened(folder, name) for name in arrays}
+    return {name: open_blocks(folder, name) for name in arrays}
 
 
-def opened(folder, name):
+def open_blocks(folder, name):
     """Zarr array of a store that saves blocks of zeros too."""
     return zarr.open_array(folder, path=name).with_config({"write_empty_chunks": True})
 

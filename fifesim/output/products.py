@@ -13,7 +13,7 @@ _TERRAIN = 512
 # Side of a chunk of a scene product; each chunk is a file. [cell]
 _SIDE = 1008
 
-SCENE = "scene-"
+SCENE_PREFIX = "scene-"
 """Beginning of the names of scene products."""
 
 
@@ -27,7 +27,7 @@ def products_of(tree, scene=False):
         rasters["level"] = _shown(tree["level"]["dn"])
     sides = {name: {axis: max(raster.chunksizes[axis]) for axis in ("y", "x")} for name, raster in rasters.items()}
     for name, raster in tree["scene"].data_vars.items() if scene else ():
-        rasters[f"{SCENE}{name}"], sides[f"{SCENE}{name}"] = raster, {"y": _SIDE, "x": _SIDE}
+        rasters[f"{SCENE_PREFIX}{name}"], sides[f"{SCENE_PREFIX}{name}"] = raster, {"y": _SIDE, "x": _SIDE}
     return {name: raster.chunk(dict.fromkeys(raster.dims, -1) | sides[name]) for name, raster in rasters.items()}
 
 

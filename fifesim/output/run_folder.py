@@ -141,7 +141,7 @@ def _compute(rasters, lai, store, client, threads, as_json):
 
 def _write_files(scenario, tree, saved, folder, home):
     """Write the files of a run from its saved blocks."""
-    cells = {name: saved.pop(f"{products.SCENE}{name}", None) for name in tree["scene"].data_vars}
+    cells = {name: saved.pop(f"{products.SCENE_PREFIX}{name}", None) for name in tree["scene"].data_vars}
     if cells["lai"] is not None:
         products.write_scene(folder / SCENE, xr.Dataset(cells))
     if sum(raster.nbytes for raster in saved.values()) <= _IN_MEMORY:

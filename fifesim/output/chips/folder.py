@@ -15,7 +15,7 @@ from fifesim.base.messages import warn
 from fifesim.grids.chunks import found_client
 from fifesim.ground.landscape.autoregression import FIELD_TILE
 from fifesim.output import identity
-from fifesim.output.blocks import has_blocks, is_saved, opened, save_block
+from fifesim.output.blocks import has_blocks, is_saved, open_blocks, save_block
 from fifesim.output.chips import store
 from fifesim.output.chips.makers import made_shards, processes, workers_of
 from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, errors_with_their_file, results
@@ -210,7 +210,7 @@ def _inputs(chips):
 
 def _compute(chips, layout, shards, folder, as_json, makers):
     """Make and write the missing shards."""
-    arrays = {name: opened(folder, name) for name in layout.variables}
+    arrays = {name: open_blocks(folder, name) for name in layout.variables}
     wanted = [shard for shard in range(len(shards)) if not all(is_saved(array, (shard,)) for array in arrays.values())]
     done = len(chips) - sum(np.diff(shards.range_of(shard)).item() for shard in wanted)
     with Progress("making chips", "chips", len(chips), done, as_json) as progress:
