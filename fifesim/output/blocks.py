@@ -12,10 +12,11 @@ from pathlib import Path
 
 import dask.array as da
 import zarr
+from zarr.codecs import Crc32cCodec
 
 from fifesim.output.identity import NotThisRun
 
-CHECKSUM = zarr.codecs.Crc32cCodec()
+CHECKSUM = Crc32cCodec()
 
 
 @contextmanager
