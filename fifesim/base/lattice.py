@@ -11,12 +11,9 @@ origin of each grid would differ by 1e-10 m, and xarray aligns exactly. A value 
 window and chunk.
 """
 
-from weakref import ref
-
 import numpy as np
 
 from fifesim.base.arguments import described
-from fifesim.base.caches import cached
 
 SEED_LIMIT = 2**63  # scenario files hold signed whole numbers
 
@@ -76,19 +73,3 @@ def _overlap(tile, index, window_start, window_size):
     tile_start = index * tile
     start, stop = max(tile_start, window_start), min(tile_start + tile, window_start + window_size)
     return slice(start - window_start, stop - window_start), slice(start - tile_start, stop - tile_start)
-
-
-class KeptTiles:
-    """Function ``make(tile_row, tile_column)`` whose last tiles are cached; a copy in another process starts empty."""
-
-    def __init__(self, make):
-        self.make = make
-
-    def __call__(self, tile_row, tile_column):
-        return _kept_tile(ref(self), tile_row, tile_column)
-
-
-@cached(8, "tiles of elevation models")
-def _kept_tile(tiles, row, column):
-    # By a weak reference, so that the source of the tiles is not kept.
-    return tiles().make(row, column)

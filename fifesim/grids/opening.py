@@ -150,8 +150,9 @@ class RasterFile:
         """Open the file."""
         return rasterio.open(self.path, driver=self.driver)
 
-    def read(self, source, window):
+    def read(self, source, rows, columns):
         """Values of a window of the open file in their unit, NaN for no data, shape (rows, columns)."""
+        window = Window.from_slices(rows, columns)
         values = source.read(self.band, window=window, masked=True).astype(float).filled(np.nan)
         return values * source.scales[self.band - 1] + source.offsets[self.band - 1]
 

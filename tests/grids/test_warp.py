@@ -15,7 +15,7 @@ from scipy.interpolate import RegularGridInterpolator
 import fifesim
 from fifesim.grids import grid as grids
 from fifesim.grids import projection, warp
-from fifesim.grids.opening import raster_file
+from fifesim.grids.source import open_source
 
 FIFE = (-96.63, 38.98, -96.45, 39.13)
 GRID = fifesim.fife_site(10.0, window=((300, 400), (500, 620)))
@@ -25,6 +25,11 @@ def hills(rows, columns):
     """Values that vary smoothly over several file cells and differ everywhere."""
     i, j = np.arange(rows)[:, None], np.arange(columns)
     return 2 + np.sin(i / 5) + 0.5 * np.cos(j / 7 + i / 11)
+
+
+def on_grid(raster, grid, chunks=None):
+    """Leaf area index on a grid."""
+    return warp.onto_grid(open_source(raster, "lai"), grid, chunks)
 
 
 def write_geographic(path, values=None, crs="EPSG:4326", cell=0.0002):
@@ -119,9 +124,9 @@ def test_cells_of_foreign_maps_are_in_the_right_place(tmp_path, name):
     rows, columns = np.indices(shape) + 0.5
     for values, expected in ((columns, (x - affine.c) / cell), (rows, (affine.f - y) / cell)):
         path = write(tmp_path / "map.tif", values, affine, crs)
-        np.testing.assert_allclose(warp.file_onto_grid(raster_file(path), grid), expected, rtol=0, atol=1e-3)
+        np.testing.assert_allclose(on_grid(path, grid), expected, rtol=0, atol=1e-3)
         opened = rioxarray.open_rasterio(path)[0]
-        np.testing.assert_allclose(warp.raster_onto_grid(opened, grid), expected, rtol=0, atol=1e-3)
+        np.testing.assert_allclose(on_grid(opened, grid), expected, rtol=0, atol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -156,7 +161,7 @@ def test_degrees_onto_metres_is_bilinear_interpolation(tmp_path, crs):
     The values change by at most 0.3 per cell.
     """
     path, values = write_geographic(tmp_path / "lai.tif", crs=crs)
-    found = warp.file_onto_grid(raster_file(path), GRID)
+    found = on_grid(path, GRID)
     pipeline = projection.operation("EPSG:26914", crs, FIFE)
 
     def to_degrees(x, y):
@@ -175,20 +180,20 @@ def test_metres_onto_metres_is_bilinear_interpolation(tmp_path, cell, shift):
     values = hills(*(np.array([4000, 4000]) // cell).astype(int))
     path = write(tmp_path / "lai.tif", values, affine, "EPSG:26914")
     expected = interpolated(path, values, GRID, lambda x, y: (x, y))
-    np.testing.assert_allclose(warp.file_onto_grid(raster_file(path), GRID), expected, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(on_grid(path, GRID), expected, rtol=0, atol=1e-6)
 
 
 def test_file_on_the_grid_is_read_unchanged(tmp_path):
     values = hills(100, 120)
     path = write(tmp_path / "lai.tif", values, GRID.affine, "EPSG:26914")
-    np.testing.assert_array_equal(warp.file_onto_grid(raster_file(path), GRID), values)
+    np.testing.assert_array_equal(on_grid(path, GRID), values)
 
 
 def test_larger_cells_hold_means(tmp_path):
     values = np.random.default_rng(0).random((500, 600))
     path = write(tmp_path / "lai.tif", values, GRID.affine * Affine.scale(0.2), "EPSG:26914")
     means = values.reshape(100, 5, 120, 5).mean(axis=(1, 3))
-    np.testing.assert_allclose(warp.file_onto_grid(raster_file(path), GRID), means, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(on_grid(path, GRID), means, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:26914"])
@@ -198,14 +203,14 @@ def test_chunks_and_windows_change_nothing(tmp_path, crs):
         path, _ = write_geographic(tmp_path / "lai.tif")
     else:
         path = write(tmp_path / "lai.tif", hills(300, 300), Affine(17, 0, 709003, 0, -17, 4332000), crs)
-    whole = warp.file_onto_grid(raster_file(path), grid)
+    whole = on_grid(path, grid)
     assert np.isfinite(whole).any()
     for chunks in ("auto", 333, {"y": 101, "x": 700}):
         with no_compute():
-            lazy = warp.file_onto_grid(raster_file(path), grid, chunks)
+            lazy = on_grid(path, grid, chunks)
         assert lazy.chunks is not None
         xr.testing.assert_identical(lazy.compute(), whole)
-    part = warp.file_onto_grid(raster_file(path), grid[200:420, 10:600])
+    part = on_grid(path, grid[200:420, 10:600])
     xr.testing.assert_identical(part, whole[200:420, 10:600].assign_coords(spatial_ref=part["spatial_ref"]))
 
 
@@ -217,8 +222,8 @@ def test_no_data_stays_no_data(tmp_path, dtype, nodata):
     affine = Affine(10, 0, GRID.affine.c - 1400, 0, -10, GRID.affine.f + 1200)
     path = write(tmp_path / "lai.tif", values, affine, "EPSG:26914", nodata=nodata, dtype=dtype)
     expected = values[120:220, 140:260]
-    np.testing.assert_array_equal(warp.file_onto_grid(raster_file(path), GRID), expected)
-    finer = warp.file_onto_grid(raster_file(path), fifesim.fife_site(4.0, window=((750, 1000), (1250, 1550))))
+    np.testing.assert_array_equal(on_grid(path, GRID), expected)
+    finer = on_grid(path, fifesim.fife_site(4.0, window=((750, 1000), (1250, 1550))))
     np.testing.assert_allclose(finer.values[np.isfinite(finer)], 3.0, rtol=1e-14)
     assert np.isnan(finer[90, 200]) and np.isfinite(finer[10, 10])
 
@@ -226,7 +231,7 @@ def test_no_data_stays_no_data(tmp_path, dtype, nodata):
 def test_cells_beyond_the_file_are_missing(tmp_path):
     affine = Affine(10, 0, GRID.affine.c + 300, 0, -10, GRID.affine.f - 400)
     path = write(tmp_path / "lai.tif", hills(400, 400), affine, "EPSG:26914")
-    found = warp.file_onto_grid(raster_file(path), GRID)
+    found = on_grid(path, GRID)
     assert np.isnan(found[:40]).all() and np.isnan(found[:, :30]).all()
     assert np.isfinite(found[40:, 30:]).all()
 
@@ -239,7 +244,7 @@ def test_nad27_file_is_placed_correctly(tmp_path):
     pipeline = projection.operation("EPSG:26714", "EPSG:26914", FIFE)
     east, north = pyproj.Transformer.from_pipeline(pipeline).transform(711050.0, 4329950.0)
     grid = fifesim.grid_at("EPSG:26914", 710700.0, 4330600.0, 800.0, 800.0, 2.0)
-    found = warp.file_onto_grid(raster_file(path), grid)
+    found = on_grid(path, grid)
     assert float((found * found["x"]).sum() / found.sum()) == pytest.approx(east, abs=0.5)
     assert float((found * found["y"]).sum() / found.sum()) == pytest.approx(north, abs=0.5)
 
@@ -247,12 +252,9 @@ def test_nad27_file_is_placed_correctly(tmp_path):
 def test_grids_not_in_metres_are_rejected(tmp_path):
     path = write(tmp_path / "hills.tif", hills(40, 40), GRID.affine, "EPSG:26914")
     degrees = GeoBox((9, 9), Affine(0.001, 0, -97, 0, -0.001, 39), "EPSG:4326")
-    for bring, raster in (
-        (warp.file_onto_grid, raster_file(path)),
-        (warp.raster_onto_grid, fifesim.open_lai(path, GRID)),
-    ):
+    for raster in (path, fifesim.open_lai(path, GRID)):
         with pytest.raises(ValueError, match="the grid is in a geographic CRS"):
-            bring(raster, degrees)
+            on_grid(raster, degrees)
 
 
 @pytest.mark.parametrize("times", [8, 40])
@@ -262,15 +264,15 @@ def test_far_finer_files_are_averaged_block_by_block(tmp_path, times):
     values = np.random.default_rng(0).random((36 * times, 40 * times)).astype("float32")
     path = write(tmp_path / "fine.tif", values, grid.affine * Affine.scale(1 / times), "EPSG:26914", dtype="float32")
     means = values.astype(float).reshape(36, times, 40, times).mean(axis=(1, 3))
-    whole = warp.file_onto_grid(raster_file(path), grid)
+    whole = on_grid(path, grid)
     np.testing.assert_allclose(whole, means, rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(warp.file_onto_grid(raster_file(path), grid[7:29, 11:30]), whole[7:29, 11:30])
-    np.testing.assert_array_equal(warp.file_onto_grid(raster_file(path), grid, chunks=13), whole)
+    np.testing.assert_array_equal(on_grid(path, grid[7:29, 11:30]), whole[7:29, 11:30])
+    np.testing.assert_array_equal(on_grid(path, grid, chunks=13), whole)
 
 
 def test_block_size_limits_the_number_of_cells_read():
-    assert warp._block_size(warp._MUCH_FINER) == warp._TILE
-    assert [warp._block_size(cells) for cells in (7, 64, 65, 2048, 1e6, np.nan)] == [32, 32, 16, 1, 1, 32]
+    assert warp._block_size(warp._MUCH_FINER, 512) == 512
+    assert [warp._block_size(cells, 512) for cells in (7, 64, 65, 2048, 1e6, np.nan)] == [32, 32, 16, 1, 1, 32]
 
 
 def test_grid_cells_with_too_many_file_cells_are_rejected(tmp_path):
@@ -294,13 +296,13 @@ def test_array_is_warped_like_its_file(tmp_path, kind, south_up):
         path = write(tmp_path / "lai.tif", hills(120, 130), Affine(cell, 0, 709450, 0, -cell, 4331500), "EPSG:26914")
     raster = xr.DataArray(rioxarray.open_rasterio(path, masked=True))
     raster = raster.isel(y=slice(None, None, -1)) if south_up else raster
-    whole = warp.file_onto_grid(raster_file(path), GRID)
+    whole = on_grid(path, GRID)
     assert np.isfinite(whole).mean() > 0.3
     tolerance = {"rtol": 0, "atol": 1e-9 if south_up else 0}
-    found = warp.raster_onto_grid(raster.squeeze("band"), GRID)
+    found = on_grid(raster.squeeze("band"), GRID)
     np.testing.assert_allclose(found, whole, **tolerance)
     with no_compute():
-        lazy = warp.raster_onto_grid(raster.squeeze("band").chunk({"y": 50, "x": 70}), GRID, {"y": 33, "x": 41})
+        lazy = on_grid(raster.squeeze("band").chunk({"y": 50, "x": 70}), GRID, {"y": 33, "x": 41})
     np.testing.assert_array_equal(lazy.compute(scheduler="synchronous"), found)
     check_place(lazy, GRID.crs)
 
@@ -312,4 +314,4 @@ def test_source_without_overlap_is_rejected_with_its_location(tmp_path):
     away = xr.DataArray(np.ones((4, 4)), dims=("y", "x"), name="mine")
     grid = fifesim.grid_at("EPSG:32735", 620000.0, 7220000.0, 40.0, 40.0, 10.0)
     with pytest.raises(ValueError, match=r"mine does not overlap .* it spans 620000 to 620040 E .*\(latitude -25.13, "):
-        warp.raster_onto_grid(grids.place(away, grid), GRID)
+        on_grid(grids.place(away, grid), GRID)

@@ -18,7 +18,7 @@ from fifesim.grids.windows import with_origin
 from fifesim.ground.canopy import layers
 from fifesim.ground.canopy.crowns import SHAPE, check_crowns, crown_shares, lai_in_crowns
 from fifesim.ground.canopy.description import Canopy
-from fifesim.ground.canopy.leaf_area import check_map, warn_of_large
+from fifesim.ground.canopy.leaf_area import check_map, warn_of_integers, warn_of_large
 from fifesim.ground.canopy.properties import NUMERIC_PROPERTIES
 from fifesim.ground.canopy.reflectance_table import (
     Scene,
@@ -28,7 +28,6 @@ from fifesim.ground.canopy.reflectance_table import (
     uniform_scene,
     with_shares,
 )
-from fifesim.ground.layer_labels import warn_of_integers
 
 CELL_SHARES = ("brown", "dissociation", "crown_cover")  # properties that may vary by cell in SAIL
 

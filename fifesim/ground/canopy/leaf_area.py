@@ -91,6 +91,15 @@ def check_source(name, values):
         ) from None
 
 
+def warn_of_integers(name):
+    """Warn that integers without a scale are used as leaf area index."""
+    warn(
+        f"{name} holds integers without a scale, which are used as leaf area index: if they are scaled, set their "
+        "scale (.assign_attrs(scale_factor=0.1), or gdal_edit.py -a_scale 0.1 for a file), else convert them with "
+        ".astype(float)"
+    )
+
+
 def warn_of_large(lai):
     """Warn if the mean leaf area index is implausibly large."""
     total, count = np.nansum(lai), np.count_nonzero(~np.isnan(lai))

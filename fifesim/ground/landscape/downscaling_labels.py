@@ -21,12 +21,12 @@ from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.dates import by_date
 from fifesim.grids.grid import north_up
+from fifesim.grids.source import one_layer
 from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.landscape import downscaling
 from fifesim.ground.landscape.autoregression import check_streaming_arp, window_field
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.lai_labels import distribution_name
-from fifesim.ground.layer_labels import one_layer
 
 # Cells along a fixed tile, and pixels at least.
 _TILE, _FEWEST_PIXELS = 504, 8

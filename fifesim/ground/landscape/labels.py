@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from numbers import Number
-from pathlib import Path
 from typing import Annotated, TypeAlias
 
 import numpy as np
@@ -13,16 +12,16 @@ import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.base.arguments import ANYTHING, UNCHECKED, Chunks, FilePath, WholeNumber, described, is_path
-from fifesim.base.files import in_a_line
 from fifesim.base.lattice import check_seed
 from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.classes import NO_CLASS, check_codes, numbers_of
 from fifesim.grids.directions import Directions
-from fifesim.grids.inputs import FileOrRaster, unpacked
+from fifesim.grids.inputs import FileOrRaster
 from fifesim.grids.sites import is_fife, made_on_site
-from fifesim.grids.warp import file_onto_grid, raster_onto_grid
+from fifesim.grids.source import open_source
+from fifesim.grids.warp import onto_grid
 from fifesim.ground.canopy.leaf_area import check_share
 from fifesim.ground.canopy.soil import check_brightness
 from fifesim.ground.landscape import distribution
@@ -31,7 +30,6 @@ from fifesim.ground.landscape.classes import CoverClass, Field, class_table, fif
 from fifesim.ground.landscape.cover import Patches, patch_classes
 from fifesim.ground.landscape.field_labels import drawn_fields
 from fifesim.ground.landscape.lai_labels import lai_window
-from fifesim.ground.layer_labels import file_of, one_layer
 
 # Chunk size for "auto" is a multiple of this. [cell]
 _TILE = 1008
@@ -60,20 +58,16 @@ def drawn_cover(grid, patches, table, seed, chunks=None):
 
 def cover_map(path_or_raster, grid, table, chunks=None, *, allow_remote=False):
     """Class codes of a user-supplied map on a grid, dims (y, x), int16, -1 where the map has no data."""
-    if isinstance(path_or_raster, xr.DataArray):
-        name = in_a_line(str(path_or_raster.name or "raster"), 150)
-        found = raster_onto_grid(unpacked(one_layer(path_or_raster, "cover")), grid, chunks, classes=True)
-    else:
-        name = in_a_line(Path(path_or_raster).name, 150)
-        found = file_onto_grid(file_of("cover", path_or_raster, allow_remote), grid, chunks, classes=True)
+    source = open_source(path_or_raster, "cover", allow_remote)
+    found = onto_grid(source, grid, chunks, classes=True)
     codes = tuple(each.code for each in table)
     cover = grids.place(chunking.pointwise(check_codes, found, dtype=np.int16, table=codes), grid)
     if cover.chunks is None and not (cover.values != NO_CLASS).any():
         raise ValueError(
-            f"the map of cover {name} has no data on the grid, which spans {grids.extent(grid)}: look at its nodata "
-            "value with gdalinfo -stats"
+            f"the map of cover {source.name} has no data on the grid, which spans {grids.extent(grid)}: look at its "
+            "nodata value with gdalinfo -stats"
         )
-    return _labelled(cover, table, f"landscape: cover of {name}")
+    return _labelled(cover, table, f"landscape: cover of {source.name}")
 
 
 def classes_of(cover):
@@ -323,14 +317,12 @@ def _property(name, given, grid, chunks, allow_remote):
     check = check_brightness if name == "soil" else partial(check_share, name)
     if isinstance(given, Number):
         return cf.label(xr.DataArray(check(float(given))), name, history=f"landscape: {name} {given:g}")
-    if isinstance(given, xr.DataArray):
-        found = raster_onto_grid(one_layer(given.rename(name), name), grid, chunks)
-    elif is_path(given):
-        found = file_onto_grid(file_of(name, given, allow_remote), grid, chunks)
-    else:
+    if not (isinstance(given, xr.DataArray) or is_path(given)):
         raise TypeError(
             f"{name} must be a number, a fifesim.Field, the path of a raster or an xarray.DataArray, got "
             f"{described(given)}"
         )
+    source = open_source(given.rename(name) if isinstance(given, xr.DataArray) else given, name, allow_remote)
+    found = onto_grid(source, grid, chunks)
     shares = grids.place(chunking.pointwise(check, found), grid)
     return cf.label(shares, name, history=f"landscape: {name} of a raster")

@@ -7,25 +7,22 @@ from typing import Literal
 
 import numpy as np
 import psutil
-import pyproj
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.base.arguments import Chunks, LaiDistribution, Times, WholeNumber
-from fifesim.base.files import in_a_line
 from fifesim.base.lattice import check_seed
 from fifesim.base.times import utc
 from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
-from fifesim.grids.inputs import FileOrRaster, storage_of
-from fifesim.grids.opening import sound_raster
+from fifesim.grids.inputs import FileOrRaster
 from fifesim.grids.sites import made_on_site, one_or_several
-from fifesim.grids.warp import file_onto_grid, raster_onto_grid
-from fifesim.ground.canopy.leaf_area import check_map, check_source, warn_of_large
+from fifesim.grids.source import open_source
+from fifesim.grids.warp import onto_grid
+from fifesim.ground.canopy.leaf_area import check_map, check_source, warn_of_integers, warn_of_large
 from fifesim.ground.landscape.autoregression import FIELD_TILE, check_arp, periodic_field, streaming_field
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
-from fifesim.ground.layer_labels import file_of, one_layer, warn_of_integers, words_of
 
 _REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
 
@@ -254,42 +251,14 @@ def phenology(
 
 def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
     """Map of leaf area index on a grid, possibly without data, dims (y, x). [m2 m-2]"""
-    if isinstance(path_or_raster, xr.DataArray):
-        name = in_a_line(str(path_or_raster.name or "raster"), 150)
-        layer = one_layer(path_or_raster, "lai")
-        _check_array(layer)
-        found = raster_onto_grid(layer, grid, chunks, check=check_source)
-    else:
-        name = in_a_line(Path(path_or_raster).name, 150)
-        file = file_of("lai", path_or_raster, allow_remote)
-        _check_band(file, name)
-        found = file_onto_grid(file, grid, chunks, check=check_source)
-    lai = chunking.pointwise(_plausible, found)
-    return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
-
-
-def _check_array(raster):
-    """Raise ValueError if an array is another quantity by name, and warn if it has integers without a scale."""
-    name, (_, scaled, _) = str(raster.name or "the raster"), storage_of(raster)
-    words = [raster.name, *(raster.attrs.get(key) for key in ("long_name", "standard_name"))]
-    _check_metadata(name, words, raster.attrs.get("units"), not scaled)
-
-
-def _check_band(file, name):
-    """Check the band of a file as `_check_array` does."""
-    with sound_raster(file) as (source, _):
-        band = file.band - 1
-        scaled = (source.scales[band], source.offsets[band]) != (1.0, 0.0)
-        counts = np.dtype(source.dtypes[band]).kind in "iu" and not scaled
-        # GDAL assigns the height unit of a compound CRS to bands without a unit.
-        units = None if len(pyproj.CRS(source.crs).axis_info) > 2 else source.units[band]
-        _check_metadata(name, words_of(source, file.band), units, counts)
-
-
-def _check_metadata(name, words, units, counts):
-    cf.check_words(name, words, "lai", str(units or ""))
-    if counts:
-        warn_of_integers(name)
+    source = open_source(path_or_raster, "lai", allow_remote)
+    # GDAL assigns the height unit of a compound CRS to bands without a unit.
+    cf.check_words(source.name, source.words, "lai", "" if source.height_units else source.units)
+    if source.counts:
+        warn_of_integers(source.name)
+    lai = chunking.pointwise(_plausible, onto_grid(source, grid, chunks, check=check_source))
+    history = f"open_lai: {source.name}"
+    return cf.label(grids.place(lai, grid), "lai", history=history, lai_distribution=source.name)
 
 
 def _plausible(lai):

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import dask.array as da
 import numpy as np
 import xarray as xr
 from affine import Affine
 from odc.geo.geobox import GeoBox
-from scipy import ndimage
 
 from fifesim.base.arguments import Chunks, WholeNumber
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import warn
-from fifesim.grids import cf, projection, windows
+from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.inputs import FileOrRaster
@@ -24,15 +22,8 @@ from fifesim.grids.projection import lies_in_words
 from fifesim.grids.sites import made_on_site, on_fife_site
 from fifesim.ground.terrain.flint_hills import hills_elevation
 from fifesim.ground.terrain.slope import terrace_step
-from fifesim.ground.terrain.source_labels import ELEVATION_TILE, Model, likely_unit, looked_up, model_under, placement
+from fifesim.ground.terrain.source_labels import check_cover, likely_unit, model_under
 from fifesim.ground.terrain.spline import block_means
-
-# Largest number of rows and columns of the grid at which coverage is checked, and rows that are checked together.
-_LOOKS = 2000
-_STRIP = 256
-
-# Rows and columns that are checked together where every cell is checked.
-_PART = 512
 
 # Relief with a larger mean slope, of cells of about this size, is rare. [degree], [m]
 _STEEP, _SLOPE_SCALE = 20.0, 30.0
@@ -44,153 +35,23 @@ _SUMMIT = 9.0
 # The FIFE site lies at 310 to 450 m. [m]
 _SITE_ELEVATION = 400.0
 
-# A model that ends farther inside the grid than this should be replaced, not extrapolated. [m]
-_NEAR = 150
 
-
-def known_elevation(model, make_tile, first_row, first_column, shape):
-    """Elevation of a part of a grid, which the model must cover, shape (rows, columns). [m]"""
-    values = model.elevation(make_tile, first_row, first_column, shape)
-    unknown = ~np.isfinite(values)
-    if unknown.any():
-        grid = model.place.grid[first_row : first_row + shape[0], first_column : first_column + shape[1]]
-        _raise_for_gaps(model, grid, unknown, np.arange(shape[0]), np.arange(shape[1]))
-    return values
-
-
-def known_cells(model, shape):
-    """Mask of the known elevations on the grid of a model, read by parts."""
-    known = np.empty(shape, bool)
-    for top in range(0, shape[0], _PART):
-        for left in range(0, shape[1], _PART):
-            part = known[top : top + _PART, left : left + _PART]
-            height, width = part.shape
-            part[:] = _looked_at(model, top + np.arange(height), left + np.arange(width))
-    return known
-
-
-def _looked_at(model, rows, columns):
-    """Mask of the known elevations at some rows and columns of the grid of a model."""
-    rows, columns = model.place.positions(rows, columns)
-    top, left, height, width = model.window(rows, columns)
-    return looked_up(np.isfinite(model.read(top, left, height, width)), rows - top, columns - left)
-
-
-def check_cover(model, grid):
-    """Raise ValueError if a model does not cover a grid, before it is used."""
-    step = max(0.5 * model.resolution / max(model.blocks) / min(grids.cell_size(grid)), 1.0)
-    looks = [
-        np.unique(np.linspace(0, size - 1, min(int(size / step) + 2, _LOOKS)).round().astype(int))
-        for size in grid.shape
-    ]
-    strips = [looks[0][first : first + _STRIP] for first in range(0, looks[0].size, _STRIP)]
-    unknown = ~np.concatenate([_looked_at(model, rows, looks[1]) for rows in strips])
-    if unknown.any():
-        _raise_for_gaps(model, grid, unknown, *looks)
-
-
-def _raise_for_gaps(model, grid, unknown, rows, columns):
-    """Raise ValueError that names the part of a grid which a model lacks."""
-    source, name = model.source, model.source.name
-    if unknown.all():
-        raise ValueError(
-            f"{name} holds no elevation on the grid, which spans {grids.extent(grid)} in "
-            f"{projection.name_of(grid.crs.proj)}; it spans {lies_in_words(source.affine, source.shape, source.crs)}"
-        )
-    down, across = grids.cell_size(grid)
-    height, width = np.gradient(rows.astype(float)) * down, np.gradient(columns.astype(float)) * across
-    words = [
-        *_short_sides(model, unknown, height, width),
-        *_covered(grid, unknown, rows, columns),
-        *_holes(grid, unknown, rows, columns, height, width),
-    ]
-    raise ValueError(f"{name} does not cover the grid, which spans {grids.extent(grid)}; " + "; ".join(words))
-
-
-def _short_sides(model, unknown, height, width):
-    """Text of the distances by which a model ends inside a grid."""
-    leads = {
-        "north": _lead(unknown, height),
-        "south": _lead(unknown[::-1], height[::-1]),
-        "west": _lead(unknown.T, width),
-        "east": _lead(unknown.T[::-1], width[::-1]),
-    }
-    if not any(leads.values()):
-        return
-    sides = ", ".join(f"{metres:.0f} m in the {side}" for side, metres in leads.items() if metres > 0)
-    filled = max(cells * size for cells, size in zip(model.fill, model.place.cell_size(), strict=True))
-    # Filling counts from the centre of the last known cell.
-    near = int(np.ceil((max(leads.values()) + model.resolution + filled) / 10 + 1)) * 10
-    carried = f", or fill={near} carries it on" if near <= _NEAR else ""
-    yield f"it lacks up to {sides}: take a smaller grid or a model that reaches farther{carried}"
-
-
-def _covered(grid, unknown, rows, columns):
-    """Text of the part of a grid that a model covers."""
-    first, last, start, stop = 0, rows.size, 0, columns.size
-    # Edge by edge, the one that lacks the larger share goes first, until the rest is known.
-    while last - first > 2 and stop - start > 2:
-        part = unknown[first:last, start:stop]
-        shares = [part[0].mean(), part[-1].mean(), part[:, 0].mean(), part[:, -1].mean()]
-        worst = int(np.argmax(shares))
-        if not shares[worst]:
-            break
-        first, last = first + (worst == 0), last - (worst == 1)
-        start, stop = start + (worst == 2), stop - (worst == 3)
-    if (first, last, start, stop) == (0, rows.size, 0, columns.size) or unknown[first:last, start:stop].any():
-        return
-    down, across = grids.cell_size(grid)
-    top, bottom = rows[first], rows[last - 1] + 1
-    left, right = columns[start], columns[stop - 1] + 1
-    west, north = projection.transform_points(grid.affine, left, top)
-    yield (
-        f"it covers west={west:.10g}, north={north:.10g}, width={(right - left) * across:.6g}, "
-        f"height={(bottom - top) * down:.6g}"
-    )
-
-
-def _lead(unknown, sizes):
-    """Longest run of unknown rows from the first on, apart from columns that are completely unknown."""
-    partly = unknown[:, ~unknown.all(axis=0)]
-    runs = np.cumsum(np.logical_and.accumulate(partly, axis=0) * sizes[:, None], axis=0)[-1]
-    return float(runs.max())
-
-
-def _holes(grid, unknown, rows, columns, height, width):
-    """Text of the location of the largest visible hole."""
-    labels, _ = ndimage.label(unknown, structure=np.ones((3, 3)))
-    holes = [
-        (height[down].sum(), width[across].sum(), down, across)
-        for down, across in ndimage.find_objects(labels)
-        if down.start > 0 and across.start > 0 and down.stop < rows.size and across.stop < columns.size
-    ]
-    if not holes:
-        return
-    tall, wide, down, across = max(holes, key=lambda hole: max(hole[:2]))
-    row, column = rows[(down.start + down.stop) // 2], columns[(across.start + across.stop) // 2]
-    east, north = projection.transform_points(grid.affine, column + 0.5, row + 0.5)
-    fill = int(np.ceil(max(tall, wide) / 20 + 1)) * 10
-    number = "a hole" if len(holes) == 1 else f"{len(holes)} holes, the largest"
-    yield f"it has {number} of {tall:.0f} x {wide:.0f} m at {east:.0f} E {north:.0f} N: fill={fill} interpolates it"
-
-
-def warn_of_relief(model, grid, unit_is_given):
+def warn_of_relief(model, unit_is_given):
     """Warn of terraces of whole numbers, and of elevations that are likely in another unit, in the middle of a grid."""
-    middle = [np.array([size // 2]) for size in grid.shape]
-    top, left, height, width = model.window(*model.place.positions(*middle))
-    around = 200
-    values = model.source.read(top - around, left - around, height + 2 * around, width + 2 * around)
-    step = terrace_step(values / model.source.metres)
+    middle, around = [np.array([size // 2]) for size in model.grid.shape], 200
+    window = model.window(*model.positions(*middle))
+    values = model.read(*(slice(part.start - around, part.stop + around) for part in window), fill=False)
+    step = terrace_step(values / model.source.factor)
     if step is not None:
         warn(
             f"the elevations of {model.source.name} are whole numbers that lie in terraces, with a vertical resolution "
-            f"of {step * model.source.metres:g} m: slope and aspect will show the terraces' edges"
+            f"of {step * model.source.factor:g} m: slope and aspect will show the terraces' edges"
         )
     if unit_is_given or not np.isfinite(values).any():
         return
-    name, slope = model.source.name, _mean_slope(values, model.place.cell_size())
+    name, slope = model.source.name, _mean_slope(values, model.cell_size())
     low, high = np.nanmin(values), np.nanmax(values)
-    unit = likely_unit(low, high, _SITE_ELEVATION) if on_fife_site(grid) else None
+    unit = likely_unit(low, high, _SITE_ELEVATION) if on_fife_site(model.grid) else None
     if unit is not None:
         warn(
             f"{name} has elevations of {low:.4g} to {high:.4g} m, but the FIFE site lies at {_SITE_ELEVATION:g} m: "
@@ -295,12 +156,10 @@ def fine_dem(
     ((60, 60), 'm')
     """
     model = replace(model_under(grid, path_or_raster, fill, vertical_units, allow_remote), linear=method == "linear")
-    if isinstance(model.source.cells, da.Array):
-        out = _from_lazy(model, grid, "auto" if chunks is None else chunks)
-    else:
-        check_cover(model, grid)
-        warn_of_relief(model, grid, vertical_units is not None)
-        out = windows.tiles(partial(known_elevation, model, model.tiles()), grid, chunks, tile=ELEVATION_TILE)
+    if not isinstance(model.source.cells, da.Array):
+        check_cover(model)
+        warn_of_relief(model, vertical_units is not None)
+    out = model.raster(chunks)
     how = "linear" if model.linear else "quintic spline"
     history = f"fine_dem: {model.source.name}, cells of {model.resolution:.4g} m, {how}"
     return cf.label(out, "dem", history=history, source_resolution=model.resolution)
@@ -355,9 +214,9 @@ def source_dem(
     coarse, around = _coarse_grid(grid, model.resolution, margin)
     if isinstance(model.source.cells, da.Array):
         model = model.reading(model.source.cells.compute())
-    model = replace(model, place=placement(model.source, coarse))
-    values = model.elevation(model.tiles(), 0, 0, tuple(coarse.shape)) if chunks is None else None
-    known = known_cells(model, coarse.shape) if values is None else np.isfinite(values)
+    model = replace(model, grid=coarse, covers=False)
+    values = model(0, 0, tuple(coarse.shape)) if chunks is None else None
+    known = np.isfinite(values) if values is not None else model.known(*map(np.arange, coarse.shape))
     if not known.any():
         source = model.source
         raise ValueError(
@@ -374,37 +233,13 @@ def source_dem(
 
 def _in_chunks(model, grid, kept, chunks):
     """Lazy elevation of a part of the grid of a model, in chunks that many horizons read."""
-    make_tile, (first_row, first_column) = model.tiles(), (part.start for part in kept)
+    first_row, first_column = (part.start for part in kept)
 
     def kernel(rows, columns):
         shape = rows.stop - rows.start, columns.stop - columns.start
-        return model.elevation(make_tile, first_row + rows.start, first_column + columns.start, shape)
+        return model(first_row + rows.start, first_column + columns.start, shape)
 
-    return chunking.windows(kernel, [], tuple(grid.shape), windows.chunk_sizes(grid, chunks, tile=ELEVATION_TILE))
-
-
-class _TileReads(NamedTuple):
-    """Window of a lazy source that the tiles of each chunk read."""
-
-    array: da.Array
-    model: Model
-
-    def window(self, rows, columns):
-        return self.model.tile_window(rows, columns)
-
-
-def _from_lazy(model, grid, chunks):
-    without = model.reading(None)
-
-    def kernel(rows, columns, cells):
-        down, across = without.tile_window(rows, columns)
-        known = without.reading(cells, (down.start, across.start))
-        shape = rows.stop - rows.start, columns.stop - columns.start
-        return known_elevation(known, known.tiles(), rows.start, columns.start, shape)
-
-    sizes = windows.chunk_sizes(grid, chunks, tile=ELEVATION_TILE)
-    out = chunking.windows(kernel, [_TileReads(model.source.cells, without)], tuple(grid.shape), sizes)
-    return grids.place(xr.DataArray(out, dims=("y", "x")), grid)
+    return chunking.windows(kernel, [], tuple(grid.shape), windows.chunk_sizes(grid, chunks, tile=model.TILE))
 
 
 def _coarse_grid(grid, resolution, margin):

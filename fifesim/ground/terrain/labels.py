@@ -19,8 +19,8 @@ from fifesim.grids.chunks import apart
 from fifesim.grids.directions import Directions, from_grid_north
 from fifesim.grids.grid import as_carried, centres_of, with_crs_of
 from fifesim.grids.inputs import Horizon
+from fifesim.grids.source import one_layer
 from fifesim.grids.windows import gather, lazy_together
-from fifesim.ground.layer_labels import one_layer
 from fifesim.ground.terrain import horizon as horizons
 from fifesim.ground.terrain import sky_labels
 from fifesim.ground.terrain.flint_hills import elevation_around, hills_elevation

@@ -1,202 +1,22 @@
-"""Sources of elevation: raster files and arrays read by window, their units and grid, and the spline under a grid."""
+"""Elevation models of the user: checks of their numbers, their spline on a grid, and their coverage of it."""
 
 from dataclasses import dataclass, replace
-from functools import partial
-from pathlib import Path
-from uuid import uuid4
+from itertools import product
 
-import dask.array as da
 import numpy as np
-import pyproj
-import rasterio.windows
-import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
-from affine import Affine
 from scipy import ndimage
 
-from fifesim.base.files import in_a_line
-from fifesim.base.lattice import KeptTiles, assemble, centres
+from fifesim.base.lattice import centres
 from fifesim.base.messages import warn
 from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
-from fifesim.grids.grid import regular_geobox
-from fifesim.grids.opening import ErrorsOfGdal, RasterFile
-from fifesim.ground.layer_labels import file_of, one_layer, words_of
+from fifesim.grids.source import OnGrid, open_source
 from fifesim.ground.terrain import spline
 from fifesim.ground.terrain.slope import metres_per_unit
 
-# Positions in another CRS are a polynomial through this number of Chebyshev nodes along each axis of a tile.
-_NODES = 12
-
 # Elevations of exactly 0 among others that are all farther from it may be voids. [m]
 _CLIFF = 50.0
-
-# Larger windows and the arrays derived from them need several GB of memory. [cell]
-_MOST_CELLS = 2**27
-
-
-class ByWindow:
-    """Cells of a raster in memory, or of an open file, which is read in windows without a cache."""
-
-    def __init__(self, raster):
-        self._cells, self._token = raster.variable, uuid4().hex
-        self.shape = raster.shape
-
-    def __getitem__(self, window):
-        return np.asarray(self._cells[window])
-
-    def __dask_tokenize__(self):
-        # A token of the cells would read all of them.
-        return self._token
-
-
-@dataclass(frozen=True, eq=False)
-class Source:
-    """Elevation model: its cells, their size and position, and metres per unit."""
-
-    name: str
-    cells: RasterFile | ByWindow | np.ndarray | da.Array
-    shape: tuple[int, int]
-    affine: Affine
-    crs: pyproj.CRS
-    metres: float
-    origin: tuple[int, int] = (0, 0)
-
-    def read(self, top, left, rows, columns):
-        """Elevations of a window, which may exceed the model, NaN where unknown, shape (rows, columns). [m]"""
-        if rows * columns > _MOST_CELLS:
-            raise ValueError(
-                f"{self.name} is far finer than the cells, {rows * columns:.2g} of its cells lie in a tile of them: "
-                "average it first, with gdalwarp -r average -tr and a cell between the two"
-            )
-        out = np.full((rows, columns), np.nan)
-        (first, last), (west, east) = (
-            (min(max(start, 0), size), max(min(start + length, size), 0))
-            for start, length, size in ((top, rows, self.shape[0]), (left, columns, self.shape[1]))
-        )
-        if first < last and west < east:
-            window = slice(first, last), slice(west, east)
-            read = _file_window if isinstance(self.cells, RasterFile) else self._array_window
-            heights = read(self.cells, *window) * self.metres
-            out[first - top : last - top, west - left : east - left] = heights
-            check_heights(self.name, heights)
-        return out
-
-    def _array_window(self, cells, rows, columns):
-        top, left = self.origin
-        return np.asarray(cells[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left], float)
-
-
-def open_source(raster, vertical_units=None, allow_remote=False):
-    """Elevation model from a file or an array."""
-    if isinstance(raster, xr.DataArray):
-        return _array_source(raster, vertical_units)
-    if not isinstance(raster, str | Path):
-        raise TypeError(f"an elevation model is a path or an xarray.DataArray, got {type(raster).__name__}")
-    file = file_of("dem", raster, allow_remote)
-    name = in_a_line(Path(file.path).name, 150)
-    with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as opened:
-        cf.check_words(name, words_of(opened, file.band), "dem")
-        source = Source(name, file, opened.shape, opened.transform, None, 1.0)
-        return _in_metres(source, opened.crs.to_wkt(), in_a_line(opened.units[file.band - 1] or "", 40), vertical_units)
-
-
-def _array_source(raster, vertical_units):
-    raster, name = one_layer(raster, "dem"), str(raster.name or "the elevation model")
-    cf.check_words(name, (raster.name, raster.attrs.get("long_name")), "dem")
-    crs = raster.rio.crs
-    found = regular_geobox(raster)
-    if found is None:
-        raise ValueError(f"the x and y of {name} are not the centres of a regular grid")
-    raster = raster.transpose(*raster.odc.spatial_dims)
-    cells = ByWindow(raster) if raster.chunks is None else raster.data
-    source = Source(name, cells, cells.shape, found.affine, None, 1.0)
-    return _in_metres(source, crs.to_wkt() if crs else None, raster.attrs.get("units"), vertical_units)
-
-
-def _in_metres(source, wkt, unit, vertical_units):
-    """Source with its horizontal CRS and the metres per unit."""
-    if wkt is None:
-        raise ValueError(
-            f"{source.name} has no CRS: give it one, for instance with gdal_edit.py -a_srs EPSG:26914 or "
-            ".rio.write_crs('EPSG:26914')"
-        )
-    crs = pyproj.CRS.from_wkt(wkt)
-    parts = crs.sub_crs_list or [crs]
-    vertical = [axis.unit_name for part in (crs, *parts) for axis in part.axis_info if axis.direction in ("up", "down")]
-    unit = unit or (vertical[0] if vertical else "metre")
-    if vertical_units is None:
-        try:
-            metres = metres_per_unit(unit)
-        except ValueError:
-            metres = None
-        if metres != 1.0:
-            raise ValueError(
-                f"{source.name} says that its elevations are in {unit!r}, not in metres: give their units, for "
-                f"instance vertical_units='us-ft', and they are converted, or vertical_units='m' if it is wrong"
-            )
-    horizontal = parts[0].to_2d() if len(parts[0].axis_info) > 2 else parts[0]
-    return replace(source, crs=horizontal, metres=metres_per_unit(vertical_units or unit))
-
-
-def _file_window(file, rows, columns):
-    window = rasterio.windows.Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
-    task = f"cannot read rows {rows.start} to {rows.stop} and columns {columns.start} to {columns.stop} of {file.name}"
-    with ErrorsOfGdal(task), file.opened() as opened:
-        return file.read(opened, window)
-
-
-@dataclass(frozen=True, eq=False)
-class Placement:
-    """Position of the cells of a grid in a source, in source cells from the centre of the first."""
-
-    source: Source
-    grid: object
-    pipeline: str | None
-
-    @property
-    def parallel(self):
-        """Whether rows and columns of the grid are parallel to those in the source."""
-        return self.pipeline is None and not (self.source.affine.b or self.source.affine.d)
-
-    def positions(self, rows, columns):
-        """Positions of cells of the grid in the source, shape (m, 1), (1, n) if parallel, else (m, n). [cell]"""
-        a = self.grid.affine
-        y, x = centres(a.f, a.e, rows), centres(a.c, a.a, columns)
-        if self.parallel:
-            inverse = ~self.source.affine
-            return (inverse.e * y + inverse.f - 0.5)[:, None], (inverse.a * x + inverse.c - 0.5)[None, :]
-        (y_nodes, from_y), (x_nodes, from_x) = _chebyshev(y), _chebyshev(x)
-        across, down = self._source_cells(*np.meshgrid(x_nodes, y_nodes))
-        return from_y @ (down - 0.5) @ from_x.T, from_y @ (across - 0.5) @ from_x.T
-
-    def cell_size(self):
-        """Size of a source cell in the middle of the grid, down and across. [m]"""
-        x, y = projection.transform_points(self.grid.affine, self.grid.shape.x / 2, self.grid.shape.y / 2)
-        step = 10.0
-        columns, rows = self._source_cells(np.array([x, x + step, x]), np.array([y, y, y + step]))
-        return tuple(float(step / np.hypot(*(axis[1:] - axis[0]))) for axis in (rows, columns))
-
-    def _source_cells(self, x, y):
-        if self.pipeline is not None:
-            x, y = projection.carry(self.pipeline, self.grid.crs.to_wkt(), self.source.crs, x, y)
-        return projection.transform_points(~self.source.affine, x, y)
-
-
-def placement(source, grid):
-    """Position of a grid in a source, by a coordinate operation of known accuracy."""
-    return Placement(source, grid, projection.operation(grid.crs.to_wkt(), source.crs, projection.degrees(grid)))
-
-
-def _chebyshev(values):
-    """Chebyshev nodes over the range of some values, and the interpolation matrix from nodes to values."""
-    middle, half = (values.max() + values.min()) / 2, max(np.ptp(values) / 2, 1.0)
-    nodes = np.polynomial.chebyshev.chebpts1(_NODES)
-    matrix = np.linalg.solve(
-        np.polynomial.chebyshev.chebvander(nodes, _NODES - 1).T,
-        np.polynomial.chebyshev.chebvander((values - middle) / half, _NODES - 1).T,
-    ).T
-    return middle + half * nodes, matrix
 
 
 def check_heights(name, values):
@@ -299,44 +119,57 @@ def source_resolution(dem, given=None):
     return found
 
 
-# Elevations are made in fixed tiles of this size. [cell]
-ELEVATION_TILE = 504
+# Positions in another CRS are a polynomial through this number of Chebyshev nodes along each axis of a tile.
+_NODES = 12
 
 # Filling goes outward ring by ring. [source cell]
 _MOST_FILLED = 250
 
+# Largest number of rows and columns of the grid at which coverage is checked, and of those that are read together.
+_LOOKS = 2000
+_PART = 512
+
+# A model that ends farther inside the grid than this should be replaced, not extrapolated. [m]
+_NEAR = 150
+
 
 @dataclass(frozen=True, eq=False)
-class Model:
-    """Position of a source below a grid, number of averaged cells, and distance to which gaps are filled."""
+class Model(OnGrid):
+    """Elevation on a grid: a spline through averaged cells of a source, whose gaps are filled up to a distance. [m]"""
 
-    place: Placement
-    blocks: tuple[int, int]  # source cells down and across that are averaged
-    fill: tuple[float, float]  # distance from known elevation [source cell]
-    resolution: float  # [m]
+    blocks: tuple[int, int] = (1, 1)  # source cells down and across that are averaged
+    fill: tuple[float, float] = (0, 0)  # distance from known elevation [source cell]
+    resolution: float = 0.0  # [m]
     linear: bool = False  # interpolate linearly, which does not overshoot
+    covers: bool = True  # unknown elevation is an error
+
+    TILE = 504
 
     @property
-    def source(self):
-        """Source of the elevations."""
-        return self.place.source
+    def parallel(self):
+        """Whether rows and columns of the grid are parallel to those in the source."""
+        return self.back is None and not (self.source.affine.b or self.source.affine.d)
 
-    def reading(self, cells, origin=(0, 0)):
-        """Copy of the model whose source has other cells, a window from `origin` on."""
-        source = replace(self.source, cells=cells, origin=origin)
-        return replace(self, place=replace(self.place, source=source))
+    def positions(self, rows, columns):
+        """Positions of cells in the source, from its first centre, shape (m, 1), (1, n) if parallel, else (m, n)."""
+        a = self.grid.affine
+        y, x = centres(a.f, a.e, rows), centres(a.c, a.a, columns)
+        if self.parallel:
+            inverse = ~self.source.affine
+            return (inverse.e * y + inverse.f - 0.5)[:, None], (inverse.a * x + inverse.c - 0.5)[None, :]
+        (y_nodes, from_y), (x_nodes, from_x) = _chebyshev(y), _chebyshev(x)
+        across, down = self.source_places(*np.meshgrid(x_nodes, y_nodes))
+        return from_y @ (down - 0.5) @ from_x.T, from_y @ (across - 0.5) @ from_x.T
 
-    def elevation(self, make_tile, first_row, first_column, shape):
-        """Elevation from a row and column of the grid on, NaN where unknown, shape (rows, columns). [m]"""
-        row, column = grids.lattice_position(self.place.grid)
-        return assemble(make_tile, ELEVATION_TILE, row + first_row, column + first_column, shape)
-
-    def tiles(self):
-        """Function that makes a tile, and caches the last ones."""
-        return KeptTiles(partial(self._tile, *grids.lattice_position(self.place.grid)))
+    def cell_size(self):
+        """Size of a source cell in the middle of the grid, down and across. [m]"""
+        x, y = projection.transform_points(self.grid.affine, self.grid.shape.x / 2, self.grid.shape.y / 2)
+        step = 10.0
+        columns, rows = self.source_places(np.array([x, x + step, x]), np.array([y, y, y + step]))
+        return tuple(float(step / np.hypot(*(axis[1:] - axis[0]))) for axis in (rows, columns))
 
     def window(self, rows, columns):
-        """First row and column and size of the source cells that positions need, in whole blocks."""
+        """Rows and columns of the source that positions need, in whole blocks."""
         found = []
         parts = zip((rows, columns), self.blocks, self.fill, self.source.shape, strict=True)
         for positions, count, fill, size in parts:
@@ -346,56 +179,70 @@ class Model:
             # The model is unknown beyond its margin.
             first = max(int(np.floor(low)) - 2, -around) - around
             last = min(int(np.floor(high)) + 4, -(-size // count) + around) + around
-            found.append((first * count, max(last - first, 0) * count))
-        (top, height), (left, width) = found
-        return top, left, height, width
+            found.append(slice(first * count, max(last, first) * count))
+        return found
 
-    def read(self, top, left, height, width):
-        """Source cells with filled gaps, NaN where unknown, shape (height, width). [m]"""
-        values = self.source.read(top, left, height, width)
-        return spline.fill_gaps(values, self.fill) if any(self.fill) else values
-
-    def tile_window(self, rows, columns):
-        """Rows and columns of the source that all tiles of a part of the grid read."""
-        outline = []
-        for first, part in zip(grids.lattice_position(self.place.grid), (rows, columns), strict=True):
-            low = (first + part.start) // ELEVATION_TILE * ELEVATION_TILE
-            high = -(-(first + part.stop) // ELEVATION_TILE) * ELEVATION_TILE - 1
-            outline.append(np.linspace(low - first, high - first, 17).round().astype(int))
-        top, left, height, width = self.window(*self.place.positions(*outline))
+    def tile_window(self, top, left):
+        """Rows and columns of the source that a tile reads."""
+        outline = np.linspace(0, self.TILE - 1, 17).round().astype(int)
         # A curved edge may bulge between the points of the outline.
-        return tuple(
-            slice(min(max(start - 2, 0), size), max(min(start + length + 2, size), 0))
-            for start, length, size in zip((top, left), (height, width), self.source.shape, strict=True)
-        )
+        return [
+            slice(part.start - 2, part.stop + 2) for part in self.window(*self.positions(top + outline, left + outline))
+        ]
 
-    def _tile(self, row, column, tile_row, tile_column):
+    def read(self, rows, columns, fill=True):
+        """Elevation of source cells with filled gaps, NaN where unknown, shape (rows, columns). [m]"""
+        with self.source.opened() as read:
+            values = read(rows, columns)
+        check_heights(self.source.name, values)
+        return spline.fill_gaps(values, self.fill) if fill and any(self.fill) else values
+
+    def make(self, top, left):
+        """Elevation of a tile, NaN where unknown, shape (TILE, TILE). [m]"""
         down, across = self.blocks
-        cells = np.arange(ELEVATION_TILE)
-        rows, columns = self.place.positions(
-            tile_row * ELEVATION_TILE - row + cells, tile_column * ELEVATION_TILE - column + cells
-        )
-        top, left, height, width = self.window(rows, columns)
-        values = self.read(top, left, height, width)
+        cells = np.arange(self.TILE)
+        rows, columns = self.positions(top + cells, left + cells)
+        window = self.window(rows, columns)
+        values = self.read(*window)
         known = np.isfinite(values)
         if not known.any():
-            return np.full((ELEVATION_TILE, ELEVATION_TILE), np.nan)
-        found = looked_up(known, rows - top, columns - left)
+            return np.full((self.TILE, self.TILE), np.nan)
+        rows, columns = rows - window[0].start, columns - window[1].start
+        found = _looked_up(known, rows, columns)
         # Places past the window are unknown; they are moved into it to be passed over.
-        rows = rows.clip(top + 3 * down, top + height - 4 * down)
-        columns = columns.clip(left + 3 * across, left + width - 4 * across)
+        rows = rows.clip(3 * down, values.shape[0] - 4 * down)
+        columns = columns.clip(3 * across, values.shape[1] - 4 * across)
         if down > 1 or across > 1:
             values = spline.block_means(spline.extend(values, 2 * max(self.blocks), rest=False), down, across)
         values = spline.extend(values, spline.SPLINE_MARGIN)
-        in_blocks = (rows - top + 0.5) / down - 0.5, (columns - left + 0.5) / across - 0.5
+        in_blocks = (rows + 0.5) / down - 0.5, (columns + 0.5) / across - 0.5
         if self.linear:
             return np.where(found, ndimage.map_coordinates(values, np.broadcast_arrays(*in_blocks), order=1), np.nan)
         coefficients = spline.spline_coefficients(values)
-        if self.place.parallel:
+        if self.parallel:
             out = spline.spline_grid(coefficients, *(axis.ravel() for axis in in_blocks))
         else:
             out = spline.spline_points(coefficients, *in_blocks)
         return np.where(found, out, np.nan)
+
+    def __call__(self, row, column, shape):
+        """Elevation from a row and column of the grid on, shape (rows, columns). [m]"""
+        values = super().__call__(row, column, shape)
+        if self.covers and (unknown := np.isnan(values)).any():
+            grid = self.grid[row : row + shape[0], column : column + shape[1]]
+            _raise_for_gaps(self, grid, unknown, np.arange(shape[0]), np.arange(shape[1]))
+        return values
+
+    def known(self, rows, columns):
+        """Mask of the known elevations at some rows and columns of the grid, read by parts."""
+        out = np.empty((rows.size, columns.size), bool)
+        for top, left in product(range(0, rows.size, _PART), range(0, columns.size, _PART)):
+            part = slice(top, top + _PART), slice(left, left + _PART)
+            down, across = self.positions(rows[part[0]], columns[part[1]])
+            window = self.window(down, across)
+            known = np.isfinite(self.read(*window))
+            out[part] = _looked_up(known, down - window[0].start, across - window[1].start)
+        return out
 
 
 def model_under(grid, raster, fill, vertical_units, allow_remote=False):
@@ -403,23 +250,147 @@ def model_under(grid, raster, fill, vertical_units, allow_remote=False):
     grids.check_grid(grid)
     if fill is not None and (isinstance(fill, bool) or not fill > 0):
         raise ValueError(f"fill is a distance from known elevation, above 0 m, got {fill!r}: give for instance fill=60")
-    place = placement(open_source(raster, vertical_units, allow_remote), grid)
-    sizes = place.cell_size()
+    source = open_source(raster, "dem", allow_remote)
+    cf.check_words(source.name, source.words, "dem")
+    unit = source.units or source.height_units or "metre"
+    if vertical_units is None:
+        try:
+            metres = metres_per_unit(unit)
+        except ValueError:
+            metres = None
+        if metres != 1.0:
+            raise ValueError(
+                f"{source.name} says that its elevations are in {unit!r}, not in metres: give their units, for "
+                f"instance vertical_units='us-ft', and they are converted, or vertical_units='m' if it is wrong"
+            )
+    source = replace(source, factor=metres_per_unit(vertical_units or unit))
+    back = projection.operation(grid.crs.to_wkt(), source.crs, projection.degrees(grid))
+    model = Model(source, grid, back)
+    sizes = model.cell_size()
     most = round(_MOST_FILLED * min(sizes), 6)
     if (fill or 0) > most:
         raise ValueError(
-            f"fill={fill:g} is more than {_MOST_FILLED} cells of {place.source.name}, of {min(sizes):.3g} m: give at "
-            f"most fill={most:g}"
+            f"fill={fill:g} is more than {_MOST_FILLED} cells of {source.name}, of {min(sizes):.3g} m: give at most "
+            f"fill={most:g}"
         )
     blocks = tuple(max(1, round(float(np.mean(grids.cell_size(grid))) / size)) for size in sizes)
     resolution = round(float(np.mean([count * size for count, size in zip(blocks, sizes, strict=True)])), 6)
-    return Model(place, blocks, tuple((fill or 0) / size for size in sizes), resolution)
+    return replace(model, blocks=blocks, fill=tuple((fill or 0) / size for size in sizes), resolution=resolution)
 
 
-def looked_up(known, rows, columns):
+def _chebyshev(values):
+    """Chebyshev nodes over the range of some values, and the interpolation matrix from nodes to values."""
+    middle, half = (values.max() + values.min()) / 2, max(np.ptp(values) / 2, 1.0)
+    nodes = np.polynomial.chebyshev.chebpts1(_NODES)
+    matrix = np.linalg.solve(
+        np.polynomial.chebyshev.chebvander(nodes, _NODES - 1).T,
+        np.polynomial.chebyshev.chebvander((values - middle) / half, _NODES - 1).T,
+    ).T
+    return middle + half * nodes, matrix
+
+
+def _looked_up(known, rows, columns):
     """Mask of places in known cells, False outside of all cells."""
     if not known.size:
         return np.zeros(np.broadcast_shapes(rows.shape, columns.shape), bool)
     row, column = np.rint(rows).astype(int), np.rint(columns).astype(int)
     inside = (row >= 0) & (row < known.shape[0]) & (column >= 0) & (column < known.shape[1])
     return inside & known[row.clip(0, known.shape[0] - 1), column.clip(0, known.shape[1] - 1)]
+
+
+def check_cover(model):
+    """Raise ValueError if a model does not cover its grid, before it is used."""
+    step = max(0.5 * model.resolution / max(model.blocks) / min(grids.cell_size(model.grid)), 1.0)
+    looks = [
+        np.unique(np.linspace(0, size - 1, min(int(size / step) + 2, _LOOKS)).round().astype(int))
+        for size in model.grid.shape
+    ]
+    unknown = ~model.known(*looks)
+    if unknown.any():
+        _raise_for_gaps(model, model.grid, unknown, *looks)
+
+
+def _raise_for_gaps(model, grid, unknown, rows, columns):
+    """Raise ValueError that names the part of a grid which a model lacks."""
+    source, name = model.source, model.source.name
+    if unknown.all():
+        raise ValueError(
+            f"{name} holds no elevation on the grid, which spans {grids.extent(grid)} in "
+            f"{projection.name_of(grid.crs.proj)}; it spans "
+            f"{projection.lies_in_words(source.affine, source.shape, source.crs)}"
+        )
+    down, across = grids.cell_size(grid)
+    height, width = np.gradient(rows.astype(float)) * down, np.gradient(columns.astype(float)) * across
+    words = [
+        *_short_sides(model, unknown, height, width),
+        *_covered(grid, unknown, rows, columns),
+        *_holes(grid, unknown, rows, columns, height, width),
+    ]
+    raise ValueError(f"{name} does not cover the grid, which spans {grids.extent(grid)}; " + "; ".join(words))
+
+
+def _short_sides(model, unknown, height, width):
+    """Text of the distances by which a model ends inside a grid."""
+    leads = {
+        "north": _lead(unknown, height),
+        "south": _lead(unknown[::-1], height[::-1]),
+        "west": _lead(unknown.T, width),
+        "east": _lead(unknown.T[::-1], width[::-1]),
+    }
+    if not any(leads.values()):
+        return
+    sides = ", ".join(f"{metres:.0f} m in the {side}" for side, metres in leads.items() if metres > 0)
+    filled = max(cells * size for cells, size in zip(model.fill, model.cell_size(), strict=True))
+    # Filling counts from the centre of the last known cell.
+    near = int(np.ceil((max(leads.values()) + model.resolution + filled) / 10 + 1)) * 10
+    carried = f", or fill={near} carries it on" if near <= _NEAR else ""
+    yield f"it lacks up to {sides}: take a smaller grid or a model that reaches farther{carried}"
+
+
+def _covered(grid, unknown, rows, columns):
+    """Text of the part of a grid that a model covers."""
+    first, last, start, stop = 0, rows.size, 0, columns.size
+    # Edge by edge, the one that lacks the larger share goes first, until the rest is known.
+    while last - first > 2 and stop - start > 2:
+        part = unknown[first:last, start:stop]
+        shares = [part[0].mean(), part[-1].mean(), part[:, 0].mean(), part[:, -1].mean()]
+        worst = int(np.argmax(shares))
+        if not shares[worst]:
+            break
+        first, last = first + (worst == 0), last - (worst == 1)
+        start, stop = start + (worst == 2), stop - (worst == 3)
+    if (first, last, start, stop) == (0, rows.size, 0, columns.size) or unknown[first:last, start:stop].any():
+        return
+    down, across = grids.cell_size(grid)
+    top, bottom = rows[first], rows[last - 1] + 1
+    left, right = columns[start], columns[stop - 1] + 1
+    west, north = projection.transform_points(grid.affine, left, top)
+    yield (
+        f"it covers west={west:.10g}, north={north:.10g}, width={(right - left) * across:.6g}, "
+        f"height={(bottom - top) * down:.6g}"
+    )
+
+
+def _lead(unknown, sizes):
+    """Longest run of unknown rows from the first on, apart from columns that are completely unknown."""
+    partly = unknown[:, ~unknown.all(axis=0)]
+    runs = np.cumsum(np.logical_and.accumulate(partly, axis=0) * sizes[:, None], axis=0)[-1]
+    return float(runs.max())
+
+
+def _holes(grid, unknown, rows, columns, height, width):
+    """Text of the location of the largest visible hole."""
+    labels, _ = ndimage.label(unknown, structure=np.ones((3, 3)))
+    holes = [
+        (height[down].sum(), width[across].sum(), down, across)
+        for down, across in ndimage.find_objects(labels)
+        if down.start > 0 and across.start > 0 and down.stop < rows.size and across.stop < columns.size
+    ]
+    if not holes:
+        return
+    tall, wide, down, across = max(holes, key=lambda hole: max(hole[:2]))
+    row, column = rows[(down.start + down.stop) // 2], columns[(across.start + across.stop) // 2]
+    east, north = projection.transform_points(grid.affine, column + 0.5, row + 0.5)
+    fill = int(np.ceil(max(tall, wide) / 20 + 1)) * 10
+    number = "a hole" if len(holes) == 1 else f"{len(holes)} holes, the largest"
+    yield f"it has {number} of {tall:.0f} x {wide:.0f} m at {east:.0f} E {north:.0f} N: fill={fill} interpolates it"

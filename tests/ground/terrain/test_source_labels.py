@@ -18,7 +18,7 @@ from lazy import check_place, no_compute
 import fifesim
 from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
-from fifesim.ground.terrain import source_labels as sources
+from fifesim.grids.opening import RasterFile
 from fifesim.ground.terrain.elevation_labels import source_dem
 from fifesim.ground.terrain.source_labels import beside_altitude, model_under, source_resolution
 
@@ -116,13 +116,13 @@ def test_only_the_part_of_a_file_near_the_grid_is_read(continent, monkeypatch, m
     # In cells of the model: tiles have 56, the spline needs 37 on each side and the search for terraces 237; with a
     # margin of 30, tiles have 504.
     (where, first), read = continent, []
-    windows = sources._file_window
+    windows = RasterFile.read
 
-    def noted(file, rows, columns):
+    def noted(file, source, rows, columns):
         read.append((rows, columns))
-        return windows(file, rows, columns)
+        return windows(file, source, rows, columns)
 
-    monkeypatch.setattr(sources, "_file_window", noted)
+    monkeypatch.setattr(RasterFile, "read", noted)
     if margin is None:
         dem = fifesim.fine_dem(where, grid(), chunks="auto").compute()
         np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-3 * AMPLITUDE)
@@ -144,7 +144,7 @@ def test_fill_must_be_a_positive_distance_of_at_most_250_cells_of_the_source(pat
 
 def test_sources_far_finer_than_the_grid_are_refused(path, monkeypatch):
     fifesim.fine_dem(path, grid())
-    monkeypatch.setattr("fifesim.ground.terrain.source_labels._MOST_CELLS", 100)
+    monkeypatch.setattr("fifesim.grids.source._MOST_CELLS", 100)
     with pytest.raises(ValueError, match=r"far finer than the cells.*gdalwarp -r average"):
         fifesim.fine_dem(path, grid(size=600.0))
 
