@@ -29,7 +29,7 @@ from fifesim.grids import cf
 from fifesim.grids import grid as grids
 from fifesim.grids.chunks import found_client
 from fifesim.grids.inputs import RASTER_OR_DATASET, STORAGE, no_data_of, opened, scale_and_offset, storage, unpacked
-from fifesim.grids.opening import ErrorsOfGdal, check_memory, raster_file, sound_raster, stored_cells
+from fifesim.grids.opening import check_memory, errors_of_gdal, raster_file, sound_raster, stored_cells
 from fifesim.grids.tags import (
     DAYS,
     TAG,
@@ -43,19 +43,8 @@ from fifesim.grids.tags import (
 )
 
 
-def physical(array, storage):
-    """Values of a file from another program in physical units, NaN for no data; digital numbers are kept."""
-    scales, offsets, nodata = storage["scales"], storage["offsets"], storage["nodata"]
-    if nodata is not None:
-        array = array.where(array != nodata, *(() if scales else [array.dtype.type(0)]))
-    if not scales or (nodata is None and set(scales) == {1.0} and not any(offsets)):
-        return array
-    gain, offset = (xr.DataArray(list(values), dims="band") for values in (scales, offsets))
-    return array * gain + offset
-
-
-def gdal_description(source, file_name):
-    """Names, calibration and wavelengths of a file that fifesim did not write, and its scales, offsets and nodata."""
+def _gdal_description(source, file_name):
+    """Names, calibration and wavelengths of a file that fifesim did not write."""
     names = [name or f"band{number}" for number, name in enumerate(source.descriptions, 1)]
     values = {"wavelength": _wavelengths(source, file_name)}
     counts = np.dtype(source.dtypes[0]).kind == "u" and set(source.units) == {cf.QUANTITIES["toa_radiance"].units}
@@ -73,8 +62,7 @@ def gdal_description(source, file_name):
     }
     shared = source.units[0] if len(set(source.units)) == 1 else None
     units = {} if counts or not shared else {"units": shared}
-    storage = {"scales": None if counts else source.scales, "offsets": source.offsets, "nodata": source.nodata}
-    return {"name": "image", "dims": ["band", "y", "x"], "attrs": units, "coords": coords}, storage
+    return {"name": "image", "dims": ["band", "y", "x"], "attrs": units, "coords": coords}
 
 
 def _wavelengths(source, file_name):
@@ -236,7 +224,7 @@ def to_geotiff(
             f"{path.name} lacks {', '.join(varying)}, which vary by cell, so another geometry would be "
             "used after reading it: give geometry= when you read it, or write a netCDF with .to_netcdf()"
         )
-    with whole_file(path) as finished, ErrorsOfGdal(f"cannot write {path}"):
+    with whole_file(path) as finished, errors_of_gdal(f"cannot write {path}"):
         streamed = finished.with_name("streamed.tif")
         _stream(array, cells, layers, grid, streamed, raster, tags or {})
         rasterio.shutil.copy(streamed, finished, blocksize=_BLOCK, **_COG)
@@ -293,17 +281,18 @@ def open_image(path: FilePath, chunks: Chunks | None = None, *, allow_remote: bo
             cells, size = source.count * source.height * source.width, np.dtype(source.dtypes[0]).itemsize
             check_memory(cells, size, f"all of {file.name}", "give chunks='auto', which reads it by parts")
         description = read_tag(source, file.name)
+        cells, nodata = stored_cells(file, crs, chunks), source.nodata
+        packing = {"scales": source.scales, "offsets": source.offsets, "_FillValue": nodata}
         written_here = description is not None
-        if not written_here:
-            description, storage = gdal_description(source, file.name)
-        plain = stored_cells(file, crs, chunks)
-    try:
-        grid = grids.geobox(plain)
-    except ValueError as error:
-        raise ValueError(f"cannot place {file.name}: {in_a_line(error, 250)}") from None
-    array = xr.DataArray(plain.data, dims=("band", "y", "x"), name=description["name"])
-    array = restored(array, description) if written_here else physical(array, storage)
-    array = grids.place(array.assign_coords(description["coords"]), grid)
+        description = description or _gdal_description(source, file.name)
+    if written_here:
+        array = restored(cells.drop_vars(cells.coords), description)
+    elif "gain" in description["coords"]:
+        array = cells if nodata is None else cells.where(cells != nodata, cells.dtype.type(0))
+    else:
+        # Fractions of a file have no scale applied, and become double precision with a value for no data.
+        array = unpacked(cells if nodata is None else cells.astype(float), packing)
+    array = grids.place(array.rename(description["name"]).assign_coords(description["coords"]), grids.geobox(cells))
     array.attrs = dict(description["attrs"]) | array.attrs
     if "gain" in array.coords:
         array.attrs["_FillValue"] = array.dtype.type(0)

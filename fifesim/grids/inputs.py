@@ -69,14 +69,14 @@ def opened(value):
     return value if isinstance(value, xr.DataTree) else with_parts(value, opened)
 
 
-def unpacked(raster):
-    """Values of a raster in their unit, NaN for no data, without the attributes of packing."""
-    stored = storage(raster)
+def unpacked(raster, packing=None):
+    """Values of a raster in their unit, NaN for no data, without attributes of packing, or by the packing of a file."""
+    stored = packing or storage(raster)
     if not stored.keys() & set(STORAGE):
         return raster
-    scale, offset = scale_and_offset(raster)
+    scale, offset = scale_and_offset(raster, packing)
     scaled = bool(np.any(scale != 1.0) or np.any(offset != 0.0))
-    if scaled and raster.dtype.kind == "f":
+    if scaled and raster.dtype.kind == "f" and not packing:
         given = ", ".join(f"{key} {stored[key]}" for key in (*_SCALES, *_SCALES.values()) if key in stored)
         raise ValueError(
             f"{raster.name or 'the raster'} has fractions but also {given}: "
@@ -104,12 +104,12 @@ def storage_of(raster):
     return raster.encoding.get(_STORED, (raster.dtype, raster.dtype.kind == "f", raster.dtype.kind == "f"))
 
 
-def scale_and_offset(raster):
+def scale_and_offset(raster, packing=None):
     """Scale and offset from stored values to their unit, 1 and 0 by default; along band where they differ."""
-    if cf.is_counts(raster):
+    if packing is None and cf.is_counts(raster):
         # A GIS has no square-root scale.
         return (1.0, 0.0) if "compression" in raster.coords else (raster.coords["gain"], raster.coords["offset"])
-    stored = storage(raster)
+    stored = packing or storage(raster)
     named = zip(_SCALES.items(), (1.0, 0.0), strict=True)
     return tuple(_numbers(raster, one, stored.get(one, stored.get(several, by))) for (one, several), by in named)
 

@@ -167,18 +167,15 @@ def raster_file(path, allow_remote=False):
     return _first_that_opens(path, [None])
 
 
-class ErrorsOfGdal:
+@contextmanager
+def errors_of_gdal(beginning):
     """Context that turns all errors of rasterio, some of which have private classes, into OSError."""
-
-    def __init__(self, beginning):
-        self._beginning = beginning
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, kind, error, traceback):
-        if kind is not None and (kind.__module__.partition(".")[0] == "rasterio" or kind is UnicodeDecodeError):
-            raise OSError(f"{self._beginning}: {in_a_line(error.__cause__ or error, _PATH)}") from error
+    try:
+        yield
+    except Exception as error:
+        if type(error).__module__.partition(".")[0] != "rasterio" and not isinstance(error, UnicodeDecodeError):
+            raise
+        raise OSError(f"{beginning}: {in_a_line(error.__cause__ or error, _PATH)}") from error
 
 
 def _first_that_opens(path, formats):
@@ -186,7 +183,7 @@ def _first_that_opens(path, formats):
     for name in formats:
         file = RasterFile(path, name)
         try:
-            with warnings.catch_warnings(), ErrorsOfGdal(f"cannot read {file.name} as a raster"):
+            with warnings.catch_warnings(), errors_of_gdal(f"cannot read {file.name} as a raster"):
                 warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
                 with file.opened() as source:
                     return RasterFile(path, source.driver)
@@ -269,24 +266,29 @@ def _check_mosaic(path, around):
 
 
 def stored_cells(file, crs, chunks):
-    """Stored cells of a file, with coordinates, dims (band, y, x)."""
+    """Stored cells of a file on its grid, dims (band, y, x)."""
     with warnings.catch_warnings():
         # rioxarray has one scale and offset for all bands; here they are coordinates along band.
         warnings.filterwarnings("ignore", "(Scales|Offsets) differ across bands")
         opened = rioxarray.open_rasterio(file.path, driver=file.driver, chunks=chunks, mask_and_scale=False)
     if not isinstance(opened, xr.DataArray):
         raise ValueError(f"{file.name} holds several rasters: take one of them out of it with gdal_translate")
-    opened = opened.rio.write_crs(crs)
+    try:
+        grid = grids.geobox(opened.rio.write_crs(crs))
+    except ValueError as error:
+        raise ValueError(f"cannot place {file.name}: {in_a_line(error, 250)}") from None
     if chunks is None:
-        return opened.load()
-    read = partial(_read_block, file, file.state, opened.dtype)
-    return opened.copy(data=da.map_blocks(read, chunks=opened.chunks, meta=np.empty((0, 0, 0), opened.dtype)))
+        cells = opened.values
+    else:
+        read = partial(_read_block, file, file.state, opened.dtype)
+        cells = da.map_blocks(read, chunks=opened.chunks, meta=np.empty((0, 0, 0), opened.dtype))
+    return grids.place(xr.DataArray(cells, {"band": opened["band"]}, ("band", "y", "x")), grid)
 
 
 def _read_block(file, state, dtype, block_info=None):
     """Chunk of a file; `state` makes a changed file another one."""
     (first, last), (top, bottom), (left, right) = block_info[None]["array-location"]
-    with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
+    with errors_of_gdal(f"cannot read {file.name}"), file.opened() as source:
         window = Window(left, top, right - left, bottom - top)
         return source.read(list(range(first + 1, last + 1)), window=window).astype(dtype, copy=False)
 
@@ -298,7 +300,7 @@ _FARTHEST = 1e9
 @contextmanager
 def sound_raster(file, *, north_up=False):
     """Context with an open file that holds numbers at places on the Earth."""
-    with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
+    with errors_of_gdal(f"cannot read {file.name}"), file.opened() as source:
         check_raster(source, file.name, north_up=north_up)
         yield source, horizontal_crs(source, file.name)
 
@@ -343,11 +345,9 @@ def horizontal_crs(source, name):
     if source.crs is None:
         raise ValueError(f"{name} has no CRS: give it one, for instance with gdal_edit.py -a_srs EPSG:26914")
     try:
-        whole = pyproj.CRS.from_wkt(source.crs.to_wkt())
-        crs = (whole.sub_crs_list or [whole])[0]
-        crs = crs.to_2d() if len(crs.axis_info) > 2 else crs
+        crs = pyproj.CRS.from_user_input(projection.horizontal(source.crs.to_wkt()))
         if crs.is_projected or crs.is_geographic:
-            return source.crs if crs is whole else rasterio.crs.CRS.from_wkt(crs.to_wkt())
+            return crs
         reason = f"it is a {in_a_line(crs.type_name, 40)}"
     except (pyproj.exceptions.ProjError, rasterio.errors.RasterioError, ValueError) as error:
         reason = in_a_line(error, 150)
@@ -368,7 +368,6 @@ def covering_grid(path, cell, pixel, crs=None):
     """Grid that covers a raster file, from and to whole pixels in its CRS or a projected one."""
     file = raster_file(path)
     with sound_raster(file) as (source, own):
-        own = pyproj.CRS.from_user_input(own)
         outline = [np.linspace(0, size, 17) for size in (source.width, source.height)]
         columns, rows = (values.ravel() for values in np.meshgrid(*outline))
         x, y = projection.transform_points(source.transform, columns, rows)

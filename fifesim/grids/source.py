@@ -24,7 +24,7 @@ from fifesim.grids import cf, projection, windows
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.inputs import storage_of, unpacked, with_band_names
-from fifesim.grids.opening import ErrorsOfGdal, RasterFile, raster_file, sound_raster
+from fifesim.grids.opening import RasterFile, errors_of_gdal, raster_file, sound_raster
 
 # Larger windows and the arrays derived from them need several GB of memory. [cell]
 _MOST_CELLS = 2**27
@@ -57,7 +57,7 @@ class Source:
         if not isinstance(self.cells, RasterFile):
             yield partial(self._read, self._array_window)
             return
-        with ErrorsOfGdal(f"cannot read {self.cells.name}"), self.cells.opened() as file:
+        with errors_of_gdal(f"cannot read {self.cells.name}"), self.cells.opened() as file:
             yield partial(self._read, partial(self.cells.read, file))
 
     def _read(self, cells, rows, columns):

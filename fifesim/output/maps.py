@@ -21,7 +21,7 @@ from fifesim.base.bands import COMPOSITES, colour_composite
 from fifesim.base.files import in_a_line
 from fifesim.grids import cf, chunks, swaths
 from fifesim.grids import grid as grids
-from fifesim.grids.opening import ErrorsOfGdal, raster_file
+from fifesim.grids.opening import errors_of_gdal, raster_file
 from fifesim.grids.reductions import computed
 from fifesim.output import colours
 from fifesim.output.colours import LAND, colours_of, dark_and_bright, percentile_limits, stops_of, stretched
@@ -334,7 +334,7 @@ def write_style(path: FilePath, *, overwrite: bool = False) -> Path:
     file, style = raster_file(path), Path(path).with_suffix(".qml")
     if style.exists() and not overwrite:
         raise FileExistsError(f"there is a style {in_a_line(style, 150)}: type overwrite=True to replace it")
-    with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
+    with errors_of_gdal(f"cannot read {file.name}"), file.opened() as source:
         name = source.descriptions[0]
         is_coloured = name in cf.QUANTITIES and cf.QUANTITIES[name].colours != "gray"
         if is_coloured:

@@ -11,7 +11,7 @@ import numpy as np
 import rasterio
 
 from fifesim.base.files import in_a_line, shown
-from fifesim.grids.opening import ErrorsOfGdal, raster_file
+from fifesim.grids.opening import errors_of_gdal, raster_file
 from fifesim.output.folders import versions
 from fifesim.output.identity import PRODUCT, SCENARIO_TAG, VERSIONS
 from fifesim.output.run_folder import simulate_to_folder
@@ -53,7 +53,7 @@ def rerun(path, output=None, *, overwrite=False, threads=None):
 def read_origin(path):
     """Scenario, product and versions of a file of a run, from its tags."""
     file = raster_file(path)
-    with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
+    with errors_of_gdal(f"cannot read {file.name}"), file.opened() as source:
         tags = source.tags()
     if not {SCENARIO_TAG, PRODUCT, VERSIONS} <= set(tags):
         raise ValueError(

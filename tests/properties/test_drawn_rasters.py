@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from rasterio.control import GroundControlPoint
 
 import fifesim
-from fifesim.grids.opening import ErrorsOfGdal
+from fifesim.grids.opening import errors_of_gdal
 
 COUNT = int(os.environ.get("FIFESIM_DRAWS", "80"))
 WEST, NORTH = 708000.0, 4332000.0
@@ -193,7 +193,7 @@ def try_a_drawn_raster(raster, broken, door):
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            with ErrorsOfGdal("cannot draw"):
+            with errors_of_gdal("cannot draw"):
                 path = write(f"{folder}/drawn.tif", **raster)
         except (OSError, ValueError, OverflowError, TypeError, SystemError):
             # Some drawn files cannot be written; test the partial file.

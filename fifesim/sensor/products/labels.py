@@ -44,10 +44,8 @@ def open_layer(folder, name, chunks, cure, count=None):
         if chunks is None:
             size = source.count * source.height * source.width
             check_memory(size, 12, f"all of {file.name}", "leave chunks out, which reads it by parts")
-        plain = stored_cells(file, crs, {"y": CHUNK, "x": CHUNK} if chunks == "auto" else chunks)
-    layer = xr.DataArray(plain.data, dims=("band", "y", "x"), name=path.name)
-    layer = layer if count else layer.isel(band=0)
-    return grids.place(layer, grids.geobox(plain))
+        layer = stored_cells(file, crs, {"y": CHUNK, "x": CHUNK} if chunks == "auto" else chunks).rename(path.name)
+    return layer.drop_vars("band") if count else layer.isel(band=0, drop=True)
 
 
 def check_same_grid(layer, other):
