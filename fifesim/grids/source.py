@@ -190,20 +190,38 @@ class OnGrid:
         first = grids.lattice_position(self.grid)
         return assemble(partial(_kept_tile, ref(self)), self.TILE, first[0] + row, first[1] + column, shape)
 
-    def raster(self, chunks=None):
-        """Raster of all cells, dims (y, x), lazy with chunks or of a lazy source."""
-        if not isinstance(self.source.cells, da.Array):
+    def raster(self, chunks=None, *, held=False):
+        """Raster of all cells, dims (y, x), lazy with chunks or of a lazy source; if held, windows of it wait."""
+        lazy = isinstance(self.source.cells, da.Array)
+        if not (lazy or held):
             return windows.tiles(self, self.grid, chunks, tile=self.TILE)
-        reads = _TileReads(self.source.cells, self.reading(None))
-
-        def kernel(rows, columns, cells):
-            down, across = reads.window(rows, columns)
-            known = reads.of.reading(cells, (down.start, across.start))
-            return known(rows.start, columns.start, (rows.stop - rows.start, columns.stop - columns.start))
-
+        of = self.reading(None) if lazy else self
         sizes = windows.chunk_sizes(self.grid, "auto" if chunks is None else chunks, tile=self.TILE)
-        out = chunking.windows(kernel, [reads], tuple(self.grid.shape), sizes)
+        reads = [_TileReads(self.source.cells, of)] if lazy else []
+        out = chunking.windows(of.part, reads, tuple(self.grid.shape), sizes)
         return grids.place(xr.DataArray(out, dims=("y", "x")), self.grid)
+
+    def part(self, rows, columns, *cells):
+        """Cells of some rows and columns, from the window of a lazy source that their tiles read."""
+        shape, known = (rows.stop - rows.start, columns.stop - columns.start), self
+        if cells:
+            down, across = self.window(rows, columns)
+            known = self.reading(*cells, (down.start, across.start))
+        return known(rows.start, columns.start, shape)
+
+    def window(self, rows, columns):
+        """Rows and columns of the source that the tiles of a part of the grid read."""
+        starts = [
+            range((first + part.start) // self.TILE * self.TILE - first, part.stop, self.TILE)
+            for first, part in zip(grids.lattice_position(self.grid), (rows, columns), strict=True)
+        ]
+        found = [each for each in starmap(self.tile_window, product(*starts)) if each]
+        if not found:
+            return slice(0, 0), slice(0, 0)
+        return tuple(
+            slice(max(min(part.start for part in parts), 0), max(min(max(part.stop for part in parts), size), 0))
+            for parts, size in zip(zip(*found, strict=True), self.source.shape, strict=True)
+        )
 
     def reading(self, cells, origin=(0, 0)):
         """Copy whose source has other cells, a window from `origin` on."""
@@ -222,16 +240,7 @@ class _TileReads(NamedTuple):
     of: OnGrid
 
     def window(self, rows, columns):
-        tile, starts = self.of.TILE, []
-        for first, part in zip(grids.lattice_position(self.of.grid), (rows, columns), strict=True):
-            starts.append(range((first + part.start) // tile * tile - first, part.stop, tile))
-        found = [each for each in starmap(self.of.tile_window, product(*starts)) if each]
-        if not found:
-            return slice(0, 0), slice(0, 0)
-        return tuple(
-            slice(max(min(part.start for part in parts), 0), max(min(max(part.stop for part in parts), size), 0))
-            for parts, size in zip(zip(*found, strict=True), self.of.source.shape, strict=True)
-        )
+        return self.of.window(rows, columns)
 
 
 @cached(16, "tiles of maps and elevation models")

@@ -49,7 +49,7 @@ def onto_grid(source, grid, chunks=None, *, classes=False, check=None):
     area, target = projection.degrees(grid), grid.crs.to_wkt()
     pipeline, back = projection.operation(source.crs, target, area), projection.operation(target, source.crs, area)
     found = _Resampled(source, grid, back, pipeline, classes, check)
-    if found.window(grid) is None:
+    if found.reads(grid) is None:
         raise ValueError(
             f"{source.name} does not overlap the grid, which spans {grids.extent(grid)} in "
             f"{projection.name_of(grid.crs.proj)}: it spans "
@@ -71,7 +71,7 @@ class _Resampled(OnGrid):
         columns, rows = self.source_places(*projection.transform_points(part.affine, columns, rows))
         return rows, columns
 
-    def window(self, part):
+    def reads(self, part):
         """Rows and columns of the source that a part reads, None if there are none or the CRS is not valid there."""
         places = self.places(part)
         if not np.isfinite(places).all():
@@ -83,11 +83,11 @@ class _Resampled(OnGrid):
         return found if all(each.stop > each.start for each in found) else None
 
     def tile_window(self, top, left):
-        found = self.window(self.part(top, left, self.TILE))
+        found = self.reads(self.square(top, left, self.TILE))
         # The window of a block may exceed the window of its tile because of map curvature.
         return found and [slice(each.start - _SOURCE_MARGIN, each.stop + _SOURCE_MARGIN) for each in found]
 
-    def part(self, row, column, size):
+    def square(self, row, column, size):
         """Square of the lattice, which may exceed the grid."""
         a = self.grid.affine
         west, north = projection.transform_points(a, column, row)
@@ -101,7 +101,7 @@ class _Resampled(OnGrid):
         out, grid = np.full((self.TILE, self.TILE), np.nan), self.grid
         finer = self.cells_per_cell(grid) > 1.01
         # Based on the tile, not the grid, so that it is the same in every window.
-        cells = self.cells_per_cell(self.part(top, left, self.TILE))
+        cells = self.cells_per_cell(self.square(top, left, self.TILE))
         size, samples = _block_size(cells, self.TILE), _samples(cells) if self.classes and finer else 1
         larger = Resampling.average if finer else Resampling.bilinear
         options = {"resampling": Resampling.nearest if self.classes else larger}
@@ -119,15 +119,15 @@ class _Resampled(OnGrid):
 
     def _block(self, read, row, column, size, samples, options):
         """Block of cells from one window of the source; with several samples, the most frequent value of each cell."""
-        block, out = self.part(row, column, size), np.full((size, size), np.nan)
-        window, a = self.window(block), block.affine
+        block, out = self.square(row, column, size), np.full((size, size), np.nan)
+        window, a = self.reads(block), block.affine
         if window is None:
             return out
         values = read(*window)
         # A slice of a GeoBox may exceed it.
         bottom, right = (min(at + size, end) for at, end in zip((row, column), self.grid.shape, strict=True))
         on_grid = self.grid[max(row, 0) : bottom, max(column, 0) : right]
-        if self.check is not None and (inside := self.window(on_grid)):
+        if self.check is not None and (inside := self.reads(on_grid)):
             (top, down), (left, across) = (
                 (max(part.start - whole.start, 0), part.stop - part.start)
                 for part, whole in zip(inside, window, strict=True)

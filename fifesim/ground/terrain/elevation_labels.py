@@ -15,7 +15,6 @@ from fifesim.base.arguments import Chunks, WholeNumber
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import warn
 from fifesim.grids import cf, windows
-from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.inputs import FileOrRaster
 from fifesim.grids.projection import lies_in_words
@@ -39,7 +38,7 @@ _SITE_ELEVATION = 400.0
 def warn_of_relief(model, unit_is_given):
     """Warn of terraces of whole numbers, and of elevations that are likely in another unit, in the middle of a grid."""
     middle, around = [np.array([size // 2]) for size in model.grid.shape], 200
-    window = model.window(*model.positions(*middle))
+    window = model.reads(*model.positions(*middle))
     values = model.read(*(slice(part.start - around, part.stop + around) for part in window), fill=False)
     step = terrace_step(values / model.source.factor)
     if step is not None:
@@ -225,21 +224,13 @@ def source_dem(
         )
     reach = _reach(known, around, grids.cell_size(coarse))
     kept = _with_data(known, around)
-    data = _in_chunks(model, coarse[kept], kept, chunks) if values is None else values[kept]
-    dem = grids.place(xr.DataArray(data, dims=("y", "x")), coarse[kept])
+    if values is None:
+        # Many horizons read each chunk.
+        dem = replace(model, grid=coarse[kept]).raster(chunks, held=True)
+    else:
+        dem = grids.place(xr.DataArray(values[kept], dims=("y", "x")), coarse[kept])
     history = f"source_dem: {model.source.name}, cells of {model.resolution:.4g} m, {margin:g} m around the grid"
     return cf.label(dem, "dem", history=history, source_resolution=model.resolution), reach
-
-
-def _in_chunks(model, grid, kept, chunks):
-    """Lazy elevation of a part of the grid of a model, in chunks that many horizons read."""
-    first_row, first_column = (part.start for part in kept)
-
-    def kernel(rows, columns):
-        shape = rows.stop - rows.start, columns.stop - columns.start
-        return model(first_row + rows.start, first_column + columns.start, shape)
-
-    return chunking.windows(kernel, [], tuple(grid.shape), windows.chunk_sizes(grid, chunks, tile=model.TILE))
 
 
 def _coarse_grid(grid, resolution, margin):

@@ -168,7 +168,7 @@ class Model(OnGrid):
         columns, rows = self.source_places(np.array([x, x + step, x]), np.array([y, y, y + step]))
         return tuple(float(step / np.hypot(*(axis[1:] - axis[0]))) for axis in (rows, columns))
 
-    def window(self, rows, columns):
+    def reads(self, rows, columns):
         """Rows and columns of the source that positions need, in whole blocks."""
         found = []
         parts = zip((rows, columns), self.blocks, self.fill, self.source.shape, strict=True)
@@ -187,7 +187,7 @@ class Model(OnGrid):
         outline = np.linspace(0, self.TILE - 1, 17).round().astype(int)
         # A curved edge may bulge between the points of the outline.
         return [
-            slice(part.start - 2, part.stop + 2) for part in self.window(*self.positions(top + outline, left + outline))
+            slice(part.start - 2, part.stop + 2) for part in self.reads(*self.positions(top + outline, left + outline))
         ]
 
     def read(self, rows, columns, fill=True):
@@ -202,7 +202,7 @@ class Model(OnGrid):
         down, across = self.blocks
         cells = np.arange(self.TILE)
         rows, columns = self.positions(top + cells, left + cells)
-        window = self.window(rows, columns)
+        window = self.reads(rows, columns)
         values = self.read(*window)
         known = np.isfinite(values)
         if not known.any():
@@ -239,7 +239,7 @@ class Model(OnGrid):
         for top, left in product(range(0, rows.size, _PART), range(0, columns.size, _PART)):
             part = slice(top, top + _PART), slice(left, left + _PART)
             down, across = self.positions(rows[part[0]], columns[part[1]])
-            window = self.window(down, across)
+            window = self.reads(down, across)
             known = np.isfinite(self.read(*window))
             out[part] = _looked_up(known, down - window[0].start, across - window[1].start)
         return out
