@@ -14,9 +14,7 @@ import typer
 import yaml
 
 import fifesim
-from fifesim.atmosphere import ENGINES
 from fifesim.atmosphere.mixtures import MODELS
-from fifesim.atmosphere.models import PROFILES
 from fifesim.cli import app
 from fifesim.ground.canopy.leaf_angles import _CUMULATIVE as LEAF_ANGLES
 from fifesim.ground.landscape.distribution import treatments
@@ -54,9 +52,7 @@ def _cell(text):
 NAMES = {
     ("ground", "distribution"): treatments(),
     ("ground", "leaf_angles"): tuple(LEAF_ANGLES),
-    ("atmosphere", "profile"): PROFILES,
     ("atmosphere", "aerosol"): (*MODELS, "none"),
-    ("atmosphere", "engine"): ENGINES,
     ("sensor", "interval"): INTERVALS,
     ("sensor", "response"): ("system", "detector", "paper"),
     ("sensor", "noise"): (*KINDS, ALL),

@@ -70,6 +70,8 @@ def agrees(hint, words):
     """Whether an annotation agrees with the type stated in a docstring."""
     given = [each for each in get_args(hint) or [hint] if each is not type(None)]
     meant = MEANT.get(words.removesuffix(", optional"))
+    if meant is str and all(isinstance(each, str) for each in given):
+        return True
     if meant is not None:
         return [each if meant is each else each.__name__ for each in given] == [meant]
     if words.startswith("{"):

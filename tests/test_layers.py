@@ -149,7 +149,7 @@ def test_imports_are_at_the_top():
     for name in sorted(set(FILES) - {"cli"}):
         functions = [node for node in ast.walk(trees()[name]) if isinstance(node, ast.FunctionDef)]
         late = {library.split(".")[0] for each in functions for library in imported(each)}
-        breaches += [f"{name} imports {each} late" for each in late - {"distributed", "zarr"}]
+        breaches += [f"{name} imports {each} late" for each in late - {"distributed", "pvlib", "zarr"}]
     assert breaches == []
 
 

@@ -1,13 +1,16 @@
 """Molecules of the air: profiles, scattering, and absorption by gases."""
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from fifesim.base import files
 from fifesim.base.caches import cached
 
-PROFILES = ("tropical", "midlatitude-summer", "midlatitude-winter", "subarctic-summer", "subarctic-winter", "us-1962")
+Profile = Literal[
+    "tropical", "midlatitude-summer", "midlatitude-winter", "subarctic-summer", "subarctic-winter", "us-1962"
+]
+PROFILES = get_args(Profile)
 
 GRAVITY = 9.80665  # [m s-2]
 GAS_CONSTANT = 8.314463  # [J mol-1 K-1]

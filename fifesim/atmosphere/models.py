@@ -5,15 +5,14 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 
-from fifesim.atmosphere import ENGINES, RANGES, aerosols, five_s, gases, mixtures
+from fifesim.atmosphere import aerosols, gases, mixtures, two_stream
 from fifesim.atmosphere.aerosols import Aerosol, known_aerosol
-from fifesim.atmosphere.gases import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, Levels, column, profile_above
-from fifesim.base.arguments import PLAIN, AerosolMixture, Numbers, check_fields, check_number, described
-from fifesim.base.messages import closest
+from fifesim.atmosphere.gases import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, Levels, Profile, column, profile_above
+from fifesim.base.arguments import PLAIN, AerosolMixture, Numbers, Range, check_fields
 
 # Band limits of the Thematic Mapper, as its designers state them. [um]
 _BANDS = ((0.45, 0.52), (0.52, 0.60), (0.63, 0.69), (0.76, 0.90), (1.55, 1.75), (2.08, 2.35))
@@ -43,8 +42,8 @@ def _of_band(atmosphere, low, high):
     through_aerosol = np.ones_like(aerosol)
     if atmosphere.aot > 0:
         _, albedo, asymmetry = aerosols.aerosol_optics(atmosphere.aerosol, wavelength)
-        _, through_aerosol = five_s.delta_eddington(aerosol, albedo, asymmetry, 1.0)
-    total = five_s.conservative_transmittance(molecules, 1.0) * through_aerosol
+        _, through_aerosol = two_stream.delta_eddington(aerosol, albedo, asymmetry, 1.0)
+    total = two_stream.conservative_transmittance(molecules, 1.0) * through_aerosol
     rows = {"optical depth, molecules": molecules, "optical depth, aerosol": aerosol}
     rows |= {"transmittance, direct": np.exp(-molecules - aerosol), "transmittance, with skylight": total}
     rows |= {
@@ -85,7 +84,7 @@ class Atmosphere:
         Column of water vapour, 0 to 10; by default from the profile. [g cm-2]
     o3 : float, optional
         Column of ozone, 0 to 1; by default from the profile. [cm-atm]
-    engine : str, optional
+    engine : {"5S", "successive-orders"}, optional
         "5S" (closed-form equations) or "successive-orders" (multiple scattering with polarization).
 
     Raises
@@ -112,26 +111,46 @@ class Atmosphere:
     True
     """
 
-    profile: str = "midlatitude-summer"
+    profile: Annotated[Profile, "profile of pressure, temperature, water vapour and ozone"] = "midlatitude-summer"
     aerosol: Annotated[AerosolMixture | Aerosol, PLAIN] = "continental"
-    visibility: float | None = None
-    altitude: float = 0.4
-    aot: float | None = None
-    h2o: float | None = None
-    o3: float | None = None
-    engine: str = "5S"
+    visibility: Annotated[
+        float | None,
+        Range("km", 5, 100, others={"m": 1e-3}, note="an optical thickness is aot="),
+        "meteorological range; give either this or aot",
+    ] = None
+    altitude: Annotated[
+        float,
+        Range("km", 0, 4, others={"m": 1e-3, "feet": 3.048e-4}),
+        "ground elevation above sea level; default only on the FIFE site",
+    ] = 0.4
+    aot: Annotated[
+        float | None,
+        Range("1", 0, 2, others={"percent": 0.01}, note="a visibility in km is visibility="),
+        "aerosol optical thickness at 0.55 um, instead of visibility",
+    ] = None
+    # From Antarctica to the wettest tropics, and from an ozone hole to the thickest layer.
+    h2o: Annotated[
+        float | None,
+        Range("g cm-2", 0, 10, (0.03, 7.5), {"mm or kg m-2": 0.1, "m": 100.0}),
+        "column water vapour; by default from the profile",
+    ] = None
+    o3: Annotated[
+        float | None,
+        Range("cm-atm", 0, 1, (0.08, 0.6), {"Dobson units": 1e-3}),
+        "column ozone; by default from the profile",
+    ] = None
+    engine: Annotated[
+        Literal["5S", "successive-orders"], "radiative transfer model: 5S, successive-orders"
+    ] = "5S"
 
     def __post_init__(self):
-        check_fields(self, "profile", "aerosol", "engine")
-        _check_name("profile", self.profile, PROFILES)
-        _check_name("engine", self.engine, ENGINES)
+        check_fields(self)
         if isinstance(self.aerosol, Aerosol):
             self._check_own_aerosol()
         elif self.aerosol != "none":
             self._set(aerosol=mixtures.canonical(self.aerosol))
-        for name in ("altitude", "h2o", "o3"):
-            if name == "altitude" or getattr(self, name) is not None:
-                self._set(**{name: _checked(name, getattr(self, name))})
+        numbers = {name: getattr(self, name) for name in ("altitude", "h2o", "o3", "visibility", "aot")}
+        self._set(**{name: float(value) for name, value in numbers.items() if value is not None})
         self._set_amount()
 
     def _check_own_aerosol(self):
@@ -145,10 +164,8 @@ class Atmosphere:
 
     def _set_amount(self):
         visibility, aot = self.visibility, self.aot
-        if aot is not None:
-            aot = _checked("aot", aot)
         if visibility is not None or aot is None:
-            visibility = _checked("visibility", 45.0 if visibility is None else visibility)
+            visibility = 45.0 if visibility is None else visibility
             follows = 0.0 if self.aerosol == "none" else aerosols.aerosol_optical_thickness(visibility)
             if aot not in (None, follows):
                 raise ValueError(
@@ -299,18 +316,3 @@ def ozone_column(levels):
 
 def _shortest(value):
     return np.format_float_positional(value, trim="-")
-
-
-def _check_name(what, value, allowed):
-    if value in allowed:
-        return
-    hint = f": type {what}={near!r}" if (near := closest(value, allowed)) else ""
-    raise ValueError(f"{what} must be one of {', '.join(allowed)}, got {value!r}{hint}")
-
-
-def _checked(what, value):
-    """Number in its range."""
-    if not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
-        raise TypeError(f"{what} must be a number in {RANGES[what].unit}, got {described(value)}: leave the unit out")
-    check_number(what, value, RANGES[what])
-    return float(value)

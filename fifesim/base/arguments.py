@@ -30,6 +30,35 @@ import numpy as np
 from fifesim.base.messages import closest, unknown_argument, warn
 
 
+class Range(NamedTuple):
+    """
+    Unit of a number, its allowed and its usual values, and factors from other units to its unit.
+
+    In ``Annotated[float, Range(...), "meaning"]``, it declares an argument, a field or a key of a scenario.
+    """
+
+    unit: str
+    lowest: float
+    highest: float
+    usual: tuple[float, float] = (-np.inf, np.inf)
+    others: Mapping[str, float] = {}
+    note: str = ""  # another meaning that the number may have
+    ends: str = "[]"  # "(" and ")" exclude an end
+
+    @property
+    def of(self):
+        """Unit as the end of a phrase, such as " km"; empty if there is none."""
+        return {"1": "", "degree": " degrees"}.get(self.unit, f" {self.unit}")
+
+    def __hash__(self):
+        return hash(self[:4])  # a mapping has no hash
+
+    def __str__(self):
+        if self.highest == np.inf:
+            return f"{'above' if self.ends[0] == '(' else 'at least'} {self.lowest:g}{self.of}"
+        return f"in {self.ends[0]}{self.lowest:g}, {self.highest:g}{self.ends[1]}{self.of}"
+
+
 class Kind(NamedTuple):
     """Set of values that an argument may have: its words in messages, and its test."""
 
@@ -43,6 +72,8 @@ class Kind(NamedTuple):
     allowed: tuple = ()
     # Whether rasters are taken as they are stored, without their scale.
     stored: bool = False
+    # Range of numbers.
+    known: Range | None = None
 
 
 _class_name = attrgetter("__name__")
@@ -196,7 +227,9 @@ def kind_of(annotation):
     """Kind of the values that an annotation allows, apart from None."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        return _named(parts[0], [each for each in parts[1:] if isinstance(each, Kind)])
+        kind = _named(parts[0], [each for each in parts[1:] if isinstance(each, Kind)])
+        known = next((each for each in parts[1:] if isinstance(each, Range)), None)
+        return kind._replace(words=f"{kind.words} in{known.of}" if known and known.of else kind.words, known=known)
     if isinstance(annotation, TypeVar):
         origin, parts = Union, annotation.__constraints__
     if origin in (Union, UnionType):
@@ -237,7 +270,7 @@ def _kinds_of(annotated):
 
 
 def check(name, value, kind):
-    """Raise TypeError if a value is not of a kind."""
+    """Raise TypeError if a value is not of a kind, and ValueError if it is a number out of the range of the kind."""
     if not kind.fits(value):
         raise TypeError(f"{name} must be {kind.words}, got {described(value)}{_cure(value, kind)}")
     if kind.allowed and value not in kind.allowed:
@@ -245,6 +278,8 @@ def check(name, value, kind):
         near = closest(value, kind.allowed)
         hint = f": did you mean {near!r}?" if near else ""
         raise ValueError(f"{name} must be {', '.join(others)} or {last}, got {described(value)}{hint}")
+    if kind.known and isinstance(value, int | float | np.number | list | tuple | np.ndarray):
+        check_number(name, value, kind.known)
     if kind.dimensions is None or not is_a(value, "DataArray"):
         return
     if value.ndim < kind.dimensions:
@@ -356,20 +391,11 @@ def _cure(value, kind):
         return ": open it with fifesim.open_image, rioxarray.open_rasterio, or onto a grid with fine_dem or open_lai"
     if kind in (NUMBER, WHOLE_NUMBER) and is_a(value, "DataArray", "ndarray"):
         return ", where one is for all cells"
+    if kind.known and isinstance(value, str):
+        return ": leave the unit out"
     if kind is GRID and is_a(value, "DataArray"):
         return ": type raster.odc.geobox"
     return ""
-
-
-class Range(NamedTuple):
-    """Unit of a quantity, its allowed and its usual values, and factors from other units to its unit."""
-
-    unit: str
-    lowest: float
-    highest: float
-    usual: tuple[float, float] = (-np.inf, np.inf)
-    others: Mapping[str, float] = {}
-    note: str = ""  # another meaning that the number may have
 
 
 def likely_units(name, value, known):
@@ -387,15 +413,16 @@ def check_number(what, values, known):
     """Raise ValueError for impossible numbers, and warn if their mean is unusual and not 0; NaN in arrays passes."""
     one, values = np.ndim(values) == 0, np.atleast_1d(np.asarray(values, float))
     wrong = (values < known.lowest) | (values > known.highest) | (one & np.isnan(values))
+    wrong |= ((known.ends[0] == "(") & (values == known.lowest)) | ((known.ends[1] == ")") & (values == known.highest))
     known_values = values[np.isfinite(values)]
     number = values[wrong][0] if wrong.any() else known_values.mean() if known_values.size else 0.0
-    unit = "" if known.unit == "1" else f" {known.unit}"
-    hint = likely_units(what.rpartition(" ")[2], number, known) or "check its unit"
+    hint = likely_units(what.rpartition(" ")[2], number, known) or (known.of and "check its unit")
+    hint = f": {hint}" if hint else ""
     if wrong.any():
-        raise ValueError(f"{what} must be in [{known.lowest:g}, {known.highest:g}]{unit}, got {number:g}: {hint}")
+        raise ValueError(f"{what} must be {known}, got {number:g}{hint}")
     if number and not known.usual[0] <= number <= known.usual[1]:
         low, high = max(known.usual[0], known.lowest), min(known.usual[1], known.highest)
-        warn(f"{what} is {number:g}{unit}, and {low:g} to {high:g} is usual: {hint}")
+        warn(f"{what} is {number:g}{known.of}, and {low:g} to {high:g} is usual{hint}")
 
 
 class Array(Protocol):

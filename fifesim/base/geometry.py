@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
-import pvlib
 
-from fifesim.base.arguments import check_fields, is_a
+from fifesim.base.arguments import Range, check_fields, check_number, is_a
 from fifesim.base.caches import cached
 from fifesim.base.messages import warn
 from fifesim.base.times import SITE_ALTITUDE, SITE_LATITUDE, SITE_LONGITUDE, SITE_TIME, utc
 
 ANGLES = ("sza", "saa", "vza", "vaa")
+
+PLACE = {"latitude": Range("degree", -90, 90), "longitude": Range("degree", -180, 360)}
+_AZIMUTH = Range("degree", -720, 720)
+_SUN = Range("degree", 0, 90, note="the sun is below the horizon; check time, latitude and longitude", ends="[)")
 
 
 @dataclass(frozen=True)
@@ -53,11 +57,15 @@ class Geometry:
     170.0
     """
 
-    sza: float
-    saa: float
-    vza: float = 0.0
-    vaa: float = 0.0
-    earth_sun_distance: float = 1.0
+    sza: Annotated[float, _SUN, "solar zenith angle"]
+    saa: Annotated[float, _AZIMUTH, "solar azimuth angle, clockwise from north"]
+    vza: Annotated[
+        float, Range("degree", 0, 90, note="the sensor looks down", ends="[)"), "sensor zenith angle; 0 is nadir"
+    ] = 0.0
+    vaa: Annotated[float, _AZIMUTH, "azimuth toward the sensor, clockwise from north"] = 0.0
+    earth_sun_distance: Annotated[
+        float, Range("astronomical units", 0.9, 1.1, note="it is from 0.983 to 1.017", ends="()")
+    ] = 1.0
 
     def __post_init__(self):
         for name in ANGLES:
@@ -67,21 +75,6 @@ class Geometry:
                     "saa, vza and vaa, such as fifesim.scan_geometry(...).assign(sza=30.0, saa=120.0)"
                 )
         check_fields(self)
-        for name in ("saa", "vaa"):
-            if not -720 <= getattr(self, name) <= 720:
-                raise ValueError(f"{name} must be in [-720, 720] degrees, got {getattr(self, name)}")
-        hints = {
-            "sza": "the sun is below the horizon; check time, latitude and longitude",
-            "vza": "the sensor looks down",
-        }
-        for name, hint in hints.items():
-            angle = getattr(self, name)
-            if not 0 <= angle < 90:
-                raise ValueError(f"{name} must be in [0, 90) degrees, got {angle:g}: {hint}")
-        if not 0.9 < self.earth_sun_distance < 1.1:
-            raise ValueError(
-                f"earth_sun_distance is in astronomical units, 0.983 to 1.017, got {self.earth_sun_distance:g}"
-            )
         warn_of_radians(self.sza, self.saa)
         warn_of_radians(self.vza, self.vaa, "vza", "vaa")
 
@@ -144,14 +137,9 @@ def scattering_angle_cosine(sza, vza, raa):
 
 def check_place(latitude, longitude):
     """Raise ValueError for numbers that are no latitude and longitude."""
-    for name, values, lowest, highest in (("latitude", latitude, -90, 90), ("longitude", longitude, -180, 360)):
-        values = np.atleast_1d(np.asarray(values, float))
-        wrong = ~((values >= lowest) & (values <= highest))
-        if wrong.any():
-            raise ValueError(
-                f"{name} must be in [{lowest}, {highest}] degrees, got {values[wrong][0]:g}: latitude is first, then "
-                "longitude; swap them?"
-            )
+    for name, values in (("latitude", latitude), ("longitude", longitude)):
+        for value in np.unique(np.asarray(values, float)):
+            check_number(name, value, PLACE[name]._replace(note="latitude is first, then longitude; swap them?"))
 
 
 def sun_geometry(time, latitude, longitude, altitude=0.0):
@@ -164,12 +152,16 @@ def sun_geometry(time, latitude, longitude, altitude=0.0):
 # Many scenes share their sun, and to find it takes as long as all that is done to their cells.
 @cached(256, "sun position")
 def _sun(time, latitude, longitude, altitude):
+    import pvlib
+
     sun = pvlib.solarposition.get_solarposition(utc(time), latitude, longitude, altitude=altitude).iloc[0]
     return Geometry(float(sun["zenith"]), float(sun["azimuth"]), earth_sun_distance=earth_sun_distance(time))
 
 
 def sun_positions(times, latitude, longitude, altitude=0.0):
     """Times in UTC, solar zeniths, possibly above 90, and azimuths [degree], and distances [AU], shape (n,)."""
+    import pvlib
+
     check_place(latitude, longitude)
     stamps = pd.DatetimeIndex([utc(time)[0] for time in times])
     numbers = [np.asarray(each, float) for each in (latitude, longitude, altitude)]
@@ -197,6 +189,8 @@ def earth_sun_distance(time):
 # Many scenes ask for the distance at one time.
 @cached(256, "distance of the sun")
 def _distance(time):
+    import pvlib
+
     return float(pvlib.solarposition.nrel_earthsun_distance(utc(time)).iloc[0])
 
 

@@ -4,13 +4,15 @@ import math
 import re
 from datetime import date, time
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal, get_args, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
+from pydantic.fields import FieldInfo
 
-from fifesim.atmosphere import ENGINES, RANGES
-from fifesim.base.arguments import Coupling
+from fifesim.atmosphere.models import Atmosphere
+from fifesim.base.arguments import Coupling, kind_of
 from fifesim.base.files import check_regular, shown
+from fifesim.base.geometry import PLACE, Geometry
 from fifesim.base.messages import nearest
 from fifesim.base.times import SITE_CORNERS, SITE_SIZE, utc
 from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
@@ -28,7 +30,9 @@ def number(default, unit, description, **limits):
 
 def ranged(default, known, description):
     """Field of a numeric key with the range of a description."""
-    field = number(default, known.unit, description, ge=known.lowest, le=known.highest)
+    low, high = ("ge" if known.ends[0] == "[" else "gt"), ("le" if known.ends[1] == "]" else "lt")
+    limits = {name: each for name, each in ((low, known.lowest), (high, known.highest)) if math.isfinite(each)}
+    field = number(default, known.unit, description, **limits)
     field.json_schema_extra["range"] = known
     return field
 
@@ -132,6 +136,20 @@ class Section(BaseModel):
     def with_paths(self, change):
         """Section with modified file paths."""
         return self.model_copy(update={key: change(value) for key, value in self.files.items()})
+
+
+def keys_of(description, names, base=Section, **changed):
+    """Section with keys for fields of a dataclass: their types, ranges, meanings and defaults, unless changed."""
+    hints, found = get_type_hints(description, include_extras=True), {}
+    for name in names.split():
+        default = changed.get(name, getattr(description, name, None))
+        if isinstance(default, FieldInfo):
+            found[name] = type(default.default), default
+            continue
+        (kind, *_, meaning), known = get_args(hints[name]), kind_of(hints[name]).known
+        field = ranged(default, known, meaning) if known else text(default, meaning)
+        found[name] = kind | None if default is None else kind, field
+    return create_model("_Keys", __base__=base, **found)
 
 
 COVERS = ("none", "pastures", "voronoi", "levels")
@@ -308,20 +326,20 @@ class TerrainKeys(Section):
         return self
 
 
-class SunAndViewKeys(Section):
-    """Directions of sun and sensor. The sun follows from time and place, or from sza and saa."""
+class _TimeAndPlace(Section):
+    """Time and place of the overpass."""
 
     time: str | None = text(
         None,
         "date and time, UTC unless it has an offset such as -05:00; by default a hypothetical overpass, on the FIFE "
         "site only. With sza and saa instead, the distance to the sun is 1 astronomical unit",
     )
-    latitude: float | None = number(None, "degree", "degrees north; by default from the grid", ge=-90, le=90)
-    longitude: float | None = number(None, "degree", "degrees east; by default from the grid", ge=-180, le=360)
-    sza: float | None = number(None, "degree", "solar zenith angle, instead of time and place", ge=0, lt=90)
-    saa: float | None = number(None, "degree", "solar azimuth angle, clockwise from north", ge=-360, le=360)
-    vza: float = number(0.0, "degree", "sensor zenith angle; 0 is nadir", ge=0, le=75)
-    vaa: float = number(0.0, "degree", "azimuth toward the sensor, clockwise from north", ge=-360, le=360)
+    latitude: float | None = ranged(None, PLACE["latitude"], "degrees north; by default from the grid")
+    longitude: float | None = ranged(None, PLACE["longitude"], "degrees east; by default from the grid")
+
+
+class SunAndViewKeys(keys_of(Geometry, "sza saa vza vaa", _TimeAndPlace, sza=None, saa=None)):  # type: ignore[misc]
+    """Directions of sun and sensor. The sun follows from time and place, or from sza and saa."""
 
     @field_validator("time", mode="before")
     @classmethod
@@ -340,22 +358,18 @@ class SunAndViewKeys(Section):
         return self
 
 
-class AirKeys(Section):
+_AEROSOL = file(
+    "continental",
+    'aerosol model, "none", a mixture such as "dust:0.5+soot:0.5" by volume, or a .nc or .csv file with aerosol '
+    "optical properties, which needs aot",
+    suffix=(".nc", ".csv"),
+)
+_Air = keys_of(Atmosphere, "profile aerosol visibility aot altitude h2o o3 engine", visibility=45.0, aerosol=_AEROSOL)
+
+
+class AirKeys(_Air):  # type: ignore[misc, valid-type]
     """The atmosphere."""
 
-    profile: str = text("midlatitude-summer", "profile of pressure, temperature, water vapour and ozone")
-    aerosol: str = file(
-        "continental",
-        'aerosol model, "none", a mixture such as "dust:0.5+soot:0.5" by volume, or a .nc or .csv file with aerosol '
-        "optical properties, which needs aot",
-        suffix=(".nc", ".csv"),
-    )
-    visibility: float | None = ranged(45.0, RANGES["visibility"], "meteorological range; give either this or aot")
-    aot: float | None = ranged(None, RANGES["aot"], "aerosol optical thickness at 0.55 um, instead of visibility")
-    altitude: float = ranged(0.4, RANGES["altitude"], "ground elevation above sea level; default only on the FIFE site")
-    h2o: float | None = ranged(None, RANGES["h2o"], "column water vapour; by default from the profile")
-    o3: float | None = ranged(None, RANGES["o3"], "column ozone; by default from the profile")
-    engine: str = text("5S", f"radiative transfer model: {', '.join(ENGINES)}")
     coupling: Coupling = text(
         "lambert",
         "reflectance of the ground toward the sky: lambert (one factor), four-stream (isotropic sky) or directional",

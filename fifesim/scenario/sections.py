@@ -5,8 +5,9 @@ from dataclasses import asdict, fields
 
 from pydantic import field_validator, model_validator
 
-from fifesim.atmosphere import ENGINES, mixtures, models
+from fifesim.atmosphere import mixtures
 from fifesim.atmosphere.aerosol_labels import read_aerosol
+from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.files import shown
 from fifesim.base.messages import nearest
 from fifesim.ground.canopy import optics
@@ -147,14 +148,6 @@ class Terrain(TerrainKeys):
 class Air(AirKeys):
     """The atmosphere."""
 
-    @field_validator("profile", "engine")
-    @classmethod
-    def _known_name(cls, value, info):
-        allowed = {"profile": models.PROFILES, "engine": ENGINES}[info.field_name]
-        if value not in allowed:
-            raise ValueError(f"must be one of {', '.join(allowed)}, got {value!r}")
-        return value
-
     @field_validator("aerosol")
     @classmethod
     def _known_aerosol(cls, value):
@@ -170,7 +163,7 @@ class Air(AirKeys):
         keys = self.model_dump(exclude={"adjacency", "coupling"})
         if "aerosol" in self.files:
             keys["aerosol"] = read_aerosol(self.aerosol)
-        return models.Atmosphere(**keys)
+        return Atmosphere(**keys)
 
 
 class Sensor(SensorKeys):

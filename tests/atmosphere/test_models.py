@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fifesim
-from fifesim.atmosphere import ENGINES, mixtures, models
+from fifesim.atmosphere import gases, mixtures
 from fifesim.atmosphere.models import Atmosphere, atmosphere_in_words
 
 
@@ -31,7 +31,10 @@ def test_text_of_the_default_atmosphere():
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        ({"profile": "midlat_summer"}, r"profile must be one of .*'midlat_summer': type profile='midlatitude-sum"),
+        (
+            {"profile": "midlat_summer"},
+            r"profile must be 'tropical', .*, got 'midlat_summer': did you mean 'midlatitude-sum",
+        ),
         ({"aerosol": "continentl"}, r"aerosol must be one of .*, got 'continentl': type aerosol='continental'"),
         ({"visibility": float("nan")}, r"visibility must be in \[5, 100\] km, got nan"),
         ({"altitude": 5}, r"altitude must be in \[0, 4\] km, got 5"),
@@ -73,7 +76,7 @@ def test_text_round_trips(arguments):
 
 def test_docstring_names_all_options():
     said = Atmosphere.__doc__
-    names = (*models.PROFILES, *mixtures.MODELS, *mixtures.COMPONENTS, *ENGINES)
+    names = (*gases.PROFILES, *mixtures.MODELS, *mixtures.COMPONENTS)
     assert [name for name in names if name not in said] == []
 
 

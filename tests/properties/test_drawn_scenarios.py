@@ -22,7 +22,7 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
 import fifesim
-from fifesim.atmosphere import models
+from fifesim.atmosphere import gases
 from fifesim.base import files
 from fifesim.scenario.keys import Keys
 from fifesim.scenario.scenario import parse_scenario, read_scenario
@@ -39,7 +39,7 @@ FEW_CELLS = 3000
 NAMES = [
     *("EPSG:26914", "EPSG:32614", "EPSG:3857", "EPSG:5041", "EPSG:2277", "EPSG:4326", "EPSG:26914+5703", "+proj=utm"),
     *fifesim.instrument_names(),
-    *models.PROFILES,
+    *gases.PROFILES,
     *("maritime", "urban", "dust:0.5+soot:0.5", "none", "dust:1e308+soot:-1"),
     *("erectophile", "planophile", "campbell(1.5)", "verhoef(-0.35,-0.15)", "verhoef(9,9)"),
     *("TM1", "tm4", "OLI4", "shot", "thermal", "ft", "km"),

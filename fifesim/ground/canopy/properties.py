@@ -4,11 +4,13 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from fifesim.base.arguments import Range
+
 _PERCENT = {"percent": 0.01}
 
 
 class Property(NamedTuple):
-    """Property of the canopy, with the fields of a `fifesim.base.arguments.Range`."""
+    """Property of the canopy, with the fields of a `Range`."""
 
     default: Any
     meaning: str
@@ -20,6 +22,8 @@ class Property(NamedTuple):
     usual: tuple[float, float] = (-math.inf, math.inf)
     others: Mapping[str, float] = _PERCENT  # factors from other units
     instead: str = ""  # other property for which the number may have been meant
+
+    ends, of, __str__ = "[]", Range.of, Range.__str__  # type: ignore[misc]
 
     @property
     def note(self):
