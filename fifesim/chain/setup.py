@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from dataclasses import dataclass, fields
 from typing import Literal
 
@@ -29,10 +30,6 @@ from fifesim.ground.canopy.description import TALLGRASS, Canopy
 from fifesim.sensor import labels as sensor
 from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.response.noise import NoiseModels
-
-# Fields that are also arguments of `surface_reflectance` and `sense`.
-_GROUND = ("canopy", "bands", "dem", "horizon", "upwelling", "slopes", "atmosphere")
-_SENSOR = ("onto", "interval", "offset", "noise", "seed", "noise_models", "quantise", "min_valid")
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,24 +123,26 @@ def _brief(value):
 
 def reflectance_of(setup, lai, coupling="lambert"):
     """Surface reflectance of leaf area in the bands of a setup, or its streams for a coupling, lazy if an input is."""
-    given = _of(setup, _GROUND) | ({"slopes": "kt"} if setup.dem is None else {})
-    given["streams"] = {"lambert": False, "four-stream": True}.get(coupling, coupling)
-    return steps.surface_reflectance(lai, setup.instrument, geometry=setup.geometry, **given)
+    given = _arguments(setup, steps.surface_reflectance) | ({"slopes": "kt"} if setup.dem is None else {})
+    streams = {"lambert": False, "four-stream": True}.get(coupling, coupling)
+    return steps.surface_reflectance(lai, geometry=setup.geometry, streams=streams, **given)
 
 
 def toa_of(setup, reflectance, lai):
     """Reflectance at the top of the atmosphere, from a surface reflectance and the leaf area or landscape below."""
     clouds = None if setup.clouds is None else cast_clouds(reflectance, setup.clouds, dem=setup.dem)
-    own = {"clouds": clouds, **_of(setup, ("adjacency", "surroundings", "coupling"))}
+    own = {name: getattr(setup, name) for name in ("instrument", "adjacency", "surroundings", "coupling")}
     if setup.coupling != "lambert" and (setup.adjacency or not coupled_ground.is_one_pass(reflectance)):
         reflectance = reflectance_of(setup, lai, setup.coupling)
-    return steps.to_toa(reflectance, instrument=setup.instrument, **own)
+    return steps.to_toa(reflectance, clouds=clouds, **own)
 
 
 def image_of(setup, reflectance, lai=None):
     """Image of a surface reflectance by the instrument of a setup, with the ground below for a coupling."""
-    return sensor.sense(toa_of(setup, reflectance, lai), setup.instrument, **_of(setup, _SENSOR))
+    return sensor.sense(toa_of(setup, reflectance, lai), **_arguments(setup, sensor.sense))
 
 
-def _of(setup, names):
-    return {name: getattr(setup, name) for name in names}
+def _arguments(setup, step):
+    """Fields of a setup that are arguments of a step, apart from the directions, which rasters carry."""
+    names = setup.__dataclass_fields__.keys() - {"geometry"}
+    return {name: getattr(setup, name) for name in inspect.signature(step).parameters if name in names}

@@ -9,6 +9,7 @@ from typing import Annotated, Literal, get_args, get_type_hints
 from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
 from pydantic.fields import FieldInfo
 
+from fifesim.atmosphere.clouds import COVER, HEIGHT, LENGTH, THICKNESS
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import Coupling, kind_of
 from fifesim.base.files import check_regular, shown
@@ -388,15 +389,15 @@ class AirKeys(_Air):  # type: ignore[misc, valid-type]
 class CloudKeys(Section):
     """Water clouds and their shadows."""
 
-    cloud_cover: float = number(0.0, "1", "cover of clouds over 100 km; 0 is a clear sky", ge=0, le=1)
-    thickness: float = number(8.0, "1", "mean optical thickness within clouds", gt=0, le=100)
-    deviation: float | None = number(None, "1", "its standard deviation; by default the mean", gt=0, le=100)
-    length: float = number(2000.0, "m", "distance at which the correlation has fallen to 0.05", ge=100, le=20_000)
-    base: float = number(1200.0, "m", "height of the base above the altitude of the atmosphere", ge=0, le=20_000)
-    top: float = number(1800.0, "m", "height of the top", ge=0, le=20_000)
+    cloud_cover: float = ranged(0.0, COVER, "cover of clouds over 100 km; 0 is a clear sky")
+    thickness: float = ranged(8.0, THICKNESS, "mean optical thickness within clouds")
+    deviation: float | None = ranged(None, THICKNESS, "its standard deviation; by default the mean")
+    length: float = ranged(2000.0, LENGTH, "distance at which the correlation has fallen to 0.05")
+    base: float = ranged(1200.0, HEIGHT, "height of the base above the altitude of the atmosphere")
+    top: float = ranged(1800.0, HEIGHT, "height of the top")
     seed: int = seed(7, "seed of the clouds; each date has an independent sky")
     # The limit of the cloud mask of MODIS (Ackerman et al., 2008, doi:10.1175/2007JTECHA1053.1).
-    mask: float = number(0.4, "1", "optical thickness from which a budget leaves out clouds and shadows", gt=0, le=100)
+    mask: float = ranged(0.4, THICKNESS, "optical thickness from which a budget leaves out clouds and shadows")
 
     @model_validator(mode="after")
     def _base_below_top(self):

@@ -198,21 +198,13 @@ class Sensor(SensorKeys):
     @classmethod
     def _known_noise_model(cls, value):
         _check_keys(value, NoiseModel, without="along")
-        detectors = value.get("detectors", 1)
-        if detectors % 1:
-            raise ValueError(f"detectors must be a whole number, got {detectors:g}")
-        if value:
-            NoiseModel(**{"thermal": 0.0, "shot": 0.0} | value | {"detectors": int(detectors)})
+        _noise_model(value, "rows")
         return value
 
     def given_noise(self):
         """Noise model from the keys; None for the model of the instrument."""
-        if not self.noise_model:
-            return None
         scan = self.description.scan
-        keys = {"thermal": 0.0, "shot": 0.0, "along": "columns" if scan and scan.kind == "pushbroom" else "rows"}
-        keys |= self.noise_model
-        return NoiseModel(**keys | {"detectors": int(keys.get("detectors", 1))})
+        return _noise_model(self.noise_model, "columns" if scan and scan.kind == "pushbroom" else "rows")
 
     @property
     def description(self):
@@ -226,6 +218,15 @@ class Sensor(SensorKeys):
     def size(self):
         """Pixel size as given; by default the pixel size of the gridded product of the bands. [m]"""
         return self.pixel or _shared_pixel(self.description, self.bands)
+
+
+def _noise_model(keys, along):
+    """Noise model from its keys; None without keys."""
+    detectors = keys.get("detectors", 1)
+    if detectors % 1:
+        raise ValueError(f"detectors must be a whole number, got {detectors:g}")
+    given = {"thermal": 0.0, "shot": 0.0} | keys | {"detectors": int(detectors)}
+    return NoiseModel(**given, along=along) if keys else None
 
 
 def _shared_pixel(description, names):

@@ -134,24 +134,22 @@ def setup_of(scenario):
     """Setup of a scenario: ground, atmosphere and instrument, without elevation."""
     own = scenario.sensor
     aligned = own.interval == "product"
+    # Keys that are fields of a setup have their names. The seed of a setup is the seed of the sensor.
+    keys = dict([*scenario.terrain, *scenario.atmosphere, *own])
+    given = {name: tuple(value) if isinstance(value, list) else value for name, value in keys.items()}
     return Setup(
-        instrument=own.description,
-        bands=tuple(own.bands),
-        atmosphere=scenario.model_atmosphere(),
-        geometry=scenario.sun_and_view(),
-        canopy=canopy_of(scenario),
-        upwelling=scenario.terrain.upwelling,
-        slopes=scenario.terrain.slopes,
-        coupling=scenario.atmosphere.coupling,
-        adjacency=scenario.atmosphere.adjacency,
-        clouds=clouds_of(scenario, scenario.geobox()),
-        onto=grids.aligned_grid(scenario.geobox(), own.size) if aligned else None,
-        interval=None if aligned else own.interval,
-        offset=tuple(own.offset),
-        min_valid=own.min_valid,
-        noise=tuple(own.noise),
-        noise_models=own.given_noise(),
-        seed=own.seed,
+        **{name: value for name, value in given.items() if name in Setup.__dataclass_fields__}
+        | {
+            "instrument": own.description,
+            "atmosphere": scenario.model_atmosphere(),
+            "geometry": scenario.sun_and_view(),
+            "canopy": canopy_of(scenario),
+            "clouds": clouds_of(scenario, scenario.geobox()),
+            "dem": None,
+            "onto": grids.aligned_grid(scenario.geobox(), own.size) if aligned else None,
+            "interval": None if aligned else own.interval,
+            "noise_models": own.given_noise(),
+        }
     )
 
 

@@ -82,7 +82,7 @@ def test_noise_key_equals_the_python_argument():
     assert Sensor().given_noise() is None
     for values, said in (
         ({"thermall": 1.0}, "did you mean 'thermal'"),
-        ({"shot": -1.0}, "shot must not be negative"),
+        ({"shot": -1.0}, "shot must be at least 0"),
         ({"detectors": 1.5}, "whole number"),
     ):
         with pytest.raises(ValueError, match=said):

@@ -17,7 +17,6 @@ from fifesim.base.caches import cached
 from fifesim.base.lattice import generator
 
 PERIOD = 100_000_000  # [mm]
-SHORTEST, LONGEST = 100.0, 20_000.0  # correlation lengths [m]
 _OCTAVES = 6
 _SLOPE = 2 / 3  # exponent of the structure function of water in clouds, a spectrum of -5/3 [Cahalan1989]_ [1]
 _LARGEST_LATTICE = 512  # finer noise repeats within the period

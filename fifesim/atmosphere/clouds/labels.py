@@ -10,10 +10,10 @@ import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere import coupling, engines
-from fifesim.atmosphere.clouds import layer
-from fifesim.atmosphere.clouds.field import LONGEST, PERIOD, SHORTEST, CloudCover, cloud_displacement, cloud_thickness
+from fifesim.atmosphere.clouds import COVER, HEIGHT, LENGTH, THICKNESS, layer
+from fifesim.atmosphere.clouds.field import PERIOD, CloudCover, cloud_displacement, cloud_thickness
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.arguments import Chunks, Kind, Pair, Time, Times, WholeNumber
+from fifesim.base.arguments import Chunks, Kind, Pair, Range, Time, Times, WholeNumber, check_number
 from fifesim.base.caches import cached
 from fifesim.base.geometry import ANGLES
 from fifesim.base.lattice import check_seed
@@ -27,7 +27,6 @@ from fifesim.grids.grid import with_crs_of
 from fifesim.grids.reductions import computed, extremes
 from fifesim.grids.sites import one_or_several
 
-HIGHEST_CLOUD = 20_000.0  # of clouds [m]
 _LOWEST_TOP = 50.0  # lower clouds are fog, or a height in km [m]
 LOWEST_SUN = 85.0  # zenith angle beyond which shadows have no end [degree]
 LEAST = 0.1  # optical thickness from which a cell counts as cloud; sensors miss thinner clouds [1]
@@ -49,17 +48,17 @@ Clouds: TypeAlias = Annotated[
 
 def cloud_field(
     grid: GeoBox,
-    cover: float = 0.4,
+    cover: Annotated[float, COVER] = 0.4,
     *,
     thickness: Pair = 8.0,
-    length: float = 2000.0,
+    length: Annotated[float, LENGTH] = 2000.0,
     height: Pair = 1500.0,
     seed: WholeNumber = 0,
     drift: Annotated[Pair, Kind("two speeds, eastward and northward, such as (5.0, 0.0)")] = (0.0, 0.0),
     time: Annotated[
         Times | float | None, Kind("a time such as '1987-06-06T16:35Z', a list of times, or seconds")
     ] = None,
-    margin: float = 0.0,
+    margin: Annotated[float, Range("m", 0, 200_000)] = 0.0,
     chunks: Chunks | None = None,
 ) -> xr.Dataset:
     """
@@ -138,13 +137,8 @@ def cloud_field(
     grid = grids.check_grid(grid)
     base, top = _base_and_top(height)
     mean, deviation = _pair(thickness)
-    _check_range("cover", cover, 0, 1, "")
-    _check_range("length", length, SHORTEST, LONGEST, " m")
-    _check_range("margin", margin, 0, 200_000, " m")
-    if not (0 < mean <= layer.THICKEST and deviation > 0):
-        raise ValueError(
-            f"thickness must be a mean from 0 to {layer.THICKEST:g} and a standard deviation above 0, got {thickness}"
-        )
+    check_number("mean of thickness", mean, THICKNESS)
+    check_number("deviation of thickness", deviation, THICKNESS._replace(highest=np.inf))
     day, seconds = _day_and_seconds(time)
     if np.shape(drift) != (2,) or not np.all(np.abs(drift) <= _FASTEST):
         raise ValueError(
@@ -188,8 +182,8 @@ def _pair(value):
 
 def _base_and_top(height):
     base, top = _pair(height)
-    _check_range("base", base, 0, HIGHEST_CLOUD, " m above the ground")
-    _check_range("top", top, 0, HIGHEST_CLOUD, " m above the ground")
+    check_number("base", base, HEIGHT)
+    check_number("top", top, HEIGHT)
     if base > top:
         raise ValueError(f"the base of clouds must not be above their top, got {base:g} and {top:g} m: swap them")
     if top < _LOWEST_TOP:
@@ -198,11 +192,6 @@ def _base_and_top(height):
             "1000"
         )
     return base, top
-
-
-def _check_range(name, value, low, high, unit):
-    if not low <= value <= high:
-        raise ValueError(f"{name} must be from {low:g} to {high:g}{unit}, got {value:g}")
 
 
 @by_date
@@ -214,7 +203,7 @@ def cast_clouds(
     altitude: float | None = None,
     geometry: Directions | None = None,
     time: Time | None = None,
-    least: float = LEAST,
+    least: Annotated[float, Range("1", 0, np.inf, note="it is an optical thickness", ends="(]")] = LEAST,
 ) -> xr.Dataset:
     """
     Find the clouds toward the sensor, toward the sun and overhead of each ground cell.
@@ -275,8 +264,6 @@ def cast_clouds(
     (100, 100)
     """
     geometry = directions.uniform_geometry(directions.given_geometry(geometry, scene, time), "clouds")
-    if not least > 0:
-        raise ValueError(f"least must be an optical thickness above 0, got {least:g}: the default is {LEAST:g}")
     if altitude is None:
         altitude = Atmosphere.parse(scene.attrs["atmosphere"]).altitude if "atmosphere" in scene.attrs else 0.4
     found = _cast(scene, clouds, dem, altitude, geometry)
@@ -345,7 +332,7 @@ def _layers(thickness, base, top, per_metre):
     height = (base + top) / 2
     low, high = extremes(height)
     # Without displacement, the height does not matter.
-    step = max(1 / per_metre if per_metre else HIGHEST_CLOUD, (high - low) / (_MOST_LAYERS - 1))
+    step = max(1 / per_metre if per_metre else HEIGHT.highest, (high - low) / (_MOST_LAYERS - 1))
     number = np.round((height.fillna(low) - low) / step)
     thickness = thickness.where(height.notnull() | (thickness == 0))
     return [(thickness.where(number == k, 0.0), low + k * step) for k in range(round((high - low) / step) + 1)]

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from fifesim.atmosphere.clouds import THICKNESS
 from fifesim.atmosphere.column import wigner
 from fifesim.atmosphere.successive_orders import quadrature
 from fifesim.base import files
@@ -15,7 +16,7 @@ from fifesim.base.geometry import scattering_angle_cosine
 
 ASYMMETRY = 0.85  # of drops in the visible and near infrared [Hansen1974]_ [1]
 DROP_RADIUS = 10e-4  # effective radius of drops in water clouds, as assumed by ISCCP [Rossow1999]_ [cm]
-THICKEST = 100.0  # largest optical thickness in the table [1]
+THICKEST = THICKNESS.highest  # largest optical thickness in the table [1]
 
 
 def two_stream_reflectance(optical_depth, asymmetry, ground=0.0):

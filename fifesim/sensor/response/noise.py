@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 
-from fifesim.base.arguments import MAPPING, Kind, Names, Numbers, Range, check_fields, check_number
+from fifesim.base.arguments import MAPPING, Kind, Names, Numbers, Range, check_fields
 from fifesim.base.lattice import generator
 
 # Kinds of noise that can be requested by name.
@@ -24,7 +24,7 @@ _TILE = 1024
 _SENSOR = 2**40
 
 
-_GAIN_SPREAD = Range("1", 0.0, np.inf, (0.0, 0.2), {"percent": 0.01}, "it is relative to the gain")
+_RADIANCE = Range("W m-2 sr-1 um-1", 0, np.inf, ends="[)")
 
 
 @dataclass(frozen=True)
@@ -65,22 +65,17 @@ class NoiseModel:
     1
     """
 
-    thermal: float
-    shot: float
-    detectors: int = 1
-    gain_spread: float = 0.0
-    offset_spread: float = 0.0
+    thermal: Annotated[float, _RADIANCE]
+    shot: Annotated[float, _RADIANCE]
+    detectors: Annotated[int, Range("1", 1, np.inf)] = 1
+    gain_spread: Annotated[
+        float, Range("1", 0, np.inf, (0.0, 0.2), {"percent": 0.01}, "it is relative to the gain", "[)")
+    ] = 0.0
+    offset_spread: Annotated[float, _RADIANCE] = 0.0
     along: Literal["columns", "rows"] = "rows"
 
     def __post_init__(self):
         check_fields(self)
-        for name in ("thermal", "shot", "gain_spread", "offset_spread"):
-            value = getattr(self, name)
-            if not 0 <= value < np.inf:
-                raise ValueError(f"{name} must not be negative, got {value}")
-        if self.detectors < 1:
-            raise ValueError(f"detectors must be at least 1, got {self.detectors}")
-        check_number("gain_spread", self.gain_spread, _GAIN_SPREAD)
 
     @classmethod
     def from_snr(cls, radiance: Numbers, snr: Numbers, shot_share: float | None = None, **fixed_pattern: Any) -> Self:

@@ -325,11 +325,13 @@ def test_each_date_has_a_separate_sun_and_cloud_field(site):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"cover": 1.1}, "cover must be from 0 to 1, got 1.1"),
+        ({"cover": 1.1}, r"cover must be in \[0, 1\], got 1.1"),
         ({"height": (2000, 1000)}, "base of clouds must not be above their top, got 2000 and 1000"),
-        ({"height": 25_000}, "base must be from 0 to 20000 m above the ground, got 25000"),
-        ({"length": 30_000}, "length must be from 100 to 20000 m, got 30000"),
-        ({"thickness": 0}, "thickness must be a mean from 0 to 100"),
+        ({"height": 25_000}, r"base must be in \[0, 20000\] m, got 25000: it is above the ground"),
+        ({"length": 30_000}, r"length must be in \[100, 20000\] m, got 30000"),
+        ({"thickness": 0}, r"mean of thickness must be in \(0, 100\], got 0"),
+        ({"thickness": (8, 0)}, "deviation of thickness must be above 0, got 0"),
+        ({"margin": -1}, r"margin must be in \[0, 200000\] m, got -1"),
         ({"drift": (np.nan, 0.0)}, "drift must be two speeds, eastward and northward"),
         ({"drift": 5.0}, "drift must be two"),
         ({"drift": (5.0, 0.0), "time": np.nan}, "time must be a finite number of seconds, got nan"),
@@ -355,7 +357,7 @@ def test_invalid_cloud_cast_raises(site, reflectance):
     with pytest.raises(ValueError, match="clouds were cast with sza 30"):
         reflectance.fifesim.to_toa(clouds=cells)
     for least in (0.0, np.nan):
-        with pytest.raises(ValueError, match="least must be an optical thickness above 0"):
+        with pytest.raises(ValueError, match="least must be above 0, got .*: it is an optical thickness"):
             reflectance.fifesim.cast_clouds(sky, least=least)
     with pytest.raises(ValueError, match="altitude must be a finite number"):
         reflectance.fifesim.cast_clouds(sky, altitude=np.nan)

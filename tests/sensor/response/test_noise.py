@@ -106,8 +106,9 @@ def test_no_kinds_give_no_noise_and_nan_is_kept():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: NoiseModel(-1.0, 0.0), "thermal must not be negative"),
-        (lambda: NoiseModel(1.0, 0.0, detectors=0), "detectors"),
+        (lambda: NoiseModel(-1.0, 0.0), "thermal must be at least 0 W m-2 sr-1 um-1, got -1"),
+        (lambda: NoiseModel(1.0, np.inf), "shot must be at least 0 W m-2 sr-1 um-1, got inf"),
+        (lambda: NoiseModel(1.0, 0.0, detectors=0), "detectors must be at least 1, got 0"),
         (lambda: NoiseModel(1.0, 0.0, along="lines"), "along must be .columns. or .rows., got .lines."),
         (lambda: NoiseModel.from_snr(80.0, 200.0, 40.0), "share of the variance"),
         (lambda: NoiseModel.from_snr([80.0, 20.0], [200.0, 300.0]), "negative variance of thermal"),
