@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from scipy import stats
 
-from fifesim.base.arguments import Method, Numbers
+from fifesim.base.arguments import Level, Method, Numbers, check, kind_of
 from fifesim.base.arrays import compiled
 
 
@@ -118,7 +118,7 @@ class Regression:
         """
         return (np.asarray(x, float) - self.x_mean) ** 2 > 9 * self.x_sum_of_squares / (self.n - 1)
 
-    def confidence_interval(self, x: Numbers, level: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
+    def confidence_interval(self, x: Numbers, level: Level = 0.95) -> tuple[np.ndarray, np.ndarray]:
         """
         Confidence interval of the mean of y at x.
 
@@ -143,7 +143,7 @@ class Regression:
         """
         return self._interval(x, level, 0.0)
 
-    def prediction_interval(self, x: Numbers, level: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
+    def prediction_interval(self, x: Numbers, level: Level = 0.95) -> tuple[np.ndarray, np.ndarray]:
         """
         Prediction interval of a new y at x.
 
@@ -169,8 +169,7 @@ class Regression:
         return self._interval(x, level, 1.0)
 
     def _interval(self, x, level, own_scatter):
-        if not 0 < level < 1:
-            raise ValueError(f"level must be between 0 and 1, got {level:g}: 0.95 is a confidence of 95 %")
+        check("level", level, kind_of(Level))
         x = np.asarray(x, float)
         leverage = own_scatter + 1.0 / self.n + (x - self.x_mean) ** 2 / self.x_sum_of_squares
         half = stats.t.ppf(0.5 + level / 2, self.n - 2) * self.residual_deviation * np.sqrt(leverage)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 import xarray as xr
 
 from fifesim.analysis import regression
 from fifesim.analysis.regression import Regression
-from fifesim.base.arguments import Pairing
+from fifesim.base.arguments import Pairing, Range
 from fifesim.grids import cf
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import with_crs_of
@@ -191,10 +192,10 @@ _MOST_INCREMENTS = 10_000
 def relative_equivalent_noise(
     variable: xr.DataArray,
     ndvi: xr.DataArray,
-    increment: float = 0.1,
+    increment: Annotated[float, Range("1", 0, np.inf, note="it is a width in units of the variable", ends="()")] = 0.1,
     *,
     slope: float | None = None,
-    min_count: int = 3,
+    min_count: Annotated[int, Range("1", 2, np.inf, note="one value has no deviation")] = 3,
     pair: Pairing = "coordinates",
 ) -> xr.Dataset:
     """
@@ -245,10 +246,6 @@ def relative_equivalent_noise(
     >>> int(noise["count"].sum())
     784
     """
-    if not 0 < increment < np.inf:
-        raise ValueError(f"increment must be positive, got {increment:g}: it is a width in units of the variable")
-    if min_count < 2:
-        raise ValueError(f"min_count must be at least 2, got {min_count}: one value has no deviation")
     if variable.attrs.get("standard_name") == cf.QUANTITIES["ndvi"].standard_name:
         raise ValueError("variable is NDVI, where a variable inferred from it is needed: exchange the two rasters")
     variable, ndvi = matched(variable, ndvi, pair)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 import xarray as xr
@@ -12,7 +13,7 @@ import xarray as xr
 from fifesim.analysis import scaling as kernels
 from fifesim.analysis.index_labels import red_and_nir
 from fifesim.analysis.regression_labels import check_same_quantity, origins, regress, sound_cells
-from fifesim.base.arguments import Metres
+from fifesim.base.arguments import FparLimit, Metres, Range
 from fifesim.base.footprints import Boxcar, Spread
 from fifesim.grids import cf, chunks
 from fifesim.grids import grid as grids
@@ -136,7 +137,12 @@ def ndvi_bias(reflectance: xr.DataArray, pixel: Metres = 30.0) -> xr.DataArray:
     return cf.label(out, "ndvi_bias", source=reflectance, history=f"ndvi_bias: second order, {pixel:g} m")
 
 
-def fpar_bias(lai: xr.DataArray, extinction: float, fpar_inf: float = 0.94, pixel: Metres = 30.0) -> xr.DataArray:
+def fpar_bias(
+    lai: xr.DataArray,
+    extinction: Annotated[float, Range("1", 0, np.inf, note="it is K of Eq. 6, about 0.5", ends="()")],
+    fpar_inf: FparLimit = 0.94,
+    pixel: Metres = 30.0,
+) -> xr.DataArray:
     """
     Mean FPAR minus FPAR of the mean LAI, predicted from the variance of LAI within pixels.
 
@@ -174,10 +180,6 @@ def fpar_bias(lai: xr.DataArray, extinction: float, fpar_inf: float = 0.94, pixe
     True
     """
     cf.check_quantity(lai, "lai")
-    if not 0 < extinction < np.inf:
-        raise ValueError(f"extinction must be positive, got {extinction:g}: it is K of Eq. 6, about 0.5")
-    if not 0 < fpar_inf <= 1:
-        raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
     means = [aggregate_blocks(array, pixel) for array in (lai, lai * lai)]
     bias = chunks.pointwise(_fpar_bias, *means, extinction=float(extinction), fpar_inf=float(fpar_inf))
     out = grids.place(bias, grids.geobox(means[0]))
@@ -269,7 +271,11 @@ def share_kept(pixels: AnyDimensions, cells: xr.DataArray) -> xr.Dataset:
 
 
 def density(
-    array: AnyDimensions, points: int = 256, bandwidth: float | None = None, *, reflect: bool | None = None
+    array: AnyDimensions,
+    points: Annotated[int, Range("1", 2, np.inf, note="it is the number of values of the density")] = 256,
+    bandwidth: float | None = None,
+    *,
+    reflect: bool | None = None,
 ) -> xr.DataArray:
     """
     Gaussian kernel density of the values of a raster; computes.
@@ -313,8 +319,6 @@ def density(
     >>> round(float(density.integrate("value")), 2)
     1.0
     """
-    if points < 2:
-        raise ValueError(f"points must be at least 2, got {points}: it is the number of values of the density")
     array = sound_cells(array)
     low, high = extremes(array)
     if reflect is None:

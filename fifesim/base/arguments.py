@@ -278,7 +278,7 @@ def check(name, value, kind):
         near = closest(value, kind.allowed)
         hint = f": did you mean {near!r}?" if near else ""
         raise ValueError(f"{name} must be {', '.join(others)} or {last}, got {described(value)}{hint}")
-    if kind.known and isinstance(value, int | float | np.number | list | tuple | np.ndarray):
+    if kind.known and (_is_number(value) or isinstance(value, list | tuple | np.ndarray)):
         check_number(name, value, kind.known)
     if kind.dimensions is None or not is_a(value, "DataArray"):
         return
@@ -468,6 +468,9 @@ NumberOrArray: TypeAlias = Annotated[float | Array, NUMBERS]
 NumberOrList: TypeAlias = Annotated[Numbers, LIST]
 NumberByBand: TypeAlias = Annotated[Numbers | Mapping[str, float], Kind("a number, or one for each band")]
 Surroundings: TypeAlias = Annotated[Numbers, Kind("a reflectance, one for each band, or a raster", dimensions=0)]
+Level: TypeAlias = Annotated[float, Range("1", 0, 1, note="0.95 is a confidence of 95 %", ends="()")]
+FparLimit: TypeAlias = Annotated[float, Range("1", 0, 1, note="it is a fraction, 0.94 in the paper", ends="(]")]
+MinValid: TypeAlias = Annotated[float, Range("1", 0, 1, note="it is a share of the footprint")]
 # One number, or two: down and across.
 Pair: TypeAlias = Annotated[float | Sequence[float], PAIR]
 Interval: TypeAlias = Annotated[

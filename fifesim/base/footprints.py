@@ -14,7 +14,7 @@ from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 
-from fifesim.base.arguments import Kind, Numbers
+from fifesim.base.arguments import Kind, MinValid, Numbers, check, kind_of
 from fifesim.base.arrays import compiled, jitable
 
 # Rounding of positions leaves weights of about 1e-16 in cells that only touch the footprint: dropped, because
@@ -195,8 +195,7 @@ def regularize(values, rows, columns, *, min_valid=0.98):
             f"the operators want {wanted} cells along (y, x), the values have shape {values.shape}: "
             "cut them with rows.window and columns.window"
         )
-    if not 0 <= min_valid <= 1:
-        raise ValueError(f"min_valid must be in [0, 1], got {min_valid}: it is a share of the footprint")
+    check("min_valid", min_valid, kind_of(MinValid))
     means = np.empty((*values.shape[:-2], len(rows), len(columns)), dtype)
     down, across = (
         _Axis(axis.start - axis.window.start, axis.count, axis.weights, axis.share) for axis in (rows, columns)

@@ -11,7 +11,7 @@ import xarray as xr
 
 from fifesim.atmosphere.engines import light_at_ground
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.arguments import Time
+from fifesim.base.arguments import FparLimit, Time
 from fifesim.base.bands import Band
 from fifesim.base.geometry import Geometry
 from fifesim.chain.landscapes import canopies_of, check_used, land_of, stands_of, warn_of_tallgrass
@@ -47,7 +47,7 @@ def fpar(
     atmosphere: Atmosphere | None = None,
     geometry: Directions | None = None,
     time: Time | None = None,
-    fpar_inf: float = layers.FPAR_INF,
+    fpar_inf: FparLimit = layers.FPAR_INF,
     leaves: Literal["all", "green"] = "all",
 ) -> xr.DataArray:
     """

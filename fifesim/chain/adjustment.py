@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
+from typing import Annotated, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base import files
-from fifesim.base.arguments import Names, NoiseKinds, Time, WholeNumber
+from fifesim.base.arguments import Names, NoiseKinds, Range, Time, WholeNumber
 from fifesim.base.caches import cached
 from fifesim.base.footprints import Boxcar
 from fifesim.base.geometry import ANGLES
@@ -38,6 +38,8 @@ from fifesim.sensor.response.spectral import band_weights, best_linear, covered_
 UNCERTAINTY = 0.0005
 """Default standard error of the reflectance in an adjustment [1]."""
 
+Uncertainty: TypeAlias = Annotated[float, Range("1", 0, np.inf, note="it is in reflectance, such as 0.005", ends="()")]
+
 
 @by_date
 def adjust_bands(
@@ -46,7 +48,7 @@ def adjust_bands(
     *,
     bands: Names | None = None,
     source: InstrumentLike | None = None,
-    uncertainty: float = UNCERTAINTY,
+    uncertainty: Uncertainty = UNCERTAINTY,
 ) -> xr.DataArray:
     """
     Estimate surface reflectance in the bands of another instrument.
@@ -106,8 +108,6 @@ def adjust_bands(
     if {"y", "x"} <= set(reflectance.dims):  # and not spectra of the field
         reflectance = as_bands_of(reflectance, source, "surface_reflectance")
     cf.check_quantity(reflectance, "surface_reflectance")
-    if not (math.isfinite(uncertainty) and uncertainty > 0):
-        raise ValueError(f"uncertainty must be above 0, got {uncertainty:g}: it is in reflectance, such as 0.005")
     description = find_instrument(instrument)
     from_bands = _source_bands(reflectance, source)
     to = description.select(bands)
@@ -135,7 +135,7 @@ def as_seen_by(
     onto: GeoBox | None = None,
     noise: NoiseKinds = (),
     seed: WholeNumber = 0,
-    uncertainty: float = UNCERTAINTY,
+    uncertainty: Uncertainty = UNCERTAINTY,
     recorded: bool | None = None,
 ) -> Image:
     """

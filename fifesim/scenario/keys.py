@@ -6,17 +6,18 @@ from datetime import date, time
 from pathlib import Path
 from typing import Annotated, Literal, get_args, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, Strict, create_model, field_validator, model_validator
 from pydantic.fields import FieldInfo
 
 from fifesim.atmosphere.clouds import COVER, HEIGHT, LENGTH, THICKNESS
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.arguments import Coupling, kind_of
+from fifesim.base.arguments import Coupling, FparLimit, MinValid, kind_of
 from fifesim.base.files import check_regular, shown
 from fifesim.base.geometry import PLACE, Geometry
 from fifesim.base.messages import nearest
 from fifesim.base.times import SITE_CORNERS, SITE_SIZE, utc
 from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
+from fifesim.ground.landscape import ARP, COARSER, STREAMING_ARP
 
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 
@@ -158,7 +159,7 @@ VARYING = tuple(DRAWN)
 KEYS = {name: known for name, known in PROPERTIES.items() if known.default is not None}
 """Canopy properties that are single keys of a scenario."""
 COVARIATES = ("elevation", "wetness", "illumination")
-FIELD_LIMITS = {"deviations": (0, 1), "arps": (0, 0.2498), "covary": (-1, 1)}
+FIELD_LIMITS = {"deviations": (0, 1), "arps": (0, STREAMING_ARP.highest), "covary": (-1, 1)}
 """Smallest and largest number in the tables of a landscape. [1]"""
 
 # Values by the name of a band, spectrum or leaf constituent.
@@ -171,7 +172,7 @@ class _LeafArea(Section):
     """Leaf area of a stand."""
 
     distribution: str = file("burned-grazed", "LAI distribution: a treatment, or a .csv of LAI samples", suffix=".csv")
-    arp: float = number(0.15, "1", "autoregressive parameter; larger values give smoother fields", ge=0, lt=0.25)
+    arp: float = ranged(0.15, ARP, "autoregressive parameter; larger values give smoother fields")
 
 
 def _key(known):
@@ -219,7 +220,7 @@ class GroundKeys(StandKeys):
     seed: int = seed(7, "seed of the random fields")
     method: Literal["streaming", "periodic"] = text("streaming", "streaming, or periodic as in the paper (in memory)")
     lai_file: str | None = file(None, "LAI map to use instead of a random field")
-    fpar_inf: float = number(0.94, "1", "FPAR of an infinitely thick canopy", gt=0, le=1)
+    fpar_inf: float = ranged(0.94, kind_of(FparLimit).known, "FPAR of an infinitely thick canopy")
 
 
 class ClassKeys(StandKeys):
@@ -246,13 +247,8 @@ class LandscapeKeys(Section):
     size: float = number(1200.0, "m", "side of a drawn pasture, or width of a drawn patch", gt=0)
     deviations: ByName = text({}, f"standard deviations [1] of properties drawn as fields: {', '.join(VARYING)}")
     arps: ByName = text({}, "autoregressive parameters [1] of these fields; by default arp of [ground]")
-    coarser: int = number(
-        1,
-        "1",
-        "ground cells per lattice cell of these fields along each side; arps refers to lattice cells",
-        ge=1,
-        le=100,
-        strict=True,
+    coarser: Annotated[int, Strict()] = ranged(
+        1, COARSER, "ground cells per lattice cell of these fields along each side; arps refers to lattice cells"
     )
     covary: ByName = text({}, f"correlations [1] of LAI with {', '.join(COVARIATES + VARYING)}")
 
@@ -443,7 +439,7 @@ class SensorKeys(Section):
         "gain_spread [1], offset_spread [W m-2 sr-1 um-1]",
     )
     seed: int = seed(0, "seed of the noise")
-    min_valid: float = number(0.98, "1", "minimum fraction of a pixel's footprint on valid cells", ge=0, le=1)
+    min_valid: float = ranged(0.98, kind_of(MinValid).known, "minimum fraction of a pixel's footprint on valid cells")
 
     @field_validator("bands")
     @classmethod

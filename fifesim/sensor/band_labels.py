@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from fifesim.base.arguments import Names
+from fifesim.base.arguments import Names, Range
 from fifesim.grids import cf
 from fifesim.grids.inputs import AnyDimensions, check_reflectance, micrometres, per_micrometre, storage_of
 from fifesim.grids.reductions import combined
@@ -69,7 +69,7 @@ def to_bands(
     instrument: InstrumentLike,
     *,
     bands: Names | None = None,
-    min_coverage: float = MIN_COVERAGE,
+    min_coverage: Annotated[float, Range("1", 0, 1, note="it is a share, such as 0.95", ends="(]")] = MIN_COVERAGE,
 ) -> xr.DataArray:
     """
     Convert spectra to the bands of an instrument, for hyperspectral images and field spectra.
@@ -131,8 +131,6 @@ def to_bands(
             f"spectra must be reflectance or radiance, got whole numbers ({dtype}) without a scale: type "
             ".assign_attrs(scale_factor=0.0001) with the scale of the data"
         )
-    if not 0 < min_coverage <= 1:
-        raise ValueError(f"min_coverage must be in (0, 1], got {min_coverage:g}: it is a share, such as 0.95")
     description = find_instrument(instrument)
     selected = description.select(bands)
     quantity = _quantity(spectra)

@@ -71,7 +71,7 @@ def test_equivalent_noise_is_identical_in_any_chunks(scattered):
     ("call", "message"),
     [
         (lambda y, x: fifesim.regress(y[:10], x[20:]), "do not overlap"),
-        (lambda y, x: fifesim.relative_equivalent_noise(y, x, increment=0.0), "increment must be positive, got 0"),
+        (lambda y, x: fifesim.relative_equivalent_noise(y, x, increment=0.0), "increment must be above 0, got 0"),
         (lambda y, x: fifesim.relative_equivalent_noise(y, x, increment=1e-6), "take a larger one"),
         (lambda y, x: fifesim.relative_equivalent_noise(y, x, min_count=1), "at least 2, got 1"),
         (lambda y, x: fifesim.relative_equivalent_noise(y * np.nan, x, slope=0.4), "needs finite values"),

@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, Any, Literal, get_type_hints
 
 import numpy as np
@@ -26,6 +27,7 @@ from fifesim.base.arguments import (
     Kind,
     Metres,
     Names,
+    Range,
     check_fields,
     checked,
     kind_of,
@@ -469,6 +471,44 @@ def test_fields_of_a_new_description_are_checked_by_their_annotations():
     for given, message in (({"width": "2"}, "width must be a number, got '2'"), ({"wet": 1}, "wet must be True or")):
         with pytest.raises(TypeError, match=f"^{message}"):
             Mesh(**{"width": 2.0, **given})
+
+
+Share = Annotated[float, Range("1", 0, 1, others={"percent": 0.01}, ends="[)")]
+Depth = Annotated[float | None, Range("m", 0, np.inf, ends="()"), "depth of the water"]
+
+
+@dataclass
+class Pond:
+    """A description with a range of each kind."""
+
+    share: Share = 0.5
+    depth: Depth = None
+
+    def __post_init__(self):
+        check_fields(self)
+
+
+def pond(share: Share = 0.5, depth: Depth = None):
+    """A public function with the same ranges."""
+    return SimpleNamespace(share=share, depth=depth)
+
+
+@pytest.mark.parametrize("checks", [Pond, checked(pond)])
+@pytest.mark.parametrize(
+    ("given", "error", "message"),
+    [
+        ({"share": 1}, ValueError, r"share must be in \[0, 1\), got 1: if it is in percent, type share=0.01$"),
+        ({"share": xr.DataArray(-1.0)}, ValueError, r"share must be in \[0, 1\), got -1$"),
+        ({"share": float("nan")}, ValueError, r"share must be in \[0, 1\), got nan$"),
+        ({"depth": 0.0}, ValueError, "depth must be above 0 m, got 0: check its unit$"),
+        ({"depth": np.inf}, ValueError, "depth must be above 0 m, got inf"),
+        ({"depth": "2 m"}, TypeError, "depth must be a number in m, got '2 m': leave the unit out$"),
+    ],
+)
+def test_range_in_an_annotation_is_checked(checks, given, error, message):
+    with pytest.raises(error, match=f"^{message}"):
+        checks(**given)
+    assert checks(share=0, depth=None).share == 0 and checks(share=np.float32(0.5), depth=1e-9).depth > 0
 
 
 def public_arguments():

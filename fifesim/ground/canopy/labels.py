@@ -277,8 +277,6 @@ def canopy_fpar(lai, canopy, *, geometry=None, time=None, fpar_inf=layers.FPAR_I
 
 def fpar_kernel(lai, canopy, geometry, fpar_inf=layers.FPAR_INF, leaves="all"):
     """Kernel of the fraction absorbed by a canopy, ``kernel(lai, *blocks)``, and its raster arguments. [1]"""
-    if not 0 < fpar_inf <= 1:
-        raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
     sza = float(geometry.sza)
     extinction = float(layers.extinction_coefficient(sza, canopy.leaf_angles))
     varying, numbers = shares_of(canopy, _absorbing(leaves), lai)

@@ -23,13 +23,14 @@ from numbers import Integral
 import numpy as np
 from scipy import fft, optimize, special
 
-from fifesim.base.arguments import described
+from fifesim.base.arguments import check_number, described
 from fifesim.base.arrays import compiled, jitable
 from fifesim.base.caches import cached
 from fifesim.base.lattice import assemble, check_seed, generator
+from fifesim.ground.landscape import ARP, COARSER, STREAMING_ARP
 
 # Largest arp of the streaming field, and of an arp found from a length. [1]
-LARGEST_STREAMING_ARP = 0.2498
+LARGEST_STREAMING_ARP = STREAMING_ARP.highest
 
 # With a margin of this many decay lengths, exp(-18) = 1.5e-8 of the standard deviation is left at a tile's edge, less
 # than the rounding of the single precision in which a tile is filtered.
@@ -41,18 +42,13 @@ PRACTICAL_RANGE = 0.05
 
 def check_arp(arp):
     """Raise ValueError if the process is not stationary for an autoregressive parameter."""
-    if not 0 <= arp < 0.25:
-        raise ValueError(
-            f"arp must be in [0, 0.25), got {arp:g}: the four-neighbour process is not stationary from 0.25 up; "
-            "the paper uses 0.05 to 0.24"
-        )
+    check_number("arp", arp, ARP)
 
 
 def check_streaming_arp(arp, remedy="use larger cells for a longer range"):
     """Raise ValueError if an autoregressive parameter is invalid, or too large for the streaming field."""
     check_arp(arp)
-    if arp > LARGEST_STREAMING_ARP:
-        raise ValueError(f"arp must be at most {LARGEST_STREAMING_ARP} for the streaming field, got {arp:g}: {remedy}")
+    check_number("arp of the streaming field", arp, STREAMING_ARP._replace(note=remedy))
 
 
 def response(arp, u, v):
@@ -483,7 +479,6 @@ def pair_correlations(arp, ratio):
 # Edge of a tile. [cell of the lattice]
 COARSE_TILE = 252
 
-LARGEST = 100  # cells of the ground along a side of a cell of the lattice
 
 _TAPS = 4  # of a cubic spline
 
@@ -536,10 +531,7 @@ def check_coarser(coarser):
     """Raise an error if the coarsening factor is invalid."""
     if isinstance(coarser, bool) or not isinstance(coarser, Integral):
         raise TypeError(f"coarser must be a whole number of ground cells, got {described(coarser)}: type coarser=4")
-    if not 1 <= coarser <= LARGEST:
-        raise ValueError(
-            f"coarser must be in 1 to {LARGEST}, got {coarser}: it counts ground cells along a side of one of the field"
-        )
+    check_number("coarser", coarser, COARSER)
     return int(coarser)
 
 

@@ -5,12 +5,21 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from numbers import Number, Real
+from numbers import Number
+from typing import Annotated
 
 import numpy as np
 from scipy import stats
 
-from fifesim.base.arguments import FilePath, FrozenDistribution, described
+from fifesim.base.arguments import (
+    FilePath,
+    FrozenDistribution,
+    Range,
+    WholeNumber,
+    check_fields,
+    check_number,
+    described,
+)
 from fifesim.base.caches import cached
 from fifesim.ground.canopy.description import TALLGRASS, Canopy
 from fifesim.ground.canopy.leaf_area import check_map
@@ -55,20 +64,13 @@ class Field:
     0.2
     """
 
-    mean: float = 0.0
-    sd: float = 0.0
+    mean: Annotated[float, Range("1", -1, 1)] = 0.0
+    sd: Annotated[float, Range("1", 0, np.inf, note="it is a standard deviation", ends="[)")] = 0.0
     arp: float = 0.15
-    coarser: int = 1
+    coarser: WholeNumber = 1
 
     def __post_init__(self):
-        for name in ("mean", "sd", "arp"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, Real):
-                raise TypeError(f"Field: {name} must be a number, got {described(value)}: type Field(mean=0.2, sd=0.1)")
-        if not 0 <= self.sd < float("inf"):
-            raise ValueError(f"Field: sd must be at least 0, got {self.sd:g}: it is a standard deviation")
-        if not abs(self.mean) <= 1:
-            raise ValueError(f"Field: mean must be in [-1, 1], got {self.mean:g}")
+        check_fields(self)
         check_coarser(self.coarser)
         check_streaming_arp(self.arp)
 
@@ -254,8 +256,7 @@ def _with_name(found, name, number):
 def _check_code(code):
     if isinstance(code, bool) or not isinstance(code, int | np.integer):
         raise TypeError(f"code must be a whole number, got {described(code)}")
-    if not 0 <= code <= LARGEST_CODE:
-        raise ValueError(f"code must be in 0 to {LARGEST_CODE}, got {code}")
+    check_number("code", code, Range("1", 0, LARGEST_CODE))
 
 
 def _is_number(value):

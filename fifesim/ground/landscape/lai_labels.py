@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import psutil
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.arguments import Chunks, LaiDistribution, Times, WholeNumber
+from fifesim.base.arguments import Chunks, LaiDistribution, Range, Times, WholeNumber
 from fifesim.base.lattice import check_seed
 from fifesim.base.times import utc
 from fifesim.grids import cf, windows
@@ -195,7 +195,12 @@ def double_logistic(day, green_up, senescence, width):
 
 
 def phenology(
-    time: Times, *, green_up: float, senescence: float, width: float = 10.0, winter: float = 0.0
+    time: Times,
+    *,
+    green_up: float,
+    senescence: float,
+    width: Annotated[float, Range("day", 0, np.inf, ends="()")] = 10.0,
+    winter: Annotated[float, Range("1", 0, 1)] = 0.0,
 ) -> xr.DataArray:
     """
     Growth by date, to be multiplied with a raster of the largest leaf area.
@@ -236,8 +241,6 @@ def phenology(
         raise ValueError(
             f"senescence must be after green_up, got {senescence:g} and {green_up:g}: give days of the year"
         )
-    if not (width > 0 and 0 <= winter <= 1):
-        raise ValueError(f"width must be above 0 and winter from 0 to 1, got {width:g} and {winter:g}")
     times = one_or_several(time)
     stamps = [utc(one)[0] for one in (times if np.ndim(times) else [times])]
     day = np.array([stamp.day_of_year + stamp.hour / 24 for stamp in stamps])

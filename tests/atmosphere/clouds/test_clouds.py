@@ -357,7 +357,7 @@ def test_invalid_cloud_cast_raises(site, reflectance):
     with pytest.raises(ValueError, match="clouds were cast with sza 30"):
         reflectance.fifesim.to_toa(clouds=cells)
     for least in (0.0, np.nan):
-        with pytest.raises(ValueError, match="least must be above 0, got .*: it is an optical thickness"):
+        with pytest.raises(ValueError, match=r"least must be above 0, got .*: it is an optical thickness"):
             reflectance.fifesim.cast_clouds(sky, least=least)
     with pytest.raises(ValueError, match="altitude must be a finite number"):
         reflectance.fifesim.cast_clouds(sky, altitude=np.nan)

@@ -245,7 +245,7 @@ def test_arp_of_a_process_that_is_not_stationary_is_refused(arp):
 
 
 def test_streaming_refuses_arps_and_lengths_with_too_large_a_margin():
-    with pytest.raises(ValueError, match=r"at most 0\.2498.*method=\"periodic\""):
+    with pytest.raises(ValueError, match=r"in \[0, 0\.2498\], got 0\.2499: use method=\"periodic\""):
         streaming_field(1, 0.2499, 0, 0, (2, 2))
     assert np.isfinite(periodic_field(1, 0.2499, (50, 50))).all()
     with pytest.raises(ValueError, match="use larger cells for a longer range"):

@@ -68,8 +68,8 @@ def test_coarse_windows_equal_slices_across_tiles(coarser):
 @pytest.mark.parametrize(
     ("coarser", "error", "message"),
     [
-        (0, ValueError, "coarser must be in 1 to 100, got 0"),
-        (101, ValueError, "coarser must be in 1 to 100, got 101"),
+        (0, ValueError, r"coarser must be in \[1, 100\], got 0"),
+        (101, ValueError, r"coarser must be in \[1, 100\], got 101"),
         (2.0, TypeError, "whole number of ground cells, got .*: type coarser=4"),
         (True, TypeError, "whole number"),
     ],

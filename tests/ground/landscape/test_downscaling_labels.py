@@ -165,7 +165,7 @@ def test_cells_correlate_with_a_lai_scene_of_the_same_seed(off):
     "options, message",
     [
         ({"arp": 0.3}, r"arp must be in \[0, 0\.25\), got 0\.3"),
-        ({"arp": 0.2499}, "arp must be at most 0.2498"),
+        ({"arp": 0.2499}, r"arp of the streaming field must be in \[0, 0.2498\]"),
         ({"seed": -1}, "seed must be"),
         ({"cv": 0.3, "distribution": "burned-grazed"}, "distribution= of the cells .* or cv= within pixels, not both"),
         ({"cv": -0.1}, r"cv must be in \[0, .* got -0.1: .* such as 0.3"),

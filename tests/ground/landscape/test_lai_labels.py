@@ -48,7 +48,7 @@ def test_window_of_the_site_equals_a_slice(lai):
     "options, message",
     [
         ({"method": "fft"}, "method must be 'streaming' or 'periodic', got 'fft'"),
-        ({"arp": 0.24999, "chunks": 10}, "at most"),
+        ({"arp": 0.24999, "chunks": 10}, "arp of the streaming field must be in"),
         ({"chunks": {"band": 1}}, "y and x"),
     ],
 )
