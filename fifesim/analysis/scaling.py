@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import fft
 
+from fifesim.base.arguments import Range, check_number
+
 
 def linearity_correlation(red, nir):
     r"""
@@ -284,8 +286,7 @@ def gaussian_density(samples, at, bandwidth, weights=None, *, reflect=False):
     ----------
     [Silverman1986]_, Sections 2.4 and 2.10
     """
-    if not 0 < bandwidth < np.inf:
-        raise ValueError(f"bandwidth must be positive, got {bandwidth:g}: do the samples vary?")
+    check_number("bandwidth", bandwidth, Range("1", 0, np.inf, note="do the samples vary?", ends="()"))
     samples, at = np.asarray(samples, float), np.asarray(at, float)
     if reflect:
         if np.min(samples, initial=0.0) < 0:

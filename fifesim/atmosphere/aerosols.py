@@ -9,6 +9,7 @@ import numpy as np
 from fifesim.atmosphere import mixtures
 from fifesim.atmosphere.mixtures import Component, mixture, normalized_log_phase, phase_on_sphere, sphere
 from fifesim.base import files
+from fifesim.base.arguments import Range, check_number
 from fifesim.base.caches import cached
 
 SCALE_HEIGHT = 2.0  # of the aerosol above the ground [km]
@@ -474,13 +475,8 @@ def phase_moments(aerosol, wavelength, count):
 
 def _checked_wavelength(wavelength):
     wavelength = np.asarray(wavelength, float)
-    low, high = WAVELENGTH_RANGE
-    outside = wavelength[(wavelength < low) | (wavelength > high)]
-    if outside.size:
-        raise ValueError(
-            f"wavelength must be from {low:g} to {high:g} um, got {outside.flat[0]:g}: give it in micrometres, "
-            "inside the aerosol tables"
-        )
+    note = "give it in micrometres, inside the aerosol tables"
+    check_number("wavelength", np.atleast_1d(wavelength), Range("um", *WAVELENGTH_RANGE, note=note))
     return wavelength
 
 

@@ -12,6 +12,7 @@ from fifesim.atmosphere.coupling import BandTerms, Scattering, band_mean_terms, 
 from fifesim.atmosphere.five_s import five_s_scattering
 from fifesim.atmosphere.gases import gas_transmittance, table_wavelengths
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
+from fifesim.base.arguments import Range, check_number
 from fifesim.base.bands import solar_irradiance_steps
 from fifesim.base.caches import cached
 from fifesim.base.geometry import scattering_angle_cosine
@@ -125,6 +126,7 @@ def _moments(aerosol, wavelength, polarized):
 
 
 LARGEST_ZENITH = 75.0  # the plane-parallel atmosphere holds to here [degree]
+_ZENITH = Range("degree", 0, LARGEST_ZENITH, note="the plane-parallel atmosphere is not valid beyond")
 
 SCATTERING = {
     "5S": five_s_scattering,
@@ -194,11 +196,7 @@ def light_at_ground(atmosphere, bands, sza, photons=True):
 
 def check_zenith(name, angle):
     """Raise ValueError if a zenith angle is outside of the range of all engines."""
-    if not 0 <= angle <= LARGEST_ZENITH:
-        raise ValueError(
-            f"{name} must be from 0 to {LARGEST_ZENITH:g} degrees, got {angle:g}: "
-            "the plane-parallel atmosphere is not valid beyond"
-        )
+    check_number(name, angle, _ZENITH)
 
 
 def check_aerosol(atmosphere, what, low, high):

@@ -5,6 +5,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from fifesim.base import files
+from fifesim.base.arguments import Range, check_number
 from fifesim.base.caches import cached
 
 Profile = Literal[
@@ -392,11 +393,8 @@ def gas_transmittance(wavelength, atmosphere, air_mass, *, gases=GASES):
     """
     wavelength = np.atleast_1d(np.asarray(wavelength, float))
     nodes = table_wavelengths()
-    if wavelength.min() < nodes[0] or wavelength.max() > nodes[-1]:
-        raise ValueError(
-            f"wavelength must be from {nodes[0]:g} to {nodes[-1]:g} um, got {wavelength.min():g} to "
-            f"{wavelength.max():g}: give it in micrometres, inside the gas table"
-        )
+    note = "give it in micrometres, inside the gas table"
+    check_number("wavelength", wavelength, Range("um", nodes[0], nodes[-1], note=note))
     index = np.clip(np.searchsorted(nodes, wavelength) - 1, 0, nodes.size - 2)
     share = (wavelength - nodes[index]) / (nodes[index + 1] - nodes[index])
     first, last = index.min(), index.max() + 2

@@ -14,7 +14,7 @@ from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 
-from fifesim.base.arguments import Kind, MinValid, Numbers, check, kind_of
+from fifesim.base.arguments import Kind, MinValid, Numbers, Range, check, check_number, kind_of
 from fifesim.base.arrays import compiled, jitable
 
 # Rounding of positions leaves weights of about 1e-16 in cells that only touch the footprint: dropped, because
@@ -316,8 +316,7 @@ class FiniteSpread(LineSpread):
     width: float
 
     def __post_init__(self):
-        if not 0 < self.width < np.inf:
-            raise ValueError(f"the width of a line spread function must be positive metres, got {self.width}")
+        check_number("width of a line spread function", self.width, Range("m", 0, np.inf, ends="()"))
 
     @property
     def half_width(self):

@@ -7,13 +7,13 @@ import xarray as xr
 
 from fifesim.atmosphere.labels import diffuse_fraction
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.arguments import Names, check_number
+from fifesim.base.arguments import Names, Range, check_number
 from fifesim.base.geometry import Geometry, warn_of_radians
 from fifesim.base.messages import nearest
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.description import TALLGRASS, Canopy, is_raster
-from fifesim.ground.canopy.leaf_area import LARGEST_LAI, check_lai
+from fifesim.ground.canopy.leaf_area import check_lai
 from fifesim.ground.canopy.optics import check_background
 from fifesim.ground.canopy.properties import NUMERIC_PROPERTIES
 from fifesim.ground.canopy.prospect import LEAF_RANGES, Leaf, leaf_band_means
@@ -23,12 +23,9 @@ from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
 _LEAF = {f"leaf_{name}": name for name in LEAF_RANGES}
-_ANGLES = {"sza": (0.0, 90.0), "vza": (0.0, 90.0), "raa": (-360.0, 360.0)}
-_RANGES = {
-    "lai": (0.0, LARGEST_LAI),
-    **_ANGLES,
-    "diffuse_fraction": (0.0, 1.0),
-}
+_ZENITH = Range("degree", 0, 90, ends="[)")
+_ANGLES = {"sza": _ZENITH, "vza": _ZENITH, "raa": Range("degree", -360, 360)}
+_RANGES = {**_ANGLES, "diffuse_fraction": Range("1", 0, 1)}
 _NAMES = ("lai", *NUMERIC_PROPERTIES, *_ANGLES, "diffuse_fraction", "background", *_LEAF)
 """Names of the quantities that may differ from canopy to canopy."""
 
@@ -276,13 +273,7 @@ def _check(values):
     """Raise ValueError if a value is out of its range; NaN passes."""
     check_lai(values["lai"])
     warn_of_radians(*(float(np.nan_to_num(np.abs(values[name])).max()) for name in ("sza", "raa")), "sza", "raa")
-    for name, (low, high) in _RANGES.items():
-        each = values[name]
-        outside = (each < low) | (each > high) | ((each >= high) if name in ("sza", "vza") else False)
-        if name != "lai" and outside.any():
-            allowed = f"[{low:g}, {high:g}{')' if name in ('sza', 'vza') else ']'}"
-            raise ValueError(f"{name} must be in {allowed}, got {each[outside].flat[0]:g}")
-    for name, known in NUMERIC_PROPERTIES.items():
+    for name, known in (_RANGES | NUMERIC_PROPERTIES).items():
         check_number(name, values[name], known)
     check_background(values["background"])
     check_crowns(values["lai"], values["crown_cover"])

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated, TypeAlias
 
 import numpy as np
 import xarray as xr
 
+from fifesim.base.arguments import Range, check, kind_of
 from fifesim.base.lattice import generator
 from fifesim.grids import grid as grids
 from fifesim.grids.sites import made_on_site
@@ -106,7 +108,10 @@ class Chips:
         return xr.Dataset(found, coords={"chip": np.arange(len(self))})
 
 
-def chips_of(study: Study, n: int) -> Chips:
+_Count: TypeAlias = Annotated[int, Range("1", 1, np.inf)]
+
+
+def chips_of(study: Study, n: _Count) -> Chips:
     """
     Chips of a study.
 
@@ -148,8 +153,7 @@ def chips_of(study: Study, n: int) -> Chips:
     >>> chips.scenario(3).atmosphere.visibility == float(drawn[3])
     True
     """
-    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
-        raise ValueError(f"n must be an integer of at least 1, got {n!r}")
+    check("n", n, kind_of(_Count))
     count, landscapes = int(n), study.landscapes
     rounds = -(-count // landscapes)
     orders = [generator(study.seed, _ORDER, (0, each, 0, 0)).permutation(landscapes) for each in range(rounds)]

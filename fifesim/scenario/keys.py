@@ -17,7 +17,7 @@ from fifesim.base.geometry import PLACE, Geometry
 from fifesim.base.messages import nearest
 from fifesim.base.times import SITE_CORNERS, SITE_SIZE, utc
 from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
-from fifesim.ground.landscape import ARP, COARSER, STREAMING_ARP
+from fifesim.ground.landscape import ARP, STREAMING_ARP, Coarser
 
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 
@@ -248,7 +248,9 @@ class LandscapeKeys(Section):
     deviations: ByName = text({}, f"standard deviations [1] of properties drawn as fields: {', '.join(VARYING)}")
     arps: ByName = text({}, "autoregressive parameters [1] of these fields; by default arp of [ground]")
     coarser: Annotated[int, Strict()] = ranged(
-        1, COARSER, "ground cells per lattice cell of these fields along each side; arps refers to lattice cells"
+        1,
+        kind_of(Coarser).known,
+        "ground cells per lattice cell of these fields along each side; arps refers to lattice cells",
     )
     covary: ByName = text({}, f"correlations [1] of LAI with {', '.join(COVARIATES + VARYING)}")
 

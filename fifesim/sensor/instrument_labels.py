@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from pydantic import TypeAdapter, ValidationError
 
-from fifesim.base.arguments import Names, NumberOrList, Numbers
+from fifesim.base.arguments import Names, NumberOrList, Numbers, Range, check_number
 from fifesim.base.messages import warn
 from fifesim.grids import cf
 from fifesim.grids.sites import is_fife
@@ -233,11 +233,8 @@ def psf(instrument: InstrumentLike = "TM", band: str | None = None, *, spacing: 
     if spacing is None:
         spacing = 2 * max(along.half_width, across.half_width) / _SAMPLES
     widest = 2 * max(along.half_width, across.half_width)
-    if not widest / _MOST_SAMPLES <= spacing < np.inf:
-        raise ValueError(
-            f"spacing must be at least {widest / _MOST_SAMPLES:.3g} m, 1/{_MOST_SAMPLES} of the support, got "
-            f"{spacing:g}: give metres, not km"
-        )
+    note = f"from 1/{_MOST_SAMPLES} of the support; give metres, not km"
+    check_number("spacing", spacing, Range("m", widest / _MOST_SAMPLES, np.inf, note=note, ends="[)"))
     y, rows = _line(along, spacing)
     x, columns = _line(across, spacing)
     return xr.DataArray(

@@ -9,7 +9,7 @@ import pandas as pd
 import xarray as xr
 
 from fifesim.base import files
-from fifesim.base.arguments import Kind, Pair, Time
+from fifesim.base.arguments import Kind, Pair, Range, Time, check_number
 from fifesim.base.geometry import check_place
 from fifesim.base.times import utc
 from fifesim.grids import cf
@@ -82,10 +82,7 @@ def overpasses(
         raise ValueError(f"end must be after start, got {end} and {start}: swap them")
     latitude, longitude = map(float, place)
     check_place(latitude, longitude)
-    if abs(latitude) > 85:
-        raise ValueError(
-            f"place must be at a latitude from -85 to 85, got {latitude:g}: closer to a pole, tracks cross"
-        )
+    check_number("latitude", latitude, Range("degree", -85, 85, note="closer to a pole, tracks cross"))
     if not np.isfinite(phase):
         raise ValueError(f"phase must be a finite number of days, got {phase:g}")
     # Phases count from 1970, so that parts of a period have the dates of the whole.

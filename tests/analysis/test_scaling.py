@@ -113,7 +113,7 @@ def test_correlation_above_the_threshold_has_no_range():
         (lambda: sobol_indices(np.full((4, 8), np.nan)), "not finite"),
         (lambda: scaling.shapley(np.zeros((2, 2)), 3), "3 axes of 2 first"),
         (lambda: scaling.sample_density([1.0, np.nan], [0.0]), "at least 2 values"),
-        (lambda: scaling.sample_density([1.0, 1.0], [0.0]), "bandwidth must be positive, got 0: do the samples vary"),
+        (lambda: scaling.sample_density([1.0, 1.0], [0.0]), "bandwidth must be above 0, got 0: do the samples vary"),
         (lambda: scaling.gaussian_density(np.array([1.0, -0.5]), np.zeros(1), 0.1, reflect=True), r"least 0 .*-0\.5"),
     ],
 )

@@ -120,7 +120,7 @@ def test_wavelength_outside_the_tables_raises(wavelength):
         lambda: phase_moments("urban", wavelength, 3),
     )
     for call in calls:
-        with pytest.raises(ValueError, match=f"wavelength must be from 0.35 to 3.75 um, got {wavelength:g}"):
+        with pytest.raises(ValueError, match=rf"wavelength must be in \[0.35, 3.75\] um, got {wavelength:g}"):
             call()
 
 

@@ -54,7 +54,7 @@ def test_factors_of_the_fife_case_agree_with_6s():
     "angles, name", [((76.0, 0.0), "sza"), ((30.0, 80.0), "vza"), ((np.nan, 0.0), "sza"), ((0.0, -1.0), "vza")]
 )
 def test_low_sun_or_view_raises(engine, angles, name):
-    with pytest.raises(ValueError, match=f"{name} must be from 0 to 75 degrees, got"):
+    with pytest.raises(ValueError, match=rf"{name} must be in \[0, 75\] degrees, got"):
         band_terms(Atmosphere(engine=engine), BANDS, *angles, 0.0)
 
 

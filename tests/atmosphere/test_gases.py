@@ -92,7 +92,7 @@ def test_band_models_have_weak_and_strong_line_limits(band_model):
 
 
 def test_thermal_wavelength_raises():
-    with pytest.raises(ValueError, match=r"wavelength must be from 0.4 to 2.5 um, got 10.8"):
+    with pytest.raises(ValueError, match=r"wavelength must be in \[0.4, 2.5\] um, got 10.8"):
         gas_transmittance(10.8, Atmosphere(), 2.0)
 
 

@@ -183,7 +183,7 @@ def test_rows_of_a_north_up_grid_count_from_the_north():
 def test_invalid_operators_are_rejected():
     for width in (0.0, -30.0, np.inf, np.nan):
         for spread in (CosineSpread, Boxcar):
-            with pytest.raises(ValueError, match=f"width.* must be positive metres, got {width}"):
+            with pytest.raises(ValueError, match=f"width.* must be above 0 m, got {width:g}"):
                 spread(width)
     for cell, pixel in ((-3, 9), (0, 9), (3, 0)):
         with pytest.raises(ValueError, match="same sign"):

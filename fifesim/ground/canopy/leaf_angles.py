@@ -34,8 +34,8 @@ class LeafAngles:
             raise ValueError(
                 f"{len(inclination)} leaf inclinations with {len(fraction)} fractions: give one fraction for each"
             )
-        if not all(0 <= angle <= 90 for angle in inclination):
-            raise ValueError(f"leaf inclinations must be in [0, 90] degrees, got {inclination}")
+        for angle in inclination:
+            check_number("a leaf inclination", angle, Range("degree", 0, 90))
         total = math.fsum(fraction)
         if not min(fraction) >= 0 or not abs(total - 1) < 1e-6:
             raise ValueError(

@@ -18,16 +18,15 @@ everywhere.
 from __future__ import annotations
 
 from functools import partial
-from numbers import Integral
 
 import numpy as np
 from scipy import fft, optimize, special
 
-from fifesim.base.arguments import check_number, described
+from fifesim.base.arguments import Range, check, check_number, kind_of
 from fifesim.base.arrays import compiled, jitable
 from fifesim.base.caches import cached
 from fifesim.base.lattice import assemble, check_seed, generator
-from fifesim.ground.landscape import ARP, COARSER, STREAMING_ARP
+from fifesim.ground.landscape import ARP, STREAMING_ARP, Coarser
 
 # Largest arp of the streaming field, and of an arp found from a length. [1]
 LARGEST_STREAMING_ARP = STREAMING_ARP.highest
@@ -210,11 +209,7 @@ def arp_for_length(length: float, cell: float = 1.0) -> float:
     0.2
     """
     longest = correlation_length(LARGEST_STREAMING_ARP, cell)
-    if not 0 <= length <= longest:
-        raise ValueError(
-            f"length must be in [0, {longest:.0f}] m for cells of {cell:g} m, got {length:g}: "
-            "use larger cells for a longer range"
-        )
+    check_number("length", length, Range("m", 0, longest, note="use larger cells for a longer range"))
     if length == 0:
         return 0.0
     if length < cell / 50:
@@ -529,9 +524,7 @@ def coarse_field(seed, arp, coarser, row, column, shape):
 
 def check_coarser(coarser):
     """Raise an error if the coarsening factor is invalid."""
-    if isinstance(coarser, bool) or not isinstance(coarser, Integral):
-        raise TypeError(f"coarser must be a whole number of ground cells, got {described(coarser)}: type coarser=4")
-    check_number("coarser", coarser, COARSER)
+    check("coarser", coarser, kind_of(Coarser))
     return int(coarser)
 
 

@@ -15,10 +15,10 @@ from fifesim.base.arguments import (
     FilePath,
     FrozenDistribution,
     Range,
-    WholeNumber,
+    check,
     check_fields,
-    check_number,
     described,
+    kind_of,
 )
 from fifesim.base.caches import cached
 from fifesim.ground.canopy.description import TALLGRASS, Canopy
@@ -26,7 +26,8 @@ from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background, Spectrum
-from fifesim.ground.landscape.autoregression import check_coarser, check_streaming_arp
+from fifesim.ground.landscape import Coarser
+from fifesim.ground.landscape.autoregression import check_streaming_arp
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
 
 # Properties between 0 and 1.
@@ -67,11 +68,10 @@ class Field:
     mean: Annotated[float, Range("1", -1, 1)] = 0.0
     sd: Annotated[float, Range("1", 0, np.inf, note="it is a standard deviation", ends="[)")] = 0.0
     arp: float = 0.15
-    coarser: WholeNumber = 1
+    coarser: Coarser = 1
 
     def __post_init__(self):
         check_fields(self)
-        check_coarser(self.coarser)
         check_streaming_arp(self.arp)
 
     def distribution(self, name: str) -> FrozenDistribution:
@@ -171,7 +171,7 @@ class CoverClass:
                 raise TypeError(f"arp must be a number, got {described(self.arp)}")
             check_streaming_arp(self.arp)
         if self.code is not None:
-            _check_code(self.code)
+            check("code", self.code, kind_of(Annotated[int, Range("1", 0, LARGEST_CODE)]))
         if _is_number(self.lai):
             check_map(float(self.lai))
         elif self.lai is not None:
@@ -251,12 +251,6 @@ def _with_name(found, name, number):
     if found.name:
         raise ValueError(f"class {name!r} has another name, {found.name!r}: leave one of the two out")
     return replace(found, name=name)
-
-
-def _check_code(code):
-    if isinstance(code, bool) or not isinstance(code, int | np.integer):
-        raise TypeError(f"code must be a whole number, got {described(code)}")
-    check_number("code", code, Range("1", 0, LARGEST_CODE))
 
 
 def _is_number(value):

@@ -7,11 +7,12 @@ Mapped to the quantiles of any distribution, fields keep the correlation of thei
 
 import zlib
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from scipy import special, stats
 
+from fifesim.base.arguments import Range, check, kind_of
 from fifesim.base.arrays import compiled
 from fifesim.base.lattice import check_seed, generator
 from fifesim.ground.landscape.autoregression import field_variance
@@ -56,10 +57,7 @@ def flat(correlations):
 
 
 def _correlation(one, other, r):
-    if isinstance(r, bool) or not isinstance(r, int | float | np.number):
-        raise TypeError(f"the correlation of {one} with {other} must be a number, got {type(r).__name__}")
-    if not -1 <= r <= 1:
-        raise ValueError(f"the correlation of {one} with {other} must be in [-1, 1], got {r:g}")
+    check(f"the correlation of {one} with {other}", r, kind_of(Annotated[float, Range("1", -1, 1)]))
     return float(r)
 
 

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
-from fifesim.base.arguments import Chunks, FilePath, Names
+from fifesim.base.arguments import Chunks, FilePath, Names, Range, check_number
 from fifesim.base.files import in_a_line, shown
 from fifesim.base.geometry import ANGLES, Geometry
 from fifesim.grids import chunks as dask_chunks
@@ -143,6 +143,7 @@ _RANGES = {1: "LEVEL1_MIN_MAX_REFLECTANCE", 2: "LEVEL2_SURFACE_REFLECTANCE_PARAM
 
 # Largest roll that Landsat 8 and 9 fly is 15 degrees.
 _LARGEST_ROLL = 20.0
+_NIGHT = "the sun is below the horizon, so the scene was taken at night and holds no reflectance; take one of the day"
 
 # Angles in the names of keys, such as FILE_NAME_ANGLE_SOLAR_ZENITH_BAND_4.
 _ANGLES = {"sza": "SOLAR_ZENITH", "saa": "SOLAR_AZIMUTH", "vza": "SENSOR_ZENITH", "vaa": "SENSOR_AZIMUTH"}
@@ -223,11 +224,8 @@ def landsat_scene(groups):
 def _sun(groups, image, time):
     """Solar zenith and azimuth angles at the scene centre, checked against its time and corners. [degree]"""
     elevation, azimuth = _number(image, "SUN_ELEVATION"), _number(image, "SUN_AZIMUTH")
-    if not -90 <= elevation <= 90 or not -360 <= azimuth <= 360:
-        raise ValueError(
-            f"SUN_ELEVATION must be in [-90, 90] and SUN_AZIMUTH in [-360, 360] degrees, got {elevation:g} and "
-            f"{azimuth:g}: {REFETCH}"
-        )
+    check_number("SUN_ELEVATION", elevation, Range("degree", -90, 90, note=REFETCH))
+    check_number("SUN_AZIMUTH", azimuth, Range("degree", -360, 360, note=REFETCH))
     centre = _centre(groups)
     if centre is not None:
         keys = f"SUN_ELEVATION = {elevation:g} and SUN_AZIMUTH = {azimuth:g}"
@@ -237,11 +235,7 @@ def _sun(groups, image, time):
             f"SUN_ELEVATION = {elevation:g} must be in degrees: it looks like radians, and the metadata have no "
             f"corners of the scene (CORNER_UL_LAT_PRODUCT and so on) that prove a sun so low; {REFETCH}"
         )
-    if elevation <= 0:
-        raise ValueError(
-            f"SUN_ELEVATION must be in (0, 90] degrees, got {elevation:g}: the sun is below the horizon, so the scene "
-            "was taken at night and holds no reflectance; take one of the day"
-        )
+    check_number("SUN_ELEVATION", elevation, Range("degree", 0, 90, note=_NIGHT, ends="(]"))
     return 90.0 - elevation, azimuth % 360.0
 
 
@@ -265,10 +259,7 @@ def _view(image):
     if "ROLL_ANGLE" not in image or not row.isdecimal() or not 1 <= int(row) <= ROWS:
         return None
     roll = _number(image, "ROLL_ANGLE")
-    if not abs(roll) <= _LARGEST_ROLL:
-        raise ValueError(
-            f"ROLL_ANGLE must be in [-{_LARGEST_ROLL:g}, {_LARGEST_ROLL:g}] degrees, got {roll:g}: {REFETCH}"
-        )
+    check_number("ROLL_ANGLE", roll, Range("degree", -_LARGEST_ROLL, _LARGEST_ROLL, note=REFETCH))
     return view_of_roll(roll, int(row))
 
 

@@ -96,7 +96,7 @@ def test_sequence_gives_equal_classes_whose_fractions_are_normalised():
         ("verhoef(0.8, 0.5)", r"\|a\| \+ \|b\| <= 1, got a = 0.8, b = 0.5"),
         ("verhoef(0.8)", "verhoef"),
         ("verhoef(a, b)", "unknown"),
-        ("campbell(95)", r"\[1, 89\] degree, got 95"),
+        ("campbell(95)", r"\[1, 89\] degrees, got 95"),
         ([-0.5, 1.5], "not be negative"),
         ([], "give one fraction for each"),
         ([np.nan, 1.0], "not be negative"),

@@ -220,7 +220,7 @@ def test_nested_and_paired_correlations_are_equivalent():
         ({("lai", "soil"): 0.1, ("soil", "lai"): 0.1}, ValueError, "'soil' with 'lai' is given twice"),
         ({("lai", "soil"): 1.2}, ValueError, r"must be in \[-1, 1\], got 1.2"),
         ({("lai", "soil"): float("nan")}, ValueError, r"must be in \[-1, 1\], got nan"),
-        ({("lai", "soil"): "much"}, TypeError, "must be a number, got str"),
+        ({("lai", "soil"): "much"}, TypeError, "correlation of lai with soil must be a number, got 'much'"),
         ({"soil": 0.1}, TypeError, "the key 'soil': name the other one too"),
         ([("lai", "soil", 0.1)], TypeError, "got list"),
     ],

@@ -372,7 +372,7 @@ def test_classes_are_read_from_the_attributes_of_the_cover(site, patched):
         ({"cover": "map.tif"}, ValueError, "a map of cover needs classes="),
         ({"cover": 3, "classes": THREE_CLASSES}, TypeError, "cover must be a fifesim.Patches, the path of"),
         ({"cover": PATCHES, "classes": fifesim.CoverClass("water")}, ValueError, "class water has no leaf area"),
-        ({"arp": 0.24999}, ValueError, "at most"),
+        ({"arp": 0.24999}, ValueError, "arp of the streaming field must be in"),
         ({"seed": -1}, ValueError, "seed must be"),
         ({"chunks": {"band": 1}}, ValueError, "y and x"),
         ({"chunks": 20, "arp": 0.3}, ValueError, "arp must be"),

@@ -148,7 +148,7 @@ def scale(**values):
         (changed("LEVEL1_MIN_MAX_PIXEL_VALUE", QUANTIZE_CAL_MAX_BAND_3="0"), "counts from 1 to 0, which must rise"),
         (changed("LEVEL1_MIN_MAX_PIXEL_VALUE", QUANTIZE_CAL_MAX_BAND_3="2.5"), "must be whole numbers, got 1 and 2.5"),
         (image(SUN_ELEVATION="0.3578"), r"SUN_ELEVATION = 0.3578 must be in degrees: .* radians"),
-        (image(SUN_ELEVATION="91"), r"must be in \[-90, 90\] .* got 91 and"),
+        (image(SUN_ELEVATION="91"), r"SUN_ELEVATION must be in \[-90, 90\] degrees, got 91: "),
         (image(SUN_ELEVATION="-3"), r"must be in \(0, 90\] degrees, got -3: .*take one of the day"),
         (image(DATE_ACQUIRED="1984-02-29"), "launch of the satellite, 1984-03-01, and today"),
         (image(EARTH_SUN_DISTANCE="1.4"), "EARTH_SUN_DISTANCE = 1.4 does not belong to the date"),
