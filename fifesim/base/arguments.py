@@ -389,7 +389,7 @@ def _cure(value, kind):
         return ": take one of its arrays, such as tree['10m/dn']"
     if takes_raster and isinstance(value, str):
         return ": open it with fifesim.open_image, rioxarray.open_rasterio, or onto a grid with fine_dem or open_lai"
-    if kind in (NUMBER, WHOLE_NUMBER) and is_a(value, "DataArray", "ndarray"):
+    if kind.fits in (_is_number, _is_whole) and is_a(value, "DataArray", "ndarray"):
         return ", where one is for all cells"
     if kind.known and isinstance(value, str):
         return ": leave the unit out"

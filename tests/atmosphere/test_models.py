@@ -1,11 +1,14 @@
 """Atmosphere description: amounts, text form, invalid arguments and summary."""
 
+from typing import get_type_hints
+
 import numpy as np
 import pytest
 
 import fifesim
 from fifesim.atmosphere import gases, mixtures
 from fifesim.atmosphere.models import Atmosphere, atmosphere_in_words
+from fifesim.base.arguments import kind_of
 
 
 def test_columns_agree_with_published_values():
@@ -76,7 +79,10 @@ def test_text_round_trips(arguments):
 
 def test_docstring_names_all_options():
     said = Atmosphere.__doc__
-    names = (*gases.PROFILES, *mixtures.MODELS, *mixtures.COMPONENTS)
+    kinds = [kind_of(hint) for hint in get_type_hints(Atmosphere, include_extras=True).values()]
+    ranges = [f", {each.known.lowest} to {each.known.highest}" for each in kinds if each.known]
+    names = (*gases.PROFILES, *mixtures.MODELS, *mixtures.COMPONENTS, *kinds[-1].allowed, *ranges)
+    assert len(ranges) == 5
     assert [name for name in names if name not in said] == []
 
 

@@ -502,6 +502,11 @@ def pond(share: Share = 0.5, depth: Depth = None):
         ({"share": float("nan")}, ValueError, r"share must be in \[0, 1\), got nan$"),
         ({"depth": 0.0}, ValueError, "depth must be above 0 m, got 0: check its unit$"),
         ({"depth": np.inf}, ValueError, "depth must be above 0 m, got inf"),
+        (
+            {"share": np.ones(3)},
+            TypeError,
+            r"share must be a number, got a numpy array \(3,\), where one is for all cells$",
+        ),
         ({"depth": "2 m"}, TypeError, "depth must be a number in m, got '2 m': leave the unit out$"),
     ],
 )
