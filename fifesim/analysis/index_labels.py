@@ -56,9 +56,9 @@ def red_and_nir(reflectance):
 def _bands(reflectance, windows, what):
     """Bands nearest to some spectral windows, without the coordinates along band."""
     cf.check_quantity(reflectance, "toa_reflectance", "surface_reflectance")
-    per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
-    numbers = band_numbers(reflectance, windows, what)
-    return tuple(reflectance.isel(band=k).drop_vars([*per_band, "band"], errors="ignore") for k in numbers)
+    numbers, values = band_numbers(reflectance, windows, what), reflectance.variable
+    parts = reflectance.coords.variables, reflectance.xindexes, reflectance.name
+    return tuple(grids.raster_of(values.isel(band=k), *parts) for k in numbers)
 
 
 def band_numbers(reflectance, windows, what):
@@ -79,7 +79,7 @@ def band_numbers(reflectance, windows, what):
 def _wavelengths(reflectance):
     """Wavelengths of the bands, or the usual wavelengths of common band names. [um]"""
     if "wavelength" in reflectance.coords:
-        return np.atleast_1d(reflectance["wavelength"].values)
+        return np.atleast_1d(reflectance.coords.variables["wavelength"].values)
     names = [str(name).lower() for name in reflectance["band"].values] if "band" in reflectance.coords else []
     if names and set(names) <= set(COMMON_NAMES):
         return np.array([COMMON_NAMES[name].best for name in names])

@@ -41,7 +41,8 @@ def matched(y, x, pair="coordinates"):
             cure = "select one band" if "time" not in array.dims else "select one date with .isel(time=0)"
             cure = "put a scan onto a map with .fifesim.grid_swath(grid)" if "line" in array.dims else cure
             raise ValueError(f"pairs are of rasters over (y, x), got {array.dims}: {cure} first")
-    return (_common_index if pair == "index" else _common_place)(y.transpose("y", "x"), x.transpose("y", "x"))
+    y, x = (array if array.dims == ("y", "x") else array.transpose("y", "x") for array in (y, x))
+    return (_common_index if pair == "index" else _common_place)(y, x)
 
 
 def sound_cells(array):
@@ -55,7 +56,10 @@ def sound_cells(array):
     if array.dtype.kind == "b" or not array.size:
         return array
     check = partial(_sound, name=_range_name(array))
-    return array.copy(data=array.data.map_blocks(check, dtype=array.dtype) if array.chunks else check(array.data))
+    if array.chunks:
+        return array.copy(deep=False, data=array.data.map_blocks(check, dtype=array.dtype))
+    check(array.values)
+    return array
 
 
 def _range_name(array):
@@ -109,7 +113,7 @@ def check_same_quantity(one, other, names):
 
 def origins(*arrays):
     """Offsets near the means, so that sums keep their digits: means of the first rows, or 0 where these are empty."""
-    rows = computed(*(array.isel(y=slice(1)).data for array in arrays))
+    rows = computed(*(array.variable.isel(y=slice(1)).data for array in arrays))
     return tuple(float(np.nan_to_num(row[np.isfinite(row)].mean())) if np.isfinite(row).any() else 0.0 for row in rows)
 
 
@@ -129,6 +133,8 @@ def _common_place(y, x):
     """Cut both rasters to their common area."""
     y, x = with_crs_of(y, x), with_crs_of(x, y)
     one, two = grids.geobox(y), grids.geobox(x)
+    if one == two:
+        return y, x
     try:
         rows, columns = grids.lattice_offset(one, two)
     except ValueError as error:

@@ -12,6 +12,7 @@ from fifesim.atmosphere.coupling import on_wavelengths, spectral_nodes
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.geometry import ANGLES, fife_geometry
 from fifesim.grids import cf, chunks, directions, swaths
+from fifesim.grids import grid as grids
 from fifesim.grids.directions import Directions
 
 LONG_NAMES = {
@@ -126,7 +127,7 @@ def _carry(name, verb, reflectance, atmosphere, bands, geometry, elevation, adja
     if surroundings is not None and not adjacency:
         raise ValueError("surroundings have an effect only with adjacency=True: give both, or leave surroundings out")
     _check_cells(reflectance, geometry, elevation, adjacency)
-    plain = reflectance.drop_vars(["band", *ANGLES], errors="ignore")
+    plain = grids.without(reflectance, ("band", *ANGLES))
     to_toa, by_cell = verb == "to_toa", directions.varying(geometry)
     if adjacency and (elevation is not None or by_cell):
         what = "elevation" if elevation is not None else "rasters of " + ", ".join(by_cell)
@@ -137,8 +138,8 @@ def _carry(name, verb, reflectance, atmosphere, bands, geometry, elevation, adja
         out = _uniform(to_toa, plain, atmosphere, bands, geometry, adjacency, surroundings, made)
     if reflectance.dtype == np.float32:
         out = out.astype(np.float32)
-    names = {"band": reflectance.coords["band"]} if "band" in reflectance.coords else {}
-    out = directions.with_geometry(swaths.placed_as(out, reflectance, names), geometry)
+    names = {"band": reflectance.coords.variables["band"]} if "band" in reflectance.coords else {}
+    out = swaths.placed_as(out, reflectance, names | directions.coordinates_of(geometry))
     text = f"{verb}: {atmosphere.engine}{' with adjacency' if adjacency else ''}, {atmosphere.text}"
     return cf.label(out, name, source=reflectance, history=text, atmosphere=atmosphere.text, references=EQUATION_SOURCE)
 

@@ -333,7 +333,7 @@ def _check_numbers(name, rasters, allowed):
     for raster in rasters if allowed else ():
         arrays = {name: raster}
         if "wavelength" in raster.coords:
-            arrays[f"wavelength of {name}"] = raster.coords["wavelength"]
+            arrays[f"wavelength of {name}"] = raster.coords.variables["wavelength"]
         for what, array in arrays.items():
             if array.dtype.kind not in allowed:
                 cure = _NOT_REAL.get(array.dtype.kind, "text or objects, type .astype(float) if they stand for numbers")

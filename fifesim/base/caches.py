@@ -1,6 +1,6 @@
 """Caches of intermediate results, with their contents and sizes, and a function that clears all of them."""
 
-from functools import lru_cache
+from functools import lru_cache, wraps
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -17,15 +17,29 @@ CACHES: list[Cache] = []
 """Caches of the modules that are imported."""
 
 
-def cached(size, what):
-    """Decorator of a function that keeps its latest results, by its arguments."""
+def cached(size, what, key=None):
+    """Decorator of a function that keeps its latest results, by its arguments or by a key that they have."""
 
     def decorate(function):
+        if key is not None:
+            return _by_key(function, Results(size, what), key)
         kept = lru_cache(maxsize=size)(function)
         CACHES.append(Cache(what, size, kept))
         return kept
 
     return decorate
+
+
+def _by_key(function, kept, key):
+    @wraps(function)
+    def found(*args):
+        at = key(*args)
+        result = kept.get(at)
+        if result is None:
+            result = kept[at] = function(*args)
+        return result
+
+    return found
 
 
 class Results(dict):

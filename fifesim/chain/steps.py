@@ -69,6 +69,7 @@ Streams: TypeAlias = Annotated[
 ]
 
 _default_atmosphere = cached(1, "default atmosphere")(Atmosphere)
+_carried_atmosphere = cached(64, "atmospheres of rasters")(Atmosphere.parse)
 
 
 def air_of(atmosphere, array, assume=False):
@@ -82,7 +83,7 @@ def air_of(atmosphere, array, assume=False):
             raise ValueError("assume=True needs the atmosphere to assume: give it too, such as fifesim.Atmosphere(...)")
         return atmosphere
     if carried is not None:
-        carried = Atmosphere.parse(carried)
+        carried = _carried_atmosphere(carried)
         if atmosphere is not None and atmosphere != carried:
             raise ValueError(
                 f"the reflectance was made for another atmosphere ({carried.text}) than the one given "
@@ -132,7 +133,11 @@ def _responses(array, instrument):
     if description is not None:
         bands = matching_bands(array, description)
         centres = [band.wavelength for band in bands]
-        if instrument is None and "wavelength" in array.coords and not np.allclose(array["wavelength"], centres, 1e-6):
+        if (
+            instrument is None
+            and "wavelength" in array.coords
+            and not np.allclose(array.coords.variables["wavelength"].values, centres, 1e-6)
+        ):
             raise ValueError(
                 f"the raster names {description.name} as its instrument, but its wavelengths differ: give instrument="
             )
@@ -241,7 +246,8 @@ def _index(image, name):
     reflectance, history = sensor.planetary(image)
     check_wavelengths(reflectance)
     found = index_labels.reflectance_index(reflectance, name, source=image, history=history)
-    return found.assign_attrs(reflectance.attrs)
+    found.attrs |= reflectance.attrs
+    return found
 
 
 def _is_recorded(image):
@@ -716,4 +722,6 @@ def _of(instrument, array):
     if instrument is None:
         return array
     attrs = {key: value for key, value in array.attrs.items() if key != "instrument_description"}
-    return array.drop_attrs(deep=False).assign_attrs(attrs | attributes_of(find_instrument(instrument)))
+    out = array.copy(deep=False)
+    out.attrs = attrs | attributes_of(find_instrument(instrument))
+    return out

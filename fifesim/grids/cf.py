@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.caches import cached
+from fifesim.grids.grid import raster_of
 
 
 @dataclass(frozen=True)
@@ -216,10 +217,9 @@ def label(array, name, *, history, source=None, **provenance):
     cited = [*before.get("references", "").split("; "), *provenance.get("references", "").split("; ")]
     attrs |= {"references": "; ".join(dict.fromkeys(filter(None, cited)))} if any(cited) else {}
     attrs["history"] = "\n".join(filter(None, [before.get("history", ""), history]))
-    # Copy, because a renamed array shares its attributes with the original.
-    array = array.copy(deep=False)
-    array.name, array.attrs = name, attrs
-    return array
+    out = raster_of(array.variable, array.coords.variables, array.xindexes, name)
+    out.attrs = attrs
+    return out
 
 
 def check_quantity(array, *names):
@@ -302,8 +302,13 @@ def check_units(array, *names):
 
 def band_coordinates(**values):
     """Coordinates along the band dimension."""
-    names = np.asarray(values.pop("band"), dtype=str).astype(object)
-    found = {"band": xr.DataArray(names, dims="band", attrs={"long_name": "band"})}
+    found = {"band": _band_axis(tuple(map(str, values.pop("band")))).copy(deep=False)}
     for name, value in values.items():
-        found[name] = xr.DataArray(np.asarray(value, float), dims="band", attrs=attributes(name))
+        found[name] = xr.Variable("band", np.asarray(value, float), attributes(name))
     return found
+
+
+# Cached, because an index of text takes 0.2 ms.
+@cached(256, "names of bands")
+def _band_axis(names):
+    return xr.IndexVariable("band", np.array(names, object), {"long_name": "band"})

@@ -35,14 +35,17 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
         data = np.asarray(kernel(*blocks, **parameters), dtype)
     out = xr.Variable(cells if bands is None else ["band", *cells], data, variables[0].attrs)
     names = dict.fromkeys([getattr(array, "name", None) for array in arrays])
-    ordered = out.transpose(*[name for name in ("band", "y", "x") if name in out.dims], ...)
+    first = [name for name in ("band", "y", "x") if name in out.dims]
+    ordered = out if out.dims[: len(first)] == tuple(first) else out.transpose(*first, ...)
     return grids.raster_of(ordered, *_shared_coordinates(arrays, out.dims), *names if len(names) == 1 else ())
 
 
 def _with_axes(variable, cells):
     """Data with axes in the order of some dimensions, then bands, which broadcast as arrays of numpy do."""
-    known = [*filter(variable.dims.__contains__, cells)]
-    data = variable.transpose(*known, ...).data
+    known, dims = [*filter(variable.dims.__contains__, cells)], variable.dims
+    order = [*map(dims.index, known), *(axis for axis, name in enumerate(dims) if name not in known)]
+    # Transposing a variable takes 20 us, and an array 1 us.
+    data = variable.data if order == sorted(order) else variable.data.transpose(order)
     # Missing axes in front are added by broadcasting.
     axes = cells[cells.index(known[0]) :] if known else known
     return data if axes == known else data[tuple([slice(None) if name in known else None for name in axes])]

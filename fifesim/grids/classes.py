@@ -4,11 +4,13 @@ import math
 from functools import partial
 
 import numpy as np
+import xarray as xr
 
 from fifesim.base.arrays import compiled
 from fifesim.base.caches import cached
 from fifesim.base.geometry import ANGLES
 from fifesim.grids import chunks as chunking
+from fifesim.grids import grid as grids
 
 NO_CLASS = -1
 """Code of cells without a class."""
@@ -87,7 +89,8 @@ def by_class(kernels, cover, *scene, bands=None):
         parts.append((kernel, tuple(list(found).index(key) for key in keys)))
     rasters = list(found.values())
     banded = tuple("band" in each.dims for each in (*scene, *rasters))
-    plain = [each.drop_vars(ANGLES, errors="ignore") for each in (cover, *scene, *rasters)]
+    given = (cover, *scene, *rasters)
+    plain = [grids.without(each, ANGLES) if isinstance(each, xr.DataArray) else each for each in given]
     kernel = partial(_of_classes, (tuple(kernels), groups), tuple(parts), banded, bands, len(scene))
     return chunking.pointwise(kernel, *plain, bands=bands)
 

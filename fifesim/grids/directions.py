@@ -41,8 +41,8 @@ def coordinates_of(geometry, names=_GEOMETRY):
     """Coordinates of a raster for the directions of sun and sensor."""
     found = {}
     for name in names:
-        angle = xr.as_variable(getattr(geometry, name))
-        found[name] = xr.Variable(angle.dims, angle.data, cf.attributes(name))
+        angle = getattr(geometry, name)
+        found[name] = xr.Variable(getattr(angle, "dims", ()), getattr(angle, "data", angle), cf.attributes(name))
     return found
 
 
@@ -172,9 +172,13 @@ def from_grid_north(geometry, grid):
 
 def angles(geometry):
     """Angles of sun and sensor as arrays, each a number or by cell. [degree]"""
-    return tuple(xr.DataArray(getattr(geometry, name)) for name in ANGLES)
+    return tuple(_numbers(getattr(geometry, name)) for name in ANGLES)
 
 
 def mu_s(geometry):
     """Cosine of the solar zenith angle, a number or by cell. [1]"""
-    return xr.DataArray(np.cos(np.radians(geometry.sza)))
+    return _numbers(np.cos(np.radians(geometry.sza)))
+
+
+def _numbers(angle):
+    return angle if isinstance(angle, xr.DataArray) else xr.Variable((), angle)

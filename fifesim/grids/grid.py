@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from threading import Lock
-from typing import Annotated, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
@@ -11,9 +10,10 @@ import pyproj
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 from affine import Affine
-from odc.geo.crs import MaybeCRS
+from odc.geo.crs import CRS, MaybeCRS
 from odc.geo.geobox import GeoBox
 from odc.geo.xr import xr_coords
+from xarray.indexes import PandasIndex
 
 from fifesim.base.arguments import Kind, Pair
 from fifesim.base.caches import Results, cached
@@ -27,7 +27,7 @@ _OTHERS = (("latitude", "longitude"), ("lat", "lon"), ("northing", "easting"), (
 
 def north_up(array):
     """Raster with rows from north to south; a scan is unchanged."""
-    if is_scan(array):
+    if is_scan(array) or _placed_grid(array) is not None:
         return array
     check_axes(array)
     northing = array.coords.variables.get("y")
@@ -46,7 +46,7 @@ def check_axes(array):
     if not isinstance(array, xr.DataArray):
         raise TypeError(f"a raster is an xarray.DataArray, got {type(array).__name__}: open it with rioxarray")
     if {"y", "x"} <= set(array.dims):
-        return _check_first(array)
+        return _placed_grid(array) is not None or _check_first(array)
     if is_scan(array):
         raise ValueError(
             f"a raster needs dimensions y and x, got {array.dims} of a scan: map it with .fifesim.grid_swath(grid)"
@@ -119,11 +119,13 @@ def exact_cell(array, cell_x, cell_y):
     return cell_x, cell_y
 
 
-# Cached, because every step of a chain needs it, and making it takes a millisecond.
-@cached(64, "CRS coordinates of grids")
-def _reference(grid):
-    """Coordinate ``spatial_ref`` of a grid, to be copied."""
-    return xr_coords(grid)["spatial_ref"]
+# Cached, because every grid needs it, and making it takes a millisecond.
+@cached(16, "coordinates of CRSs", str)
+def _reference(crs):
+    """Coordinate ``spatial_ref`` of a CRS, without a transform."""
+    found = xr_coords(GeoBox((1, 1), Affine.identity(), crs))["spatial_ref"].variable
+    del found.attrs["GeoTransform"]
+    return found
 
 
 def centres_of(grid):
@@ -137,17 +139,22 @@ def on_lattice(grid):
     a = grid.affine
     (column, x_offset), (row, y_offset) = whole_cells(a.c, a.a), whole_cells(a.f, a.e)
     west, north = column * a.a + x_offset, row * a.e + y_offset
-    crs = f"EPSG:{grid.crs.epsg}" if grid.crs and grid.crs.epsg else grid.crs
-    return GeoBox(grid.shape, Affine(a.a, a.b, west, a.d, a.e, north), crs)
+    return GeoBox(grid.shape, Affine(a.a, a.b, west, a.d, a.e, north), _by_authority(grid.crs))
+
+
+@cached(16, "CRSs by authority", str)
+def _by_authority(crs):
+    return CRS(f"EPSG:{crs.epsg}") if crs and crs.epsg else crs
 
 
 # All steps of a scene use the same grid.
-@cached(64, "grids as rasters carry them")
+@cached(64, "grids as rasters carry them", projection.key_of)
 def as_carried(grid):
     """Grid as `geobox` finds it on an array after `place`, whose origin differs in the last digits."""
     a = grid.affine
     west, north = _edge(a.c, a.a, grid.shape.x), _edge(a.f, a.e, grid.shape.y)
-    return on_lattice(GeoBox(grid.shape, Affine(a.a, a.b, west, a.d, a.e, north), grid.crs))
+    found = on_lattice(GeoBox(grid.shape, Affine(a.a, a.b, west, a.d, a.e, north), grid.crs))
+    return grid if found == grid else found
 
 
 def _edge(origin, cell, size):
@@ -157,7 +164,6 @@ def _edge(origin, cell, size):
     return first - step / 2
 
 
-_VALUES = "_values"  # the values of a raster among its coordinates
 _LONGEST = 2**31 - 1  # cells along a side, as whole numbers of image files count them
 # Smaller cells [m], and smaller grids [m] so close to the origin of their CRS [m], are probably in km.
 _FINEST, _NARROWEST, _FARTHEST_KM = 0.1, 30.0, 1e4
@@ -278,26 +284,20 @@ def geobox(array):
     a = found.affine
     (west, cell_x), (north, cell_y) = along_axis(array, "x", a.c, a.a), along_axis(array, "y", a.f, a.e)
     cell_x, cell_y = exact_cell(array, cell_x, cell_y)
-    return check_grid(on_lattice(GeoBox(found.shape, Affine(cell_x, a.b, west, a.d, cell_y, north), found.crs)))
+    found = check_grid(on_lattice(GeoBox(found.shape, Affine(cell_x, a.b, west, a.d, cell_y, north), found.crs)))
+    _remember(array.coords.variables, array.xindexes, found)
+    return found
 
 
 def coordinates(grid):
     """Coordinates of a grid: ``y``, ``x`` [m], and ``spatial_ref`` with a matching GeoTransform."""
-    out = {}
-    for axis, values in zip(("y", "x"), centres_of(grid), strict=True):
-        attrs = {"standard_name": f"projection_{axis}_coordinate", "long_name": f"{axis} coordinate of projection"}
-        attrs |= {"units": "m", "axis": axis.upper()}
-        out[axis] = xr.DataArray(values, dims=axis, attrs=attrs)
-        # xarray would write a fill value, which CF forbids for coordinate variables (section 2.5.1).
-        out[axis].encoding = {"_FillValue": None}
-    out["spatial_ref"] = _reference(on_lattice(grid)).copy()
-    return out
+    # Copied, because a user may change the attributes of coordinates.
+    return {name: each.copy(deep=False) for name, each in _place_on(grid).variables.items()}
 
 
-def place(array, grid, coordinates=None):
+def place(array, grid, others=None):
     """Place an array on a grid, with new coordinates, CRS and transform; other coordinates stay."""
-    own = _whole(grid)
-    out = _with(array, {**(coordinates or {}), **own.variables}, own.xindexes)
+    out = _with(array, {**(others or {}), **coordinates(grid)}, _place_on(grid).indexes)
     out.encoding = {"grid_mapping": "spatial_ref"}
     return out
 
@@ -305,74 +305,98 @@ def place(array, grid, coordinates=None):
 def with_coordinates(array, coordinates):
     """Raster with additional or replaced coordinates."""
     # `assign_coords` would align all coordinates, which takes ten times as long.
-    out = _with(array, coordinates, {})
-    out.encoding = dict(array.encoding)
-    return out
+    return _with(array, coordinates, {})
+
+
+def without(array, names):
+    """Raster without some coordinates."""
+    kept = {name: each for name, each in array.coords.variables.items() if name not in names}
+    return raster_of(array.variable, kept, array.xindexes, array.name)
 
 
 def _with(array, coordinates, indexes):
     """Raster with other coordinates, assembled at once, because xarray aligns assigned ones."""
-    variables, known, axes = dict(array.coords.variables), dict(array.xindexes), {}
+    variables, known = dict(array.coords.variables), dict(array.xindexes)
     given = {name: each for name, each in variables.items() if each.dtype.kind == "U"} | dict(coordinates)
     for name, each in given.items():
         variables.pop(name, None)
         known.pop(name, None)
         variable = getattr(each, "variable", each)
         # Zarr has no specification of text of fixed width, and warns of it.
-        variables[name] = variable = variable.astype(object) if variable.dtype.kind == "U" else variable
+        variable = variable.astype(object) if variable.dtype.kind == "U" else variable
         if variable.dims == (name,) and name not in indexes:
-            axes[name] = variable
-    made = xr.Coordinates(axes)
-    return raster_of(array.variable, {**variables, **made.variables}, {**known, **made.xindexes, **indexes}, array.name)
+            variable = variable.to_index_variable()
+            known[name] = PandasIndex(variable.to_index(), name)
+        variables[name] = variable
+    return raster_of(array.variable, variables, {**known, **indexes}, array.name)
 
 
 def raster_of(variable, coordinates, indexes, name=None):
-    """A raster from its parts."""
-    raster = xr.Coordinates({_VALUES: variable, **coordinates}, indexes=indexes).to_dataset()[_VALUES]
-    del raster.coords[_VALUES]
-    raster.name = name
-    return raster
+    """Raster of the values of a variable, with those coordinates, and their indexes, that lie along its dimensions."""
+    # By internal parameters of xarray's constructor, which takes 15 us for 300 of the public way. Coordinates are
+    # shared, as by methods of xarray.
+    own = {key: each for key, each in coordinates.items() if set(each.dims) <= set(variable.dims)}
+    kept = {key: index for key, index in indexes.items() if key in own}
+    return xr.DataArray(variable.copy(deep=False), own, name=name, indexes=kept, fastpath=True)
+
+
+class _Place(NamedTuple):
+    """Coordinates of a grid, and the grid as `geobox` would read it from them."""
+
+    variables: dict
+    indexes: dict
+    grid: GeoBox
 
 
 # Cached, because every step of a chain needs them.
-@cached(64, "coordinates of grids")
-def _whole(grid):
-    found = xr.Coordinates(coordinates(grid))
-    with _placing:
-        _placed[id(_pandas_index(found, "x"))] = found, as_carried(grid)
+@cached(64, "coordinates of grids", projection.key_of)
+def _place_on(grid):
+    variables, indexes = {}, {}
+    for axis, values in zip(("y", "x"), centres_of(grid), strict=True):
+        attrs = {"standard_name": f"projection_{axis}_coordinate", "long_name": f"{axis} coordinate of projection"}
+        attrs |= {"units": "m", "axis": axis.upper()}
+        # xarray would write a fill value, which CF forbids for coordinate variables (section 2.5.1).
+        variables[axis] = xr.IndexVariable(axis, values, attrs, {"_FillValue": None})
+        indexes[axis] = PandasIndex(variables[axis].to_index(), axis)
+    lattice = on_lattice(grid)
+    transform = " ".join(f"{number:.24f}".rstrip("0").rstrip(".") for number in lattice.affine.to_gdal())
+    variables["spatial_ref"] = reference = _reference(lattice.crs).copy(deep=False)
+    reference.attrs["GeoTransform"] = transform
+    return _remember(variables, indexes, as_carried(grid))
+
+
+# Coordinates and their grid, by the identity of the pandas index of x, which copies of a raster share. Reading the grid
+# from the coordinates takes 0.5 ms, several times in each step.
+_placed = Results(64, "grids of coordinates")
+
+
+def _remember(variables, indexes, grid):
+    """Place of a grid, which rasters with the same coordinate objects are on."""
+    found = _Place(variables, indexes, grid)
+    if {"y", "x"} <= set(indexes) and "spatial_ref" in variables:
+        # Attributes of the coordinate of a raster may be changed in place.
+        own = {name: variables[name].copy(deep=False) for name in ("y", "x", "spatial_ref")}
+        found = _placed[id(indexes["x"].to_pandas_index())] = _Place(own, dict(indexes), grid)
     return found
 
 
-# Coordinates made by `place` and their grid, by the identity of the pandas index of x, which copies of a raster share.
-# Reading the grid from the coordinates takes 0.2 ms, several times in each step.
-_placed = Results(64, "grids of coordinates")
-_placing = Lock()
-
-
 def _placed_grid(array):
-    """Grid of a raster that still has the coordinate objects of `place`, or None."""
-    if not (isinstance(array, xr.DataArray) and {"y", "x", "spatial_ref"} <= set(array.coords.variables)):
+    """Grid of a raster with coordinate objects whose grid is known, or None."""
+    if not isinstance(array, xr.DataArray):
         return None
-    known, grid = _placed.get(id(_pandas_index(array, "x")), (None, None))
-    if known is None or _pandas_index(array, "y") is not _pandas_index(known, "y"):
+    reference, indexes = array.coords.variables.get("spatial_ref"), array.xindexes
+    if reference is None or "x" not in indexes or "y" not in indexes:
         return None
-    same = array.coords.variables["spatial_ref"].attrs == known.variables["spatial_ref"].attrs
-    return grid if same else None
+    known = _placed.get(id(indexes["x"].to_pandas_index()))
+    if known is None or indexes["y"].to_pandas_index() is not known.indexes["y"].to_pandas_index():
+        return None
+    return known.grid if reference.attrs == known.variables["spatial_ref"].attrs else None
 
 
 def on_same_coordinates(arrays):
-    """Whether arrays share the coordinate objects of `place`."""
-    first = arrays[0]
-    if _placed_grid(first) is None:
-        return False
-    same = (_pandas_index(each, axis) is _pandas_index(first, axis) for each in arrays[1:] for axis in ("y", "x"))
-    return all(same) and all(_placed_grid(each) is not None for each in arrays[1:])
-
-
-def _pandas_index(array, axis):
-    """Index of an axis, which copies of a raster share; None without coordinates."""
-    found = array.xindexes.get(axis)
-    return None if found is None else found.to_pandas_index()
+    """Whether arrays are known to be on one grid."""
+    first = _placed_grid(arrays[0])
+    return first is not None and all(_placed_grid(each) is first for each in arrays[1:])
 
 
 def same_grid(one, other):
@@ -447,7 +471,12 @@ def in_words(grid):
 
 def with_crs_of(array, main):
     """Raster that lost its CRS, as by ``xr.where``, with the CRS of another on the same cells; others stay."""
-    if {"y", "x"} - set(array.dims) or array.odc.crs is not None or main.odc.crs is None:
+    if (
+        _placed_grid(array) is not None
+        or {"y", "x"} - set(array.dims)
+        or array.odc.crs is not None
+        or main.odc.crs is None
+    ):
         return array
     grid = geobox(main)
     for axis, size in zip(("y", "x"), cell_size(grid), strict=True):

@@ -188,7 +188,10 @@ def in_micrometres(array):
     given = array.coords.variables.get("wavelength")
     if given is None:
         return array
-    found = xr.Variable(given.dims, micrometres(given), cf.attributes("wavelength"))
+    values = micrometres(given)
+    if given.dtype == float and given.attrs == cf.attributes("wavelength"):
+        return array
+    found = xr.Variable(given.dims, values, cf.attributes("wavelength"))
     return grids.with_coordinates(array, {"wavelength": found})
 
 
@@ -273,7 +276,7 @@ def _called(band):
 def with_band_names(array):
     """Name bands by ``long_name`` if the coordinate has only numbers, which count the names from 1."""
     names = array.attrs.get("long_name")
-    if "band" not in array.coords or array["band"].dtype.kind not in "iu" or isinstance(names, str) or not names:
+    if isinstance(names, str) or not names or "band" not in array.coords or array["band"].dtype.kind not in "iu":
         return array
     numbers = array["band"].values
     if np.min(numbers) < 1 or np.max(numbers) > len(names):

@@ -262,8 +262,13 @@ def warn_of_degrees(west, north):
         )
 
 
+def key_of(grid):
+    """Key of a grid in caches; odc-geo hashes the WKT of the CRS, which takes 50 us."""
+    return tuple(grid.shape), grid.affine, str(grid.crs)
+
+
 # Cached, because every step needs the centre of its grid, and the WKT of a CRS takes longer than a small scene.
-@cached(256, "longitude and latitude of the middle of grids")
+@cached(256, "longitude and latitude of the middle of grids", key_of)
 def middle(grid):
     """Longitude, from Greenwich, and latitude of the middle of a grid, in any datum. [degree]"""
     x, y = transform_points(grid.affine, grid.shape.x / 2, grid.shape.y / 2)

@@ -181,9 +181,9 @@ def check_same_angles(geometry, array, *names):
     if geometry is None or "atmosphere" not in array.attrs:
         return
     for name in names:
-        if name not in array.coords:
+        carried, given = array.coords.variables.get(name), getattr(geometry, name)
+        if carried is None:
             continue
-        carried, given = array[name], getattr(geometry, name)
         if carried.ndim == 0 and np.ndim(given) == 0 and abs(float(carried) - float(given)) > 0.01:
             raise ValueError(
                 f"{array.name or 'the raster'} was made for {name}={float(carried):.2f}, got geometry with "

@@ -299,9 +299,9 @@ def located(kernel, array, *, tile=None):
 
     data = array.data
     if isinstance(data, da.Array):
-        return array.copy(data=data.map_blocks(call, dtype=float, meta=np.empty((0,) * data.ndim)))
+        return array.copy(deep=False, data=data.map_blocks(call, dtype=float, meta=np.empty((0,) * data.ndim)))
     if tile is None:
-        return array.copy(data=kernel(data, (0,) * data.ndim))
+        return array.copy(deep=False, data=kernel(data, (0,) * data.ndim))
     return part_by_part(
         lambda row, column, shape, block: kernel(block, (row, column)), grids.geobox(array), data, tile=tile
     )

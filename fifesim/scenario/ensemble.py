@@ -187,8 +187,7 @@ def _placed(variables, coordinates, others=None):
     """Dataset on a grid, without comparing coordinates that were made for that grid."""
     for each in variables.values():
         each.encoding = {"grid_mapping": "spatial_ref"}
-    bare = {name: each.variable for name, each in coordinates.items()}
-    return xr.Dataset(variables, bare | (others or {}))
+    return xr.Dataset(variables, coordinates | (others or {}))
 
 
 def _driver(scenario, setup):

@@ -124,9 +124,10 @@ def saturated_pixels(image):
 
 def number_of_pixels(saturated):
     """Number of pixels with a saturated band, as attributes; none for a lazy image, or if no pixel is saturated."""
-    if saturated.chunks is not None:
+    if not isinstance(saturated.data, np.ndarray):
         return {}
-    count = int(saturated.any([name for name in saturated.dims if name == "band"]).sum())
+    along = tuple(np.flatnonzero(np.array(saturated.dims) == "band").tolist())
+    count = int(np.count_nonzero(saturated.data.any(along)))
     return {"saturated_pixels": count} if count else {}
 
 
@@ -445,7 +446,7 @@ def to_radiance(image: xr.DataArray) -> xr.DataArray:
     """
     scale = _scale_of(image)
     out = chunks.pointwise(radiance_kernel(image), image, *scale)
-    out, found = swaths.placed_as(out.drop_vars(_SCALE, errors="ignore"), image), saturated_pixels(image)
+    out, found = swaths.placed_as(grids.without(out, _SCALE), image), saturated_pixels(image)
     return cf.label(out, "toa_radiance", source=image, history="to_radiance", **found)
 
 
@@ -514,7 +515,7 @@ def planetary(image):
     out = chunks.pointwise(_reflectance_of, image, *below, *scale, radiance=radiance, earth_sun_distance=distance)
     out.attrs = saturated_pixels(image)
     history = "to_radiance\nto_reflectance" if counts else "to_reflectance"
-    return out.drop_vars(_SCALE, errors="ignore"), history
+    return grids.without(out, _SCALE), history
 
 
 def _reflectance_of(values, solar_irradiance, mu_s, *scale, radiance, earth_sun_distance):

@@ -176,7 +176,7 @@ def shares_in_words(canopy, names=CELL_SHARES):
 def _per_band(values, bands=None):
     """Raster, or values of each band as one, without band names; backgrounds in the order of some bands."""
     if not isinstance(values, xr.DataArray):
-        return xr.DataArray(np.asarray(values, float), dims="band")
+        return xr.Variable("band", np.asarray(values, float))
     values = values if bands is None else _background_bands(values, bands)
     return values.drop_vars("band", errors="ignore")
 
