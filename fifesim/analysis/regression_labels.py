@@ -56,7 +56,7 @@ def sound_cells(array):
     if array.dtype.kind == "b" or not array.size:
         return array
     check = partial(_sound, name=_range_name(array))
-    if array.chunks:
+    if not isinstance(array.data, np.ndarray):
         return array.copy(deep=False, data=array.data.map_blocks(check, dtype=array.dtype))
     check(array.values)
     return array

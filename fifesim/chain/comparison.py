@@ -187,7 +187,9 @@ def image_origins(image):
 
 def shows_ndvi(image):
     """Whether an image has a red and a near infrared band."""
-    return all(nearest_band(image["wavelength"].values, window) is not None for window in (RED, NEAR_INFRARED))
+    return all(
+        nearest_band(image.coords.variables["wavelength"].values, window) is not None for window in (RED, NEAR_INFRARED)
+    )
 
 
 TYPICAL_LAI = 2.0  # of a representative surface [m2 m-2]

@@ -294,22 +294,27 @@ def aggregate(
     >>> lai.fifesim.aggregate(30).shape
     (10, 10)
     """
-    if not isinstance(array, xr.Dataset):
-        means = scaling_labels.aggregate_blocks(array, pixel, min_valid=min_valid, lsf=lsf)
-        cells = grids.geobox(north_up(array))
-        cure = "choose a pixel that divides the raster, or crop the raster with .isel"
-        grids.whole_shape(np.multiply(cells.shape, grids.cell_size(cells)), (pixel, pixel), cure)
-        return means
-    by_cell = {name: each for name, each in array.data_vars.items() if {"y", "x"} <= set(each.dims)}
-    kept = {name: each for name, each in array.data_vars.items() if name != "cover"}
+    if isinstance(array, xr.Dataset):
+        return xr.Dataset(block_means(array.data_vars, pixel, min_valid, lsf), attrs=array.attrs)
+    means = scaling_labels.aggregate_blocks(array, pixel, min_valid=min_valid, lsf=lsf)
+    cells = grids.geobox(north_up(array))
+    cure = "choose a pixel that divides the raster, or crop the raster with .isel"
+    grids.whole_shape(np.multiply(cells.shape, grids.cell_size(cells)), (pixel, pixel), cure)
+    return means
+
+
+def block_means(rasters, pixel, min_valid, lsf=None):
+    """Means of the rasters of a landscape by name, as `aggregate` of a Dataset, whose assembly takes longer."""
+    by_cell = {name: each for name, each in rasters.items() if {"y", "x"} <= set(each.dims)}
+    kept = {name: each for name, each in rasters.items() if name != "cover"}
     mean = partial(aggregate, pixel=pixel, min_valid=min_valid, lsf=lsf)
     out = {name: mean(each) if name in by_cell else each for name, each in kept.items()}
     if "brown" in by_cell and "lai" in by_cell:
-        dead = mean(array["lai"] * array["brown"]) / out["lai"]
+        dead = mean(rasters["lai"] * rasters["brown"]) / out["lai"]
         out["brown"] = out["brown"].copy(data=dead.where(out["lai"] != 0, 0.0).data)
     if "cover" in by_cell:
-        out["class_share"] = _class_shares(array["cover"], mean)
-    return xr.Dataset(out, attrs=array.attrs)
+        out["class_share"] = _class_shares(rasters["cover"], mean)
+    return out
 
 
 def _class_shares(cover, mean):

@@ -21,6 +21,7 @@ from fifesim.base.surface_kernels import RPV, RossLi
 from fifesim.chain import coupled_ground, landscapes
 from fifesim.chain.landscapes import seen_through_air, warn_of_tallgrass
 from fifesim.grids import cf, directions
+from fifesim.grids import grid as grids
 from fifesim.grids.dates import by_date
 from fifesim.grids.directions import Directions
 from fifesim.grids.grid import north_up
@@ -722,6 +723,6 @@ def _of(instrument, array):
     if instrument is None:
         return array
     attrs = {key: value for key, value in array.attrs.items() if key != "instrument_description"}
-    out = array.copy(deep=False)
+    out = grids.with_values(array, array.data)
     out.attrs = attrs | attributes_of(find_instrument(instrument))
     return out

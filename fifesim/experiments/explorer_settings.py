@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
+import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.analysis import regression
@@ -281,7 +282,9 @@ def _images(scenario, offsets):
     grid, setup = scenario.geobox(), setup_of(scenario)
     dem, horizon, _ = elevation(scenario, grid)
     land = ground_scene(scenario, grid, dem=dem)
-    truth = aggregate(truth_of(scenario, setup, land)[list(VARIABLES)], scenario.sensor.size, min_valid=setup.min_valid)
+    truth = aggregate(
+        xr.Dataset(truth_of(scenario, setup, land))[list(VARIABLES)], scenario.sensor.size, min_valid=setup.min_valid
+    )
     setup = replace(setup, dem=dem, horizon=horizon)
     reflectance = reflectance_of(setup, land).compute()
     seen = [image_of(replace(setup, offset=offset), reflectance, land) for offset in offsets]

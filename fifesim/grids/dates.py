@@ -82,7 +82,7 @@ def _check_no_dates(step, options):
     """Raise ValueError for arguments with dates if the raster has one date."""
     for name, other in options.items():
         # Classes of pydantic hold no rasters.
-        if other is None or isinstance(other, str | int | float) or hasattr(other, "__pydantic_validator__"):
+        if other is None or isinstance(other, str | int | float) or hasattr(type(other), "__pydantic_validator__"):
             continue
         if not isinstance(other, xr.DataArray | xr.Dataset | xr.DataTree):
             _check_no_dates(step, parts_of(other))

@@ -173,7 +173,7 @@ def incoming(raster, name):
     _check_stored(array, name)
     array = in_micrometres(with_band_names(north_up(array)))
     if "atmosphere" in array.attrs and array.dtype.kind == "f":
-        if array.chunks is None and array.dims[-2:] in (("y", "x"), ("line", "sample")):
+        if isinstance(array.data, np.ndarray) and array.dims[-2:] in (("y", "x"), ("line", "sample")):
             check_scale(array.values)
             return array
         # A lazy raster with an origin is unchanged since fifesim made it.

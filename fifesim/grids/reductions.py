@@ -200,7 +200,7 @@ def resample(rows, columns, array, grid, *, min_valid=0.98):
     """Resample a raster to another grid by one operator for each axis, dims (..., y, x), lazily where the input is."""
     array = array if array.dims[-2:] == ("y", "x") else array.transpose(..., "y", "x")
     sizes, seams = None, ((), ())
-    if array.chunks is not None:
+    if isinstance(array.data, da.Array):
         # A pixel is computed with the chunk of its last cell; parts of earlier chunks are kept for it.
         lasts = [axis.start + np.maximum(axis.count, 1) - 1 for axis in (rows, columns)]
         sizes = tuple(chunks.runs(last, each) for last, each in zip(lasts, array.chunks[-2:], strict=True))

@@ -240,7 +240,7 @@ def with_origin(raster, origin):
 
 def origin_of(raster):
     """Origin of a raster given to `with_origin`, or None."""
-    return None if raster.chunks is None else _ORIGINS.get(_identity(raster))
+    return None if isinstance(raster.data, np.ndarray) else _ORIGINS.get(_identity(raster))
 
 
 def _identity(raster):
@@ -299,9 +299,9 @@ def located(kernel, array, *, tile=None):
 
     data = array.data
     if isinstance(data, da.Array):
-        return array.copy(deep=False, data=data.map_blocks(call, dtype=float, meta=np.empty((0,) * data.ndim)))
+        return grids.with_values(array, data.map_blocks(call, dtype=float, meta=np.empty((0,) * data.ndim)))
     if tile is None:
-        return array.copy(deep=False, data=kernel(data, (0,) * data.ndim))
+        return grids.with_values(array, kernel(data, (0,) * data.ndim))
     return part_by_part(
         lambda row, column, shape, block: kernel(block, (row, column)), grids.geobox(array), data, tile=tile
     )

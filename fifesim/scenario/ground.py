@@ -5,7 +5,6 @@ from pathlib import Path
 
 import dask
 import numpy as np
-import xarray as xr
 
 from fifesim.chain.absorbed_light import fpar
 from fifesim.chain.landscapes import warn_of_tallgrass
@@ -77,19 +76,19 @@ def light_of(scenario, grid, geometry):
     light = scenario_light_on_hills(scenario, grid, geometry)
     if light is not None:
         return light
-    # For so few cells, starting threads takes longer than the computation.
-    with dask.config.set(scheduler="synchronous"):
-        dem, horizon = in_memory(*elevation(scenario, grid)[:2])
+    dem, horizon = in_memory(*elevation(scenario, grid)[:2])
     return terrain_labels.light_on_slopes(beside_altitude(dem, scenario.atmosphere.altitude), grid, geometry, horizon)
 
 
 def in_memory(dem, horizon):
     """Elevation and horizon in memory; the horizon covers only the grid of the elevation."""
-    if horizon is None:
-        return dem if dem is None else dem.compute(), None
-    _, (rows, columns) = horizon_places(elevation_grid(dem), horizon)
-    # A scene of a thousand pixels needs only 1 % of the terrain within the horizon reach.
-    return dem.compute(), horizon.isel(y=rows, x=columns).compute()
+    # For so few cells, starting threads takes longer than the computation.
+    with dask.config.set(scheduler="synchronous"):
+        if horizon is None:
+            return dem if dem is None else dem.compute(), None
+        _, (rows, columns) = horizon_places(elevation_grid(dem), horizon)
+        # A scene of a thousand pixels needs only 1 % of the terrain within the horizon reach.
+        return dem.compute(), horizon.isel(y=rows, x=columns).compute()
 
 
 def cut(raster, grid):
@@ -230,7 +229,7 @@ def truth_of(scenario, setup, land):
     """True ground properties of a scenario by cell, for comparison with an image."""
     absorbed = {name: absorbed_light(scenario, setup, land, kind) for name, kind in fpar_kinds(scenario).items()}
     varying = {name: each for name, each in land.data_vars.items() if name not in ("lai", "cover") and each.ndim == 2}
-    return xr.Dataset({"lai": land["lai"], **absorbed, **varying})
+    return {"lai": land["lai"], **absorbed, **varying}
 
 
 def fpar_kinds(scenario):

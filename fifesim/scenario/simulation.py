@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -12,12 +13,12 @@ from odc.geo.geobox import GeoBox
 from fifesim.atmosphere.clouds.labels import DEEPEST_GROUND, cast_clouds, cloud_field
 from fifesim.base.arguments import Chunks
 from fifesim.chain.comparison import shows_ndvi
-from fifesim.chain.landscapes import aggregate
+from fifesim.chain.landscapes import block_means
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.chain.steps import kt, kt_and_reflectance, ndvi
 from fifesim.grids import grid as grids
 from fifesim.ground.terrain import labels as terrain_labels
-from fifesim.scenario.ground import canopy_of, cut, elevation, ground_scene, truth_of
+from fifesim.scenario.ground import canopy_of, cut, elevation, ground_scene, in_memory, truth_of
 from fifesim.scenario.scenario import Scenario
 from fifesim.sensor.pixel_labels import pixel_grid, shifts_of, warn_of_pixels
 
@@ -60,35 +61,42 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
     >>> list(run.children), run["image"]["dn"].shape
     (['scene', 'truth', 'image'], (2, 10, 10))
     """
-    grid, setup = scenario.geobox(), setup_of(scenario)
-    ground, setup, inside = with_margin(scenario, setup) if complete else (grid, setup, {})
-
-    def means(rasters):
-        return aggregate(rasters, scenario.sensor.size, min_valid=setup.min_valid)
-
-    setup = replace(setup, clouds=clouds_of(scenario, ground, chunks))
-    dem, horizon, reach = elevation(scenario, ground, chunks)
-    land = ground_scene(scenario, ground, chunks, dem)
-    level, scene = reflectance_of(setup, land), land.isel(inside)
-    nodes = {"scene": dict(scene.data_vars), "truth": dict(means(truth_of(scenario, setup, scene)).data_vars)}
-    if dem is None:
-        reflectance = level
-    else:
-        reflectance, kt = _on_slopes(replace(setup, dem=dem, horizon=horizon), level, land)
-        own, slope = cut(dem, grid), cut(terrain_labels.slope(dem), grid)
-        nodes["scene"]["dem"] = own
-        nodes["terrain"] = {"dem": means(own), "slope": means(slope), "kt": means(kt.isel(inside))}
-        nodes["level"] = {"dn": image_of(setup, level, land)}
-    nodes["scene"]["surface_reflectance"] = reflectance.isel(inside)
-    if setup.clouds is not None:
-        hidden = cast_clouds(reflectance, setup.clouds, dem=dem)[["cloud", "shadow", "optical_thickness"]]
-        nodes["truth"] |= means(hidden.isel(inside)).data_vars
-    image = image_of(replace(setup, dem=dem, horizon=horizon), reflectance, land)
-    nodes["image"] = {"dn": image} | ({"ndvi": ndvi(image)} if shows_ndvi(image) else {})
+    nodes, reach = nodes_of(scenario, chunks, complete)
     tree = xr.DataTree.from_dict({name: xr.Dataset(arrays) for name, arrays in nodes.items()})
     if reach:
         tree["terrain"].attrs = {f"reach_{side}": distance for side, distance in reach.items()}
     return tree
+
+
+def nodes_of(scenario, chunks, complete, whole=True):
+    """Rasters of a run by node and name, of its image and truth alone unless it is whole, and the reach of the land."""
+    grid, setup = scenario.geobox(), setup_of(scenario)
+    ground, setup, inside = with_margin(scenario, setup) if complete else (grid, setup, {})
+    means = partial(block_means, pixel=scenario.sensor.size, min_valid=setup.min_valid)
+    setup = replace(setup, clouds=clouds_of(scenario, ground, chunks))
+    dem, horizon, reach = elevation(scenario, ground, chunks)
+    dem, horizon = (dem, horizon) if whole else in_memory(dem, horizon)
+    lit = replace(setup, dem=dem, horizon=horizon)
+    land = ground_scene(scenario, ground, chunks, dem)
+    scene, nodes = land.isel(inside), {}
+    level = reflectance = reflectance_of(setup if whole else lit, land)
+    if whole:
+        nodes["scene"] = dict(scene.data_vars)
+    nodes["truth"] = means(truth_of(scenario, setup, scene))
+    if whole and dem is not None:
+        reflectance, kt = _on_slopes(lit, level, land)
+        own, slope = cut(dem, grid), cut(terrain_labels.slope(dem), grid)
+        nodes["scene"]["dem"] = own
+        nodes["terrain"] = means({"dem": own, "slope": slope, "kt": kt.isel(inside)})
+        nodes["level"] = {"dn": image_of(setup, level, land)}
+    if whole:
+        nodes["scene"]["surface_reflectance"] = reflectance.isel(inside)
+    if setup.clouds is not None:
+        hidden = cast_clouds(reflectance, setup.clouds, dem=dem)[["cloud", "shadow", "optical_thickness"]]
+        nodes["truth"] |= means(hidden.isel(inside).data_vars)
+    image = image_of(lit, reflectance, land)
+    nodes["image"] = {"dn": image} | ({"ndvi": ndvi(image)} if shows_ndvi(image) else {})
+    return nodes, reach
 
 
 def warn_of_scenario_pixels(*scenarios):

@@ -208,7 +208,7 @@ def level_reflectance(lai, bands, stand, light, exact=False, attrs=MappingProxyT
     attrs = {"background": below} | dict(attrs)
     shares, angles = shares_in_words(stand.canopy), stand.canopy.leaf_angle_distribution.name
     out = _labelled(out, lai, bands, light.geometry, angles, shares, attrs, _NAMES[stand.canopy.model])
-    return out if out.chunks is None else with_origin(out, even_canopy(lai, stand, light, exact))
+    return out if isinstance(out.data, np.ndarray) else with_origin(out, even_canopy(lai, stand, light, exact))
 
 
 def reflectance_of_classes(lai, cover, bands, stands, light, exact=False, attrs=MappingProxyType({})):
@@ -310,7 +310,7 @@ def checked_scene(lai):
         raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
     grids.geobox(lai)
     cf.check_words(str(lai.name or "the raster"), (lai.name, lai.attrs.get("long_name")), "lai")
-    if lai.chunks is None and lai.size:
+    if isinstance(lai.data, np.ndarray) and lai.size:
         if not np.isfinite(lai.values).any():
             raise ValueError(
                 "all cells of the leaf area index are NaN: check the nodata value and the extent of the map"

@@ -39,7 +39,12 @@ def treatments() -> list[str]:
     >>> treatments()
     ['burned-grazed', 'burned-ungrazed', 'unburned-ungrazed']
     """
-    return files.table("lai_distributions.csv")["treatment"].tolist()
+    return [*_tabulated()]
+
+
+@cached(1, "names of LAI distributions")
+def _tabulated():
+    return tuple(files.table("lai_distributions.csv")["treatment"])
 
 
 def lai_distribution(source: LaiDistribution) -> FrozenDistribution:
@@ -87,7 +92,7 @@ def lai_distribution(source: LaiDistribution) -> FrozenDistribution:
         return source  # type: ignore[return-value]
     if not isinstance(source, str | Path):
         raise TypeError(f"an LAI distribution is a name, a CSV file or a frozen scipy distribution, got {type(source)}")
-    if str(source) in treatments():
+    if str(source) in _tabulated():
         return _treatment(str(source))
     if Path(source).suffix.lower() == ".csv":
         return _density_of(read_samples(source).tobytes())
