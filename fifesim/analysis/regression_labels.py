@@ -56,10 +56,8 @@ def sound_cells(array):
     if array.dtype.kind == "b" or not array.size:
         return array
     check = partial(_sound, name=_range_name(array))
-    if not isinstance(array.data, np.ndarray):
-        return array.copy(deep=False, data=array.data.map_blocks(check, dtype=array.dtype))
-    check(array.values)
-    return array
+    lazy = not isinstance(array.data, np.ndarray)
+    return grids.with_values(array, array.data.map_blocks(check, dtype=array.dtype) if lazy else check(array.data))
 
 
 def _range_name(array):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
@@ -297,17 +298,9 @@ def coordinates(grid):
 
 def place(array, grid, others=None):
     """Place an array on a grid, with new coordinates, CRS and transform; other coordinates stay."""
-    found = _place_on(grid)
-    _remember(*found)
-    out = _with(array, {**(others or {}), **coordinates(grid)}, found.indexes)
+    out = with_coordinates(array, {**(others or {}), **coordinates(grid)}, _place_on(grid).indexes)
     out.encoding = {"grid_mapping": "spatial_ref"}
     return out
-
-
-def with_coordinates(array, coordinates):
-    """Raster with additional or replaced coordinates."""
-    # `assign_coords` would align all coordinates, which takes ten times as long.
-    return _with(array, coordinates, {})
 
 
 def without(array, names):
@@ -316,8 +309,8 @@ def without(array, names):
     return raster_of(array.variable, kept, array.xindexes, array.name)
 
 
-def _with(array, coordinates, indexes):
-    """Raster with other coordinates, assembled at once, because xarray aligns assigned ones."""
+def with_coordinates(array, coordinates, indexes=MappingProxyType({})):
+    """Raster with additional or replaced coordinates, assembled at once, because xarray aligns assigned ones."""
     variables, known = dict(array.coords.variables), dict(array.xindexes)
     given = {name: each for name, each in variables.items() if each.dtype.kind == "U"} | dict(coordinates)
     for name, each in given.items():
@@ -370,25 +363,21 @@ def _place_on(grid):
     transform = " ".join(f"{number:.24f}".rstrip("0").rstrip(".") for number in lattice.affine.to_gdal())
     variables["spatial_ref"] = reference = _reference(lattice.crs).copy(deep=False)
     reference.attrs["GeoTransform"] = transform
-    return _remember(variables, indexes, as_carried(grid))
+    _remember(variables, indexes, as_carried(grid))
+    return _Place(variables, indexes, as_carried(grid))
 
 
 # Coordinates and their grid, by the identity of the pandas index of x, which copies of a raster share. Reading the grid
 # from the coordinates takes 0.5 ms, several times in each step.
-_placed = Results(64, "grids of coordinates")
+_placed = Results(512, "grids of coordinates")
 
 
 def _remember(variables, indexes, grid):
-    """Place of a grid, which rasters with the same coordinate objects are on."""
-    found = _Place(variables, indexes, grid)
-    if not ({"y", "x"} <= set(indexes) and "spatial_ref" in variables):
-        return found
-    key = id(indexes["x"].to_pandas_index())
-    if key not in _placed:
-        # Copied, because attributes of the coordinate of a raster may be changed in place.
-        own = {name: variables[name].copy(deep=False) for name in ("y", "x", "spatial_ref")}
-        _placed[key] = _Place(own, dict(indexes), grid)
-    return found
+    """Remember the grid of coordinates, for rasters that share them."""
+    if {"y", "x"} <= set(indexes) and "spatial_ref" in variables:
+        # Attributes of the coordinate of a raster may be changed in place.
+        reference = {"spatial_ref": variables["spatial_ref"].copy(deep=False)}
+        _placed[id(indexes["x"].to_pandas_index())] = _Place(reference, dict(indexes), grid)
 
 
 def _placed_grid(array):

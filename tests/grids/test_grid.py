@@ -14,6 +14,7 @@ import xarray as xr
 from affine import Affine
 from lazy import check_place
 from odc.geo.geobox import GeoBox
+from odc.geo.xr import xr_coords
 
 import fifesim
 from fifesim.grids import grid as grids
@@ -342,3 +343,18 @@ def test_crs_without_a_code_is_written_as_wkt():
     (name, text), *others = grids.crs_fields(own).items()
     assert name == "proj:wkt2" and not others
     assert pyproj.CRS.from_wkt(text).equals(own)
+
+
+def test_coordinate_of_the_crs_equals_that_of_odc_geo():
+    for grid in (fifesim.fife_site(10 / 3), fifesim.grid_at("EPSG:32633", 390000.1, 5820000.7, 300, 200, (5.1, 2.3))):
+        found, expected = grids.coordinates(grid)["spatial_ref"], xr_coords(grids.on_lattice(grid))["spatial_ref"]
+        assert found.attrs == expected.attrs and list(found.attrs) == list(expected.attrs)
+        assert found.dtype == expected.dtype and found.values == expected.values
+
+
+def test_changed_attributes_of_a_coordinate_stay_with_their_raster(lai):
+    grid = grids.geobox(lai)
+    one = grids.place(lai, grid)
+    one["x"].attrs["units"], one["spatial_ref"].attrs["crs_wkt"] = "km", "another"
+    other = grids.place(lai, grid)
+    assert other["x"].attrs["units"] == "m" and other["spatial_ref"].attrs["crs_wkt"] != "another"

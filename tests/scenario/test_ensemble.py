@@ -8,8 +8,9 @@ import xarray as xr
 import fifesim
 from fifesim.grids import grid as grids
 from fifesim.scenario.ensemble import LIGHT, realise, realise_arrays
+from fifesim.scenario.ground import elevation, ground_scene
 from fifesim.scenario.scenario import Scenario
-from fifesim.scenario.simulation import simulate
+from fifesim.scenario.simulation import clouds_of, setup_of, simulate
 
 SMALL = {"width": 300.0, "height": 240.0, "west": 708000.0, "north": 4331000.0}
 FLAT = {"dem": "flat"}
@@ -238,3 +239,71 @@ def test_each_key_changes_the_result_equally_in_simulate_and_in_chips(files, mon
     before = results(dumps(base), complete)
     differs = any(not np.array_equal(before.get(each), found[each]) for each in found)
     assert differs == (name != OF_BUDGETS)
+
+
+# ---------------------------------------------------------------------------------- drawn over all keys
+
+DRAWN = 40  # and as many more as it takes to change every key
+STREAMS = {"lambert": False, "four-stream": True, "directional": "directional"}
+
+
+def drawn_scenarios():
+    """Scenarios that each change four keys, drawn from all; combinations that a scenario refuses are drawn again."""
+    draw, names = np.random.default_rng(54), sorted(set(CHANGES) - {NECESSARY, "grid.crs"})
+    found, used = [], set()
+    while len(found) < DRAWN or used < set(names):
+        rest = sorted(set(names) - used) if len(found) >= DRAWN else names
+        # The last draws take keys that no scenario has yet.
+        chosen = [*draw.choice(rest, 1), *draw.choice(names, 3 if len(found) < DRAWN else 0)]
+        tables = {"grid": SMALL | {"width": 240.0, "cell": 10.0}, "terrain": FLAT}
+        for name in map(str, chosen):
+            value, others, *along = CHANGES[name]
+            changed = {name.split(".")[-1]: value}
+            for part in name.split(".")[-2::-1]:
+                changed = {part: changed}
+            tables = merged(merged(tables, merged(others, changed)), *along or [{}])
+        try:
+            one = Scenario(**tables)
+            one.complete()
+        except ValueError:
+            continue
+        used |= set(map(str, chosen))
+        found.append(one)
+    return found
+
+
+def by_verbs(one):
+    """Image of a scenario by public functions."""
+    setup, grid = setup_of(one), one.geobox()
+    dem, horizon, _ = elevation(one, grid)
+    land, air = ground_scene(one, grid, dem=dem), {"atmosphere": setup.atmosphere, "geometry": setup.geometry}
+    slopes = {} if dem is None else {"dem": dem, "horizon": horizon, "slopes": setup.slopes}
+    rho = land.fifesim.surface_reflectance(
+        setup.instrument, bands=setup.bands, canopy=setup.canopy, upwelling=setup.upwelling, **slopes, **air,
+        streams=STREAMS[setup.coupling],
+    )  # fmt: skip
+    clouds = None if setup.clouds is None else fifesim.cast_clouds(rho, clouds_of(one, grid, None), dem=dem)
+    toa = fifesim.to_toa(rho, adjacency=setup.adjacency, clouds=clouds)
+    return fifesim.sense(
+        toa, setup.instrument, onto=setup.onto, interval=setup.interval, offset=setup.offset, noise=setup.noise,
+        noise_models=setup.noise_models, seed=setup.seed, min_valid=setup.min_valid,
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_simulate_verbs_chips_and_sweeps_are_equal_for_scenarios_drawn_over_all_keys(files, monkeypatch):
+    monkeypatch.chdir(files)
+    for one in drawn_scenarios():
+        run, text = simulate(one, None), repr(one)
+        image, truth = realise_arrays(one)
+        for each, values in (image | truth).items():
+            node = run["image"] if each in run["image"].variables else run["truth"]
+            np.testing.assert_array_equal(values, node[each], err_msg=f"{each}\n{text}")
+        np.testing.assert_array_equal(by_verbs(one), run["image"]["dn"], err_msg=text)
+        if "ndvi" not in image or one.sensor.interval != "product":
+            continue
+        found = fifesim.sweep(one, {"ground.seed": [one.ground.seed]}).compute(scheduler="synchronous")
+        for name in ("lai", "fpar"):
+            fit = fifesim.regress(run["truth"][name], run["image"]["ndvi"])
+            assert found["slope"].sel(variable=name).item() == fit.slope, text
