@@ -295,7 +295,7 @@ def aggregate(
     (10, 10)
     """
     if isinstance(array, xr.Dataset):
-        return xr.Dataset(block_means(array.data_vars, pixel, min_valid, lsf), attrs=array.attrs)
+        return xr.Dataset(block_averages(array.data_vars, pixel, min_valid, lsf), attrs=array.attrs)
     means = scaling_labels.aggregate_blocks(array, pixel, min_valid=min_valid, lsf=lsf)
     cells = grids.geobox(north_up(array))
     cure = "choose a pixel that divides the raster, or crop the raster with .isel"
@@ -303,7 +303,7 @@ def aggregate(
     return means
 
 
-def block_means(rasters, pixel, min_valid, lsf=None):
+def block_averages(rasters, pixel, min_valid, lsf=None):
     """Means of the rasters of a landscape by name, as `aggregate` of a Dataset, whose assembly takes longer."""
     by_cell = {name: each for name, each in rasters.items() if {"y", "x"} <= set(each.dims)}
     kept = {name: each for name, each in rasters.items() if name != "cover"}

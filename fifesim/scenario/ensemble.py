@@ -14,14 +14,14 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.base.caches import cached
 from fifesim.chain.driver import Driver, cell_block_means, varying_parts
-from fifesim.chain.setup import Setup, is_default, reflectance_of, toa_of
+from fifesim.chain.setup import Setup, reflectance_of, toa_of
 from fifesim.grids import cf, directions
 from fifesim.grids import grid as grids
 from fifesim.grids.grid import as_carried
 from fifesim.ground.landscape.lai_labels import scene_cells
 from fifesim.scenario.ground import fpar_kinds, light_of
 from fifesim.scenario.keys import KEYS
-from fifesim.scenario.simulation import nodes_of, setup_of, with_margin
+from fifesim.scenario.simulation import run_nodes, setup_of, with_margin
 from fifesim.sensor.instrument_labels import attributes_of
 
 # Coordinates of an image that describe its illumination and view.
@@ -71,9 +71,9 @@ def _rasters(scenario, complete):
     """Rasters of image and truth in memory by node and name, from the steps of `fifesim.simulate`."""
     with dask.config.set(scheduler="synchronous"):
         if _is_small(scenario.geobox()):
-            nodes, _ = nodes_of(scenario, None, complete, whole=False)
+            nodes, _ = run_nodes(scenario, None, complete, whole=False)
         else:
-            nodes, _ = nodes_of(scenario, "auto", complete)
+            nodes, _ = run_nodes(scenario, "auto", complete)
         rasters = {node: nodes[node] for node in ("image", "truth")}
         return {node: dict(zip(own, dask.compute(*own.values()), strict=True)) for node, own in rasters.items()}
 
@@ -81,8 +81,11 @@ def _rasters(scenario, complete):
 def uniform_reflectance(scenario, ground):
     """Planetary reflectance of pixels of uniform ground without noise, shape (band, y, x). [1]"""
     setup = setup_of(scenario)
-    if parts := [name for name in ("coupling", "adjacency", "clouds") if not is_default(setup, name)]:
+    if parts := varying_parts(setup):
         raise ValueError(f"uniform ground does not support {', '.join(parts)}: use pixels='chain'")
+    if scenario.landscape.is_one():
+        driver = _driver(scenario, setup)
+        return driver.toa(driver.reflectance(ground["lai"]))
     pixels = grids.aligned_grid(as_carried(scenario.geobox()), scenario.sensor.size)
     cells = {name: xr.DataArray(each, dims=("y", "x"), attrs={"units": "1"}) for name, each in ground.items()}
     land = xr.Dataset({name: grids.place(each, pixels) for name, each in cells.items()})

@@ -13,7 +13,7 @@ from odc.geo.geobox import GeoBox
 from fifesim.atmosphere.clouds.labels import DEEPEST_GROUND, cast_clouds, cloud_field
 from fifesim.base.arguments import Chunks
 from fifesim.chain.comparison import shows_ndvi
-from fifesim.chain.landscapes import block_means
+from fifesim.chain.landscapes import block_averages
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.chain.steps import kt, kt_and_reflectance, ndvi
 from fifesim.grids import grid as grids
@@ -61,18 +61,18 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
     >>> list(run.children), run["image"]["dn"].shape
     (['scene', 'truth', 'image'], (2, 10, 10))
     """
-    nodes, reach = nodes_of(scenario, chunks, complete)
+    nodes, reach = run_nodes(scenario, chunks, complete)
     tree = xr.DataTree.from_dict({name: xr.Dataset(arrays) for name, arrays in nodes.items()})
     if reach:
         tree["terrain"].attrs = {f"reach_{side}": distance for side, distance in reach.items()}
     return tree
 
 
-def nodes_of(scenario, chunks, complete, whole=True):
+def run_nodes(scenario, chunks, complete, whole=True):
     """Rasters of a run by node and name, of its image and truth alone unless it is whole, and the reach of the land."""
     grid, setup = scenario.geobox(), setup_of(scenario)
     ground, setup, inside = with_margin(scenario, setup) if complete else (grid, setup, {})
-    means = partial(block_means, pixel=scenario.sensor.size, min_valid=setup.min_valid)
+    means = partial(block_averages, pixel=scenario.sensor.size, min_valid=setup.min_valid)
     setup = replace(setup, clouds=clouds_of(scenario, ground, chunks))
     dem, horizon, reach = elevation(scenario, ground, chunks)
     dem, horizon = (dem, horizon) if whole else in_memory(dem, horizon)
