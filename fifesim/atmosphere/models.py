@@ -139,9 +139,7 @@ class Atmosphere:
         Range("cm-atm", 0, 1, (0.08, 0.6), {"Dobson units": 1e-3}),
         "column ozone; by default from the profile",
     ] = None
-    engine: Annotated[
-        Literal["5S", "successive-orders"], "radiative transfer model: 5S, successive-orders"
-    ] = "5S"
+    engine: Annotated[Literal["5S", "successive-orders"], "radiative transfer model: 5S, successive-orders"] = "5S"
 
     def __post_init__(self):
         check_fields(self)
