@@ -27,6 +27,9 @@ from .ground.landscape.distribution import treatments as treatments
 from .ground.landscape.autoregression import correlation_length as correlation_length
 from .ground.landscape.autoregression import arp_for_length as arp_for_length
 from .ground.landscape.labels import landscape as landscape
+from .ground.landscape.learned_labels import Landscape as Landscape
+from .chain.landscape_learning import learn_landscape as learn_landscape
+from .ground.landscape.learned_labels import compare_landscapes as compare_landscapes
 from .ground.landscape.cover import Patches as Patches
 from .ground.landscape.classes import CoverClass as CoverClass
 from .ground.landscape.classes import fife_classes as fife_classes

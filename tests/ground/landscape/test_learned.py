@@ -1,0 +1,223 @@
+"""Learned landscapes: fields by place, learning, files and comparison."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.interpolate import BSpline
+
+import fifesim
+from fifesim.grids import grid as grids
+from fifesim.ground.landscape import learning
+from fifesim.ground.landscape.learned import bench_noise, kept, spline_noise
+from fifesim.ground.terrain.forms import REACH, land_forms
+
+GRID = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 900.0, 600.0, 10.0)
+KONZA = fifesim.Landscape.read("konza")
+
+# Half the mean square differences of LAI over its variance by distance [m] in the map that konza was learned from.
+REAL_VARIOGRAM = {60: 0.565, 120: 0.766, 240: 0.909, 480: 0.962}
+
+
+@pytest.fixture(scope="module")
+def hills():
+    """Hills around the grid, on its lattice."""
+    wide = fifesim.grid_at("EPSG:32614", 706500.0, 4333000.0, 3100.0, 2800.0, 10.0)
+    return fifesim.flint_hills(wide, seed=3)
+
+
+@pytest.mark.parametrize("level", [True, False])
+def test_windows_and_chunks_have_the_bits_of_the_whole(hills, level):
+    dem = None if level else hills
+    whole = KONZA.simulate(GRID, dem, seed=7)["lai"]
+    part = KONZA.simulate(GRID[13:44, 21:80], dem, seed=7)["lai"]
+    np.testing.assert_array_equal(part.values, whole.values[13:44, 21:80])
+    lazy = KONZA.simulate(GRID, dem, seed=7, chunks={"y": 17, "x": 31})["lai"]
+    assert lazy.chunks
+    np.testing.assert_array_equal(lazy.values, whole.values)
+    assert not np.array_equal(whole.values, KONZA.simulate(GRID, dem, seed=8)["lai"].values)
+
+
+def test_finer_cells_read_the_same_forms(hills):
+    # At 5 m, two cells lie between the nodes of the forms, which the blocks must not shift.
+    fine = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 300.0, 300.0, 5.0)
+    dem = fifesim.flint_hills(fifesim.grid_at("EPSG:32614", 706500.0, 4333000.0, 2600.0, 2600.0, 5.0), seed=3)
+    whole = KONZA.simulate(fine, dem, seed=7)["lai"].values
+    np.testing.assert_array_equal(KONZA.simulate(fine[7:33, 5:41], dem, seed=7)["lai"].values, whole[7:33, 5:41])
+
+
+def test_leaf_area_is_unknown_where_the_elevation_is(hills):
+    holed = hills.copy()
+    # The grid begins 110 cells from the corner of the hills.
+    holed[140, 155] = np.nan
+    lai = KONZA.simulate(GRID, holed, seed=7)["lai"]
+    np.testing.assert_array_equal(np.argwhere(lai.isnull().values), [[30, 45]])
+
+
+def test_spline_noise_has_the_autocorrelation_of_its_spline():
+    place = np.arange(0.5, 4000.0, 2.0)
+    fields = [spline_noise(seed, 8.0, -place[:40], place) for seed in range(30)]
+    assert np.mean([np.var(each) for each in fields]) == pytest.approx(1.0, abs=0.02)
+    spline = BSpline.basis_element(np.arange(9.0) - 4)
+    for lag in (2, 4, 8):
+        found = np.mean([np.mean(each[:, lag:] * each[:, :-lag]) for each in fields])
+        assert found == pytest.approx(float(spline(2 * lag / 8.0) / spline(0.0)), abs=0.03), lag
+
+
+def test_variance_of_means_over_cells():
+    place = np.arange(0.5, 3000.0)
+    fields = [spline_noise(seed, 10.0, -place[:60], place) for seed in range(20)]
+    means = [each.reshape(3, 20, 150, 20).mean((1, 3)) for each in fields]
+    assert np.var(means) == pytest.approx(kept(10.0, 20.0), rel=0.08)
+    assert kept(10.0, 0.0) == 1.0
+    assert kept(10.0, 0.1) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_bench_noise_follows_contours():
+    place = np.arange(0.0, 6000.0, 30.0)
+    slope = np.broadcast_to(0.02 * place[:, None], (200, 200)).copy()
+    field = bench_noise(5, 300.0, 1.2, -place, place, slope)
+    along, down = np.mean(np.diff(field, axis=1) ** 2), np.mean(np.diff(field, axis=0) ** 2)
+    assert down > 10 * along
+    # The same place has other leaf area at another elevation.
+    assert abs(np.corrcoef(field.ravel(), bench_noise(5, 300.0, 1.2, -place, place, slope + 50.0).ravel())[0, 1]) < 0.2
+
+
+def test_forms_of_a_plane():
+    down, across = np.mgrid[0:300, 0:300] * 10.0
+    forms = land_forms(400.0 - 0.03 * down + 0.04 * across, 10.0)
+    inner = (slice(145, 155),) * 2
+    for scale in (10, 40):
+        np.testing.assert_allclose(forms[f"slope_{scale}"][inner], 0.05, rtol=1e-9)
+        np.testing.assert_allclose(forms[f"northward_{scale}"][inner], 0.03, rtol=1e-9)
+        np.testing.assert_allclose(forms[f"eastward_{scale}"][inner], 0.04, rtol=1e-9)
+    for name in ("position_20", "position_320", "convergence_20"):
+        np.testing.assert_allclose(forms[name][inner], 0.0, atol=1e-9)
+    # The lowest place of a square of 150 m is in its lower left corner.
+    np.testing.assert_allclose(forms["above_150"][inner], 150 * 0.07, rtol=1e-9)
+    np.testing.assert_allclose(forms["below_150"][inner], 150 * 0.07, rtol=1e-9)
+
+
+def test_a_hollow_is_convergent_and_low():
+    down, across = np.mgrid[-100:101, -100:101] * 10.0
+    forms = land_forms(400.0 + 1e-4 * across**2 + 0.02 * -down, 10.0)
+    assert forms["convergence_20"][100, 100] > 0 > forms["position_80"][100, 100]
+    assert forms["above_400"][100, 60] > forms["above_150"][100, 60] > 0
+
+
+def test_forms_depend_on_elevation_within_reach_only():
+    ground = np.random.default_rng(0).normal(400.0, 5.0, (260, 260))
+    margin = int(np.ceil(REACH / 10.0)) + 2
+    whole, part = land_forms(ground, 10.0), land_forms(ground[10:-10, 10:-10], 10.0)
+    inner = slice(margin + 10, -margin - 10)
+    for name, each in part.items():
+        np.testing.assert_array_equal(each[margin:-margin, margin:-margin], whole[name][inner, inner], name)
+
+
+@pytest.fixture(scope="module")
+def large():
+    grid = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 3000.0, 3000.0, 10.0)
+    return [KONZA.simulate(grid, seed=seed)["lai"] for seed in range(3)]
+
+
+def test_level_konza_has_the_variogram_of_the_real_map(large):
+    # The blur of the map, which the landscape does not have, no longer matters at 60 m.
+    found = [fifesim.compare_landscapes(each, each)["one"] for each in large]
+    for lag, real in REAL_VARIOGRAM.items():
+        got = np.mean([each[f"variogram_{lag}_m"] for each in found])
+        assert got == pytest.approx(real, rel=0.15), lag
+
+
+def test_learning_recovers_a_landscape(large):
+    learned = fifesim.learn_landscape(large[0])
+    grid = grids.geobox(large[0])
+    again = [learned.simulate(grid, seed=seed)["lai"] for seed in (11, 12)]
+    rows = [fifesim.compare_landscapes(large[0], each) for each in again]
+    assert np.mean([row.loc["variogram", "other"] for row in rows]) < 0.15
+    assert np.mean([row.loc["spectrum", "other"] for row in rows]) < 0.25
+    # Three standard deviations of the difference of one realisation and the mean of two: 0.035, 0.048, 0.101 in each.
+    for name, spread in (("quantile_0.05", 0.035), ("quantile_0.5", 0.048), ("quantile_0.95", 0.101)):
+        difference = np.mean([row.loc[name, "difference"] for row in rows])
+        assert difference == pytest.approx(0.0, abs=3 * np.sqrt(1.5) * spread), name
+    kurtosis = np.mean([row.loc["kurtosis_of_differences", "other"] for row in rows])
+    assert kurtosis == pytest.approx(rows[0].loc["kurtosis_of_differences", "one"], rel=0.35)
+
+
+def test_learning_finds_the_response_to_the_terrain(hills):
+    # Leaf area follows the position on the slope, and half of its variance is noise.
+    forms = land_forms(hills.values, 10.0)
+    position = forms["position_80"] / np.std(forms["position_80"])
+    noise = np.random.default_rng(0).normal(size=position.shape)
+    lai = xr.DataArray(np.exp(0.3 * (noise - position)), hills.coords, name="lai")
+    learned = fifesim.learn_landscape(lai, hills)
+    assert learned.explained == pytest.approx(0.5, abs=0.08)
+    made = learned.simulate(grids.geobox(lai), hills, seed=1)["lai"]
+    assert np.corrcoef(np.log(made.values.ravel()), -position.ravel())[0, 1] == pytest.approx(np.sqrt(0.5), abs=0.08)
+
+
+def test_files(tmp_path):
+    path = tmp_path / "land.json"
+    KONZA.save(path)
+    assert fifesim.Landscape.read(path) == KONZA
+    assert path.stat().st_size < 2**20
+    path.write_text(path.read_text().replace('"cell": 10.0', '"cell": -10.0'))
+    with pytest.raises(ValueError, match=r"land\.json is not a landscape: cell"):
+        fifesim.Landscape.read(path)
+    path.write_text("{")
+    with pytest.raises(ValueError, match="is not a landscape"):
+        fifesim.Landscape.read(path)
+
+
+def test_description_prints_in_ten_lines():
+    text = str(KONZA)
+    assert len(text.splitlines()) <= 10
+    assert "Copernicus Sentinel data 2022" in text
+
+
+def _map(values, name="lai"):
+    grid = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 10.0 * values.shape[1], 10.0 * values.shape[0], 10.0)
+    return grids.place(xr.DataArray(values, dims=("y", "x"), name=name), grid)
+
+
+_FIELD = np.random.default_rng(0).uniform(0.3, 0.8, (60, 60))
+
+
+@pytest.mark.parametrize(
+    ("image", "options", "words"),
+    [
+        (_map(_FIELD[:20]), {}, "1200 known cells, at least 2000"),
+        (_map(_FIELD, "red"), {}, "quantity of the map 'red' is unknown"),
+        (_map(_FIELD * 1e4, "ndvi"), {}, "apply its scale"),
+        (_map(_FIELD, "ndvi"), {}, "needs instrument and geometry"),
+        (_map(_FIELD * 0.01), {}, "give a map of a date with leaves"),
+    ],
+)
+def test_maps_that_cannot_be_learned(image, options, words):
+    with pytest.raises(ValueError, match=words):
+        fifesim.learn_landscape(image, **options)
+
+
+def test_elevation_elsewhere():
+    far = _map(_FIELD).assign_coords(x=lambda each: each["x"] + 5000.0)
+    with pytest.raises(ValueError, match="dem does not overlap the grid"):
+        fifesim.learn_landscape(_map(_FIELD), far.rename("dem"))
+    with pytest.raises(ValueError, match="give an elevation that covers the grid"):
+        KONZA.simulate(GRID, far)
+
+
+def test_saturated_ndvi_warns():
+    geometry = fifesim.Geometry(sza=25, saa=140)
+    with pytest.warns(UserWarning, match="NDVI is saturated in"):
+        fifesim.learn_landscape(_map(0.2 * _FIELD + 0.78, "ndvi"), instrument="MSI", geometry=geometry)
+
+
+def test_terrain_beyond_the_learned_range_warns(hills):
+    with pytest.warns(UserWarning, match="of the cells are higher, lower or steeper"):
+        land = KONZA.simulate(GRID, hills + 500.0)
+    assert land["lai"].attrs["beyond_learned"] == 1.0
+
+
+def test_normal_scores_are_zero_where_unknown():
+    known = np.array([[True, True, False]])
+    np.testing.assert_allclose(
+        learning.normal_scores(np.array([[2.0, 1.0, 9.0]]), known), [[0.6744898, -0.6744898, 0.0]]
+    )
