@@ -17,11 +17,11 @@ from fifesim.grids import cf
 from fifesim.grids import grid as grids
 from fifesim.grids.inputs import FileOrRaster
 from fifesim.grids.sites import made_on_site
-from fifesim.grids.warp import file_onto_grid, raster_onto_grid
+from fifesim.grids.source import open_source
+from fifesim.grids.warp import onto_grid
 from fifesim.ground.canopy.description import Canopy
 from fifesim.ground.landscape import learning
 from fifesim.ground.landscape.learned_labels import Landscape
-from fifesim.ground.layer_labels import file_of, one_layer
 from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
@@ -192,11 +192,7 @@ def _leaf_area(values, site, instrument, geometry, canopy):
 
 def _elevation(dem, grid, known):
     """Elevation on the cells of the map, NaN where it is unknown."""
-    if isinstance(dem, xr.DataArray):
-        found = raster_onto_grid(one_layer(dem, "dem"), grid)
-    else:
-        found = file_onto_grid(file_of("dem", dem, False), grid)
-    ground = np.asarray(found.values, float)
+    ground = np.asarray(onto_grid(open_source(dem, "dem"), grid).values, float)
     if (share := np.mean(np.isfinite(ground[known]))) < 0.1:
         raise ValueError(
             f"the elevation covers {share:.0%} of the known cells of the map: give one that overlaps with it"

@@ -11,12 +11,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import dask.array as da
-import zarr
-from zarr.codecs import Crc32cCodec
 
 from fifesim.output.identity import NotThisRun
 
-CHECKSUM = Crc32cCodec()
+
+def checksum():
+    """Codec that seals each block."""
+    # Reading a run does not need zarr, which is slow to import.
+    from zarr.codecs import Crc32cCodec
+
+    return Crc32cCodec()
 
 
 @contextmanager
@@ -36,15 +40,19 @@ def fresh_store(folder):
 
 def block_store(folder, arrays):
     """Zarr arrays for the blocks of dask arrays of equal blocks, by name."""
+    import zarr
+
     with fresh_store(folder) as fresh:
         for name, array in arrays.items():
             layout = {"shape": array.shape, "chunks": array.chunksize, "dtype": array.dtype, "fill_value": 0}
-            zarr.create_array(fresh, name=name, compressors=CHECKSUM, **layout)
+            zarr.create_array(fresh, name=name, compressors=checksum(), **layout)
     return {name: open_blocks(folder, name) for name in arrays}
 
 
 def open_blocks(folder, name):
     """Zarr array of a store that saves blocks of zeros too."""
+    import zarr
+
     return zarr.open_array(folder, path=name).with_config({"write_empty_chunks": True})
 
 

@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pyproj
+import xarray as xr
 
 from fifesim.base.footprints import Boxcar, axis_operator
 from fifesim.base.geometry import fife_geometry
@@ -185,7 +186,7 @@ def _plane():
     cells = grids.grid_at("EPSG:26914", 705600.0, 4334000.0, 600.0, 500.0, 10 / 3)
     place = grids.coordinates(cells)
     light = 40 + 0.02 * (place["x"] - 705900) - 0.03 * (place["y"] - 4333750)
-    toa = grids.place(light.transpose("y", "x").drop_attrs(), cells).assign_coords(band="TM3")
+    toa = grids.place(xr.DataArray(light.transpose("y", "x").data, dims=("y", "x")), cells).assign_coords(band="TM3")
     toa.attrs["units"] = "W m-2 sr-1 um-1"
     seen = {"nadir_offset": -36e3, "heading": 193.6, "quantise": False, "min_valid": 1.0, "geometry": fife_geometry()}
     image = sense_swath(toa, "TM", view_tolerance=180, **seen)

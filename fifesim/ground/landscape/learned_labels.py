@@ -225,9 +225,7 @@ class Landscape(Described, frozen=True):
             if self.terrain
             else "  terrain        none",
             f"  along contours {shares[0] / shares[1]:.0%} of the variance of the residual" if self.terrain else "",
-            "  other fields   of "
-            + ", ".join(f"{each.spacing:g}" for each in self.residual if not each.height)
-            + " m",
+            "  other fields   of " + ", ".join(f"{each.spacing:g}" for each in self.residual if not each.height) + " m",
             "  gusts          " + ", ".join(f"{name} {value:g}" for name, value in self.gusts.items()),
         ]
         return "\n".join(lines)

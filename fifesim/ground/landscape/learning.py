@@ -40,7 +40,10 @@ _RIDGE, _SPREAD_RIDGE = 100.0, 300.0
 
 _NODES, _BED_HEIGHT = 8, 1.5  # number; m
 _PROBABILITIES = np.r_[0.0, 0.002, 0.005, np.linspace(0.01, 0.99, 99), 0.995, 0.998, 1.0]
-_STEPS = 5
+_STEPS = 6
+
+# Largest factor by which the statistics that are fitted may differ from those of the residual.
+_CHANGE = 3.0
 
 LEAST_CELLS = 2000
 
@@ -317,10 +320,12 @@ def _residual(landscape, image, values, mean, kinds, forms):
     rest = np.where(known, score - mean, 0.0)
     ordered = np.sort(values[known])
     white = np.random.default_rng(0).normal(size=values.shape) * image.noise
-    wanted, target, offset = measured(score), measured(rest), measured(white)
+    wanted, first, offset = measured(score), measured(rest), measured(white)
+    target = first
     energy, tails = np.var(_log_energy(score, known, _WIDE)), kurtosis(values, known)
     wide = fine = 0.0
-    for step in range(_STEPS + 1):
+    best = np.inf, (), {}
+    for step in range(_STEPS):
         variances = optimize.nnls(table / target[:, None], np.maximum(1 - offset / target, 0.0))[0]
         fields = [
             Residual(spacing=s, variance=float(f"{v:.4g}"), height=h)
@@ -329,8 +334,6 @@ def _residual(landscape, image, values, mean, kinds, forms):
         ]
         gusts = {"broad": wide / 2, "medium": wide / 2, "fine": fine, "benches": wide / 2 if forms else 0.0}
         gusts = {name: float(f"{np.sqrt(variance):.3g}") for name, variance in gusts.items()}
-        if step == _STEPS:
-            return tuple(fields), gusts
         trial = landscape.model_copy(update=dict(zip(names, (tuple(fields), gusts), strict=True)))
         got, energies, heavy = [], [], []
         for seed in range(2):
@@ -343,12 +346,18 @@ def _residual(landscape, image, values, mean, kinds, forms):
                 special.ndtr(drawn[known]), (np.arange(ordered.size) + 0.5) / ordered.size, ordered
             )
             heavy.append(kurtosis(mapped, known))
-        target = target * wanted / np.mean(got, axis=0)
+        misfit = np.sqrt(np.mean(np.log(np.mean(got, axis=0) / wanted) ** 2))
+        misfit += abs(np.mean(energies) / energy - 1) + abs(np.log((3 + np.mean(heavy)) / (3 + tails)))
+        best = min(best, (misfit, tuple(fields), gusts), key=lambda each: each[0])
+        # Structure that no field has, such as white noise of the map, must not take over.
+        change = np.clip(target * wanted / np.mean(got, axis=0) / first, 1 / _CHANGE, _CHANGE)
+        target = first * change
         # The variance of a log-energy is four times that of the logarithm s of the standard deviation, and the kurtosis
         # of normal deviates with log-normal standard deviation is 3 (exp(4 var s) - 1).
         more = max(wide + (energy - np.mean(energies)) / 4, 0.0) - wide
         tail = (np.log1p(max(tails, 0.0) / 3) - np.log1p(max(np.mean(heavy), 0.0) / 3)) / 4
         wide, fine = wide + more, max(fine + tail - more, 0.0)
+    return best[1:]
 
 
 def _marginal(landscape, image, lai, forms):

@@ -8,7 +8,7 @@ import xarray as xr
 import zarr
 
 from fifesim.grids import cf
-from fifesim.output.blocks import CHECKSUM, block_file, fresh_store
+from fifesim.output.blocks import block_file, checksum, fresh_store
 from fifesim.output.folders import versions
 from fifesim.scenario.ensemble import LIGHT, realise, realise_arrays
 from fifesim.sensor.response import calibration
@@ -177,7 +177,7 @@ def make_store(folder, chips, layout, shards):
             dtype, shape = str if values.dtype == object else values.dtype, values.shape
             array = group.create_array(
                 name, shape=shape, dtype=dtype, chunks=shape, dimension_names=dims, attributes=attributes,
-                compressors=(zarr.codecs.ZstdCodec(level=0, checksum=False), CHECKSUM),
+                compressors=(zarr.codecs.ZstdCodec(level=0, checksum=False), checksum()),
             )  # fmt: skip
             array[...] = values
         # A fifth smaller than bytes shuffled, in half the time of level 5.
@@ -192,7 +192,7 @@ def make_store(folder, chips, layout, shards):
                 chunks=(shards.chunk if dims else shards.length, *inside),
                 shards=(shards.length, *inside) if dims else None,
                 # With the checksum, zarr refuses to read damaged numbers.
-                compressors=(blosc, CHECKSUM),
+                compressors=(blosc, checksum()),
                 fill_value=0 if number else np.nan,
                 dimension_names=("chip", *dims),
                 attributes=layout.attributes(name) | ({"_FillValue": 0} if number else {}),

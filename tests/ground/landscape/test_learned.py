@@ -143,10 +143,11 @@ def test_learning_recovers_a_landscape(large):
 
 
 def test_learning_finds_the_response_to_the_terrain(hills):
-    # Leaf area follows the position on the slope, and half of its variance is noise.
+    # Leaf area follows the position on the slope, and half of its variance is a random field.
     forms = land_forms(hills.values, 10.0)
     position = forms["position_80"] / np.std(forms["position_80"])
-    noise = np.random.default_rng(0).normal(size=position.shape)
+    northing, easting = hills["y"].values, hills["x"].values
+    noise = spline_noise(1, 20.0, northing, easting)
     lai = xr.DataArray(np.exp(0.3 * (noise - position)), hills.coords, name="lai")
     learned = fifesim.learn_landscape(lai, hills)
     assert learned.explained == pytest.approx(0.5, abs=0.08)
