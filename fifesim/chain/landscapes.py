@@ -36,7 +36,6 @@ from fifesim.ground.canopy.sail_model import upright_reflectance
 from fifesim.ground.landscape.classes import CoverClass
 from fifesim.ground.landscape.labels import classes_of
 from fifesim.ground.terrain import labels as terrain_labels
-from fifesim.ground.terrain.horizon import horizon_terrain_view
 from fifesim.ground.terrain.lit_slopes import slope_light
 
 _TALLGRASS = {"background": "soil and litter", "brown_leaf": "dead leaves", "leaf_optics": "green leaves"}
@@ -159,16 +158,14 @@ def _upright(canopy, lai, elevation, sky, cell, seen):
     out = np.full((len(scene.sky), lai.size), np.nan)
     for start in range(0, known.size, _AT_ONCE):
         part = known[start : start + _AT_ONCE]
-        cosine, mu_s_local, sky_view = (each.flat[part] for each in (light.cosine, light.mu_s_local, light.sky_view))
         out[:, part] = upright_reflectance(
             lai.flat[part],
             *bands,
             **given,
-            cosine=cosine,
-            mu_s_local=mu_s_local,
+            cosine=light.cosine.flat[part],
+            mu_s_local=light.mu_s_local.flat[part],
             mu_v_local=light.upwelling.flat[part] * seen.mu_v,
-            sky_view=sky_view,
-            terrain_view=horizon_terrain_view(sky_view, cosine),
+            sky_view=light.sky_view.flat[part],
         )
     return out.reshape(-1, *lai.shape)
 

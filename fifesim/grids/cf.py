@@ -79,7 +79,7 @@ QUANTITIES = {
         "of the land around, 90 where open; direction clockwise from north", label="horizon", lowest=0, highest=90),
     "sky_view": Quantity("1", "", "sky view factor", "diffuse light over that on an open plain",
         lowest=0, highest=1, colours="gray"),
-    "terrain_view": Quantity("1", "", "terrain configuration factor", lowest=0, highest=1),
+    "terrain_view": Quantity("1", "", "share of land in the view of a slope", lowest=0, highest=1),
     "wetness": Quantity("1", "", "topographic wetness index",
         "logarithm of the area that drains through a metre of contour, over slope", label="wetness"),
     "illumination": Quantity("1", "", "cosine of the solar zenith angle on the slope", "0 in shadow",

@@ -572,16 +572,16 @@ _LEAST_COSINE = 1e-3  # of sun and view on the slope; below, the slope is as goo
 
 def upright_reflectance(
     lai, leaf_reflectance, leaf_transmittance, background, *, sza, vza, raa, cosine, mu_s_local, mu_v_local, sky_view,
-    terrain_view, diffuse_fraction=0.0, leaf_angles="spherical", hotspot=0.0,
+    diffuse_fraction=0.0, leaf_angles="spherical", hotspot=0.0,
 ):  # fmt: skip
     r"""
     Reflectance factor of a canopy of upright plants on a slope, relative to the irradiance of level ground.
 
     .. math::
 
-        \rho &= E_s r_{so} + E_d r_{do}
-            + r_{do} \, C_t \frac{E_s r_{sd} + E_d r_{dd}}{1 - r_{dd} C_t} \\
-        E_s &= (1 - f) \, \mu_s' / \mu_s, \qquad E_d = f \, V_d
+        \rho &= E_s r_{so} + (E_d + E_t) \, r_{do} \\
+        E_s &= (1 - f) \, \mu_s' / \mu_s, \qquad E_d = f \, V_d, \qquad
+            E_t = (1 - V_d) \, \frac{V_d \, r_{dd}}{1 - (1 - V_d) \, r_{dd}}
 
     Along a beam, leaves of upright plants have the path length of the slope: the extinction is
     :math:`k' = k \mu / \mu'` for the leaf area of the slope, :math:`L \cos S`.
@@ -598,8 +598,8 @@ def upright_reflectance(
         Cosine of the slope, :math:`\cos S`. [1]
     mu_s_local, mu_v_local : array
         Cosines of the zenith angles of sun and sensor on the slope, :math:`\mu'`; 0 in shadow or hidden. [1]
-    sky_view, terrain_view : array
-        :math:`V_d` and :math:`C_t`. [1]
+    sky_view : array
+        :math:`V_d`; land fills the rest of the view, :math:`1 - V_d`. [1]
     diffuse_fraction : array, optional
         :math:`f` on level ground. [1]
     leaf_angles : optional
@@ -614,8 +614,10 @@ def upright_reflectance(
 
     Notes
     -----
-    The surroundings are as bright as the slope, and their light is summed over all reflections. The leaf angle
-    distribution keeps its axis in all coefficients, with the mean of the normals' outer products.
+    The light of the surroundings is summed over all reflections. They have the canopy and the sky view of the slope,
+    and face all directions: sun and sky that enter a hollow are spread over an area that is larger by
+    :math:`1 / V_d`, and are reflected by :math:`r_{dd}`. This is exact for Lambertian ground in a spherical bowl. The
+    leaf angle distribution keeps its axis in all coefficients, with the mean of the normals' outer products.
 
     References
     ----------
@@ -633,7 +635,8 @@ def upright_reflectance(
     layer = layer._replace(rso=c.w * sunlit_and_seen + layer.rso, tsstoo=gaps)
     r = with_background(layer, background)
     direct, sky = (1 - diffuse_fraction) * np.maximum(mu_s_local, 0) / mu_s, diffuse_fraction * sky_view
-    around = terrain_view * (direct * r.rsd + sky * r.rdd) / (1 - r.rdd * terrain_view)
+    land = 1 - sky_view
+    around = land * sky_view * r.rdd / (1 - land * r.rdd)
     return seen * (direct * r.rso + (sky + around) * r.rdo)
 
 

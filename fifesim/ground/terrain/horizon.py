@@ -226,8 +226,8 @@ def horizon_sky_view(tangents, directions, east, north):
 @jitable
 def horizon_terrain_view(sky_view, cosine):
     r"""
-    Terrain configuration factor: share of land in the view of a slope above its plane; 0 on any wide plane. [1]
-    :math:`C_t = \frac{1 + \cos S}{2} - V_d` [DozierFrew1990]_, Eq. 9b
+    Terrain configuration factor of Eq. 4: land above the horizontal in the view of a slope, 0 on any wide plane. [1]
+    :math:`C_t = \frac{1 + \cos S}{2} - V_d` [DozierFrew1990]_, Eq. 9b. All land in the view is :math:`1 - V_d`.
     """
     return (1 + cosine) / 2 - sky_view
 

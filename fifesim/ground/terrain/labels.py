@@ -362,7 +362,7 @@ def sky_view(dem: xr.DataArray, horizon: Horizon | None = None) -> xr.DataArray:
 
 def terrain_view(dem: xr.DataArray, horizon: Horizon | None = None) -> xr.DataArray:
     """
-    Terrain configuration factor Ct.
+    Share of land in the view of a slope, one less the sky view.
 
     Parameters
     ----------
@@ -372,7 +372,7 @@ def terrain_view(dem: xr.DataArray, horizon: Horizon | None = None) -> xr.DataAr
     Returns
     -------
     terrain_view : xarray.DataArray, dims (y, x)
-        [1]
+        Includes the land below the horizontal, which Ct of Eq. 4, (1 + cos S) / 2 - Vd, leaves out. [1]
 
     Raises
     ------
@@ -381,7 +381,7 @@ def terrain_view(dem: xr.DataArray, horizon: Horizon | None = None) -> xr.DataAr
 
     See Also
     --------
-    fifesim.ground.terrain.horizon.horizon_terrain_view
+    sky_view, kt
 
     Examples
     --------
@@ -390,9 +390,7 @@ def terrain_view(dem: xr.DataArray, horizon: Horizon | None = None) -> xr.DataAr
     >>> bool((dem.fifesim.terrain_view() >= 0).all())
     True
     """
-    return _light(
-        dem, horizon, None, "terrain_view", lambda light: horizons.horizon_terrain_view(light.sky_view, light.cosine)
-    )
+    return _light(dem, horizon, None, "terrain_view", lambda light: 1 - light.sky_view)
 
 
 def illumination(

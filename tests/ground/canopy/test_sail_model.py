@@ -1,12 +1,16 @@
 """Tests of SAIL against other solutions of its equations, of invariants, and of upright plants on slopes."""
 
+from pathlib import Path
+
 import numpy as np
+import pandas as pd
 import pytest
 from oracles_canopy import four_streams, sunlit_and_seen, turned_leaves
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import fifesim
+from fifesim.atmosphere.labels import diffuse_fraction
 from fifesim.ground.canopy import sail_model
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes, leaf_projection
 from fifesim.ground.canopy.sail_model import (
@@ -253,9 +257,8 @@ def on(slope, sza, vza, raa, aspect=0.0):
         np.cos(z) * np.cos(tilt) + np.sin(z) * np.sin(tilt) * np.cos(np.radians(azimuth - aspect))
         for z, azimuth in ((sun, 0.0), (view, raa))
     ]
-    plane = (1 + np.cos(tilt)) / 2
-    given = {"cosine": np.cos(tilt), "mu_s_local": local[0], "mu_v_local": local[1], "sky_view": plane}
-    return {"sza": sza, "vza": vza, "raa": raa, "terrain_view": 0.0} | given
+    given = {"cosine": np.cos(tilt), "mu_s_local": local[0], "mu_v_local": local[1], "sky_view": 1.0}
+    return {"sza": sza, "vza": vza, "raa": raa} | given
 
 
 @pytest.mark.parametrize("hotspot", [0.0, 0.1])
@@ -289,13 +292,44 @@ def test_dark_leaves_have_the_path_length_of_the_slope():
     assert found == pytest.approx(expected, rel=1e-5)
 
 
-def test_reflections_between_slopes_are_summed():
-    """Bare ground: geometric series of the reflections between the slope and the terrain around it."""
-    rho, sky, land = 0.4, 0.7, 0.25
-    given = on(20.0, 40.0, 0.0, 0.0) | {"sky_view": sky, "terrain_view": land}
-    found = upright_reflectance(0.0, *GREEN, rho, **given, diffuse_fraction=0.3)
-    first = 0.7 * given["mu_s_local"] / np.cos(np.radians(40.0)) + 0.3 * sky
-    assert found == pytest.approx(rho * first / (1 - rho * land), rel=1e-12)
+BOWLS = pd.read_csv(Path(__file__).parents[2] / "data" / "bowl_radiosity.csv", comment="#")
+
+
+def test_bare_bowl_has_the_exact_radiosity():
+    for row in BOWLS.itertuples():
+        given = on(row.slope, row.sza, 0.0, 0.0, row.azimuth_from_sun)
+        assert given["mu_s_local"] == pytest.approx(row.cos_i, abs=1e-7)
+        given["sky_view"] = 1 - row.wall_view
+        assert upright_reflectance(0.0, *GREEN, row.albedo, **given) == pytest.approx(row.reflectance, rel=1e-6)
+        # Under a uniform sky, the radiosity of a bowl is even and returns what neither ground nor sky takes.
+        sky = upright_reflectance(0.0, *GREEN, row.albedo, **given, diffuse_fraction=1.0)
+        assert sky == pytest.approx(row.albedo * (given["sky_view"] + row.wall_view * sky), rel=1e-12)
+
+
+def test_bowl_on_a_dem_has_the_exact_radiosity():
+    """Bowl in level ground with walls of 45 degrees: land in view is 1 - Vd, and its light is even."""
+    sza, albedo, size, cell = 30.0, 0.45, 161, 10.0
+    lai = 0 * fifesim.lai_scene(fifesim.fife_site(cell, window=((0, size), (0, size))), seed=7)
+    distance = np.hypot(*(np.mgrid[:size, :size] - size // 2)) * cell
+    rim = 0.45 * size * cell
+    radius = rim * np.sqrt(2)
+    dem = lai.copy(data=500 + rim - np.sqrt(radius**2 - np.minimum(distance, rim) ** 2))
+    dem.attrs = {"units": "m"}
+    inside, share = distance < 0.9 * rim, (1 - np.sqrt(0.5)) / 2
+    np.testing.assert_allclose(dem.fifesim.terrain_view().values[inside], share, rtol=0, atol=0.003)
+    given = {"dem": dem, "slopes": "upright", "geometry": fifesim.Geometry(sza, 180.0)}
+    air = fifesim.Atmosphere(visibility=100.0)
+    rho = lai.fifesim.surface_reflectance(
+        "TM", bands=["TM4"], canopy=fifesim.Canopy(background=albedo), atmosphere=air, **given
+    )[0]
+    sky = diffuse_fraction(air, [fifesim.instrument("TM").select(["TM4"])[0].response], given["geometry"])[0]
+    both = BOWLS[(BOWLS.alpha == 45) & (BOWLS.sza == sza) & (BOWLS.albedo == albedo)]
+    # The sun adds to the light of the walls, which is even, in proportion to the cosine.
+    slope, floor = np.polyfit(both.cos_i, both.reflectance, 1)
+    sun = floor + slope * dem.fifesim.illumination(given["geometry"])
+    skylit = albedo * (1 - share) / (1 - albedo * share)
+    expected = (1 - sky) * sun + sky * skylit
+    np.testing.assert_allclose(rho.values[inside], expected.values[inside], rtol=1e-3)
 
 
 def test_shaded_slopes_get_skylight_and_hidden_slopes_are_black():

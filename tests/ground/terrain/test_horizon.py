@@ -170,7 +170,7 @@ def test_sky_factor_and_terrain_view_in_a_spherical_pit(depth):
     np.testing.assert_allclose(found[inside].mean(), 1 - depth / 2, rtol=5e-3)
     # Cells approximate the rim, which matters for single directions.
     np.testing.assert_allclose(found[inside], 1 - depth / 2, rtol=0.012)
-    # The terrain view factor equals the part of the sky above the plane of the slope that terrain hides.
+    # Ct of Eq. 4 equals the part of the sky above the plane of the slope that terrain hides.
     view = horizon_terrain_view(found, np.cos(np.radians(slope)))
     np.testing.assert_allclose(view[inside], ((1 + np.cos(np.radians(slope))) / 2)[inside] - 1 + depth / 2, atol=0.012)
 

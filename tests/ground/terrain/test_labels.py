@@ -46,7 +46,7 @@ def test_slope_aspect_and_views_of_a_plane_on_cells_that_are_not_square(slope):
         np.testing.assert_allclose(fifesim.aspect(dem), 250.0 + projection.convergence(grid), atol=0.002)
     # The reach of 30 m cuts the corner where the plane falls below the horizontal.
     np.testing.assert_allclose(fifesim.sky_view(dem), (1 + np.cos(np.radians(slope))) / 2, rtol=0, atol=2e-4)
-    np.testing.assert_allclose(fifesim.terrain_view(dem), 0, atol=2e-4)
+    np.testing.assert_allclose(fifesim.terrain_view(dem), (1 - np.cos(np.radians(slope))) / 2, rtol=0, atol=2e-4)
 
 
 def test_sun_azimuth_and_aspect_are_relative_to_true_north():
