@@ -185,13 +185,18 @@ def light_at_ground(atmosphere, bands, sza, photons=True):
     -----
     Light that the ground reflects and the atmosphere sends back is left out: it has nearly the same spectrum.
     """
+    flux, diffuse_fraction = flux_at_ground(atmosphere, bands, sza, photons)
+    return flux / flux.sum(), diffuse_fraction
+
+
+def flux_at_ground(atmosphere, bands, sza, photons=True):
+    """Relative flux of each band on level ground per cosine of the sun's zenith angle, and diffuse fraction."""
     terms = band_terms(atmosphere, tuple(bands), sza, 0.0, 0.0)
     wavelength = table_wavelengths()
     gas = gas_transmittance(wavelength, atmosphere, 1 / np.cos(np.radians(sza)))
     spectrum = solar_irradiance_steps(wavelength) * gas * (wavelength if photons else 1.0)
     means = [band.mean(spectrum, wavelength) * np.trapezoid(band.response, band.wavelength) for band in bands]
-    flux = np.array(means) * terms.transmittance_down
-    return flux / flux.sum(), terms.diffuse_fraction
+    return np.array(means) * terms.transmittance_down, terms.diffuse_fraction
 
 
 def check_zenith(name, angle):

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from fifesim.atmosphere.engines import light_at_ground
+from fifesim.atmosphere.engines import LARGEST_ZENITH, check_zenith, flux_at_ground
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.arguments import FparLimit, Time
 from fifesim.base.bands import Band
+from fifesim.base.caches import cached
 from fifesim.base.geometry import Geometry
-from fifesim.chain.landscapes import canopies_of, check_used, land_of, stands_of, warn_of_tallgrass
+from fifesim.chain.landscapes import Land, canopies_of, check_used, land_of, stands_of, warn_of_tallgrass
 from fifesim.chain.steps import air_of
 from fifesim.grids import cf, chunks, directions
 from fifesim.grids import grid as grids
@@ -217,36 +219,81 @@ def light(
 
 def _absorbed(lai, part, canopy, atmosphere, geometry, time):
     """Layers of absorbed light, dims (band, y, x) [1], the text of their history, and the leaf area."""
-    land, canopy = land_of(lai), canopy or TALLGRASS
-    area = ground.checked_scene(north_up(land.lai))
+    land = land_of(lai)
+    scene, area = lai if isinstance(lai, xr.Dataset) else land.lai, ground.checked_scene(north_up(land.lai))
     geometry = directions.given_geometry(geometry, area, time)
     if "sza" in directions.varying(geometry):
         directions.uniform_geometry(geometry, "light")
+    sza = float(geometry.sza)
+    check_zenith("sza", sza)
+    made = absorption_of(scene, part, canopy, atmosphere, (sza,))
+    shares = "by class" if made.land.cover is not None else made.words
+    words = ["energy balance of SAIL, 0.4 to 0.7 um", *filter(None, [shares]), f"sza {sza:.2f}"]
+    return made.layers(len(LIGHT_PARTS) if part == "light" else 1), ", ".join(words), area
+
+
+class Absorption(NamedTuple):
+    """Kernels of absorbed light by class code, with their rasters, for a scene and its leaf area."""
+
+    land: Land
+    area: xr.DataArray
+    kernels: dict
+    words: str
+
+    def layers(self, count):
+        """Absorbed light, dims (band, y, x). [1]"""
+        if self.land.cover is None:
+            kernel, rasters = self.kernels[None]
+            out = chunks.pointwise(kernel, self.area, *rasters, bands=count)
+        else:
+            out = by_class(self.kernels, self.land.cover, self.area, bands=count)
+        return grids.place(out, grids.geobox(self.area))
+
+    @property
+    def of_leaf_area(self):
+        """Function of an array of leaf area, or None if cells differ in anything else."""
+        if self.land.cover is not None or any({"y", "x"} & set(each.dims) for each in self.kernels[None][1]):
+            return None
+        kernel, rasters = self.kernels[None]
+        return lambda cells: kernel(cells, *(each.values for each in rasters))
+
+
+def absorption_of(lai, part, canopy, atmosphere, suns):
+    """Absorption of light in a scene for each zenith angle of the sun."""
+    land, canopy = land_of(lai), canopy or TALLGRASS
+    area = ground.checked_scene(north_up(land.lai))
     atmosphere = air_of(atmosphere, area)
     if not is_fife(area):
         warn_of_tallgrass(area.name or "the raster", land.classes, canopy, land.cells)
     check_spectra(stands_of(land.classes, canopy, land.cells))
     stands = canopies_of(land._replace(lai=area), PAR_BANDS, canopy)
-    sza = float(geometry.sza)
-    kernels = {code: sunlit_kernel(area, stand, atmosphere, sza, part) for code, stand in stands.items()}
-    layers_made = len(LIGHT_PARTS) if part == "light" else 1
-    if land.cover is None:
-        kernel, rasters = kernels[None]
-        out = chunks.pointwise(kernel, area, *rasters, bands=layers_made)
-    else:
-        out = by_class(kernels, land.cover, area, bands=layers_made)
-    out = grids.place(out, grids.geobox(area))
-    what = "by class" if land.cover is not None else f"{ground.shares_in_words(stands[None].canopy)}".rstrip(", ")
-    words = ["energy balance of SAIL, 0.4 to 0.7 um", *filter(None, [what]), f"sza {sza:.2f}"]
-    return out, ", ".join(words), area
+    kernels = {code: sunlit_kernel(area, stand, atmosphere, suns, part) for code, stand in stands.items()}
+    words = "" if land.cover is not None else f"{ground.shares_in_words(stands[None].canopy)}".rstrip(", ")
+    return Absorption(land, area, kernels, words)
 
 
-def sunlit_kernel(lai, stand, atmosphere, sza, part):
-    """Kernel of light absorbed by a stand with optics in `PAR_BANDS`, ``kernel(lai, *blocks)``, and its rasters."""
-    shares, diffuse = light_at_ground(atmosphere, PAR_BANDS, sza)
-    # Absorption does not depend on the view.
-    sun, names = Light(Geometry(sza=sza, saa=0.0), diffuse), [band.name for band in PAR_BANDS]
-    return ground.light_kernel(lai, names, stand, sun, tuple(shares.tolist()), part)
+def sunlit_kernel(lai, stand, atmosphere, suns, part):
+    """Kernel of light absorbed by a stand with optics in `PAR_BANDS` for each sun, and its rasters."""
+    kernels, rasters, names = [], [], [band.name for band in PAR_BANDS]
+    for sza in suns:
+        flux, diffuse = par_at_ground(atmosphere, sza)
+        # Absorption does not depend on the view.
+        sun = Light(Geometry(sza=sza, saa=0.0), diffuse)
+        kernel, rasters = ground.light_kernel(lai, names, stand, sun, tuple((flux / flux.sum()).tolist()), part)
+        kernels.append(kernel)
+    return (kernels[0] if len(suns) == 1 else partial(_by_sun, tuple(kernels))), rasters
+
+
+def _by_sun(kernels, lai, *blocks):
+    """Layers of all kernels."""
+    return np.concatenate([kernel(lai, *blocks) for kernel in kernels])
+
+
+@cached(64, "photosynthetically active light at the ground")
+def par_at_ground(atmosphere, sza):
+    """Relative photon flux in `PAR_BANDS` on level ground per cosine of the zenith angle, and diffuse fraction."""
+    # A lower sun has the air of the lowest sun of all engines.
+    return flux_at_ground(atmosphere, PAR_BANDS, min(sza, LARGEST_ZENITH))
 
 
 def check_spectra(stands):

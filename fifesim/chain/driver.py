@@ -95,11 +95,12 @@ class Driver:
         """Fraction of absorbed photosynthetically active radiation, as `absorbed_light.fpar` by Beer's law."""
         return fpar_kernel(None, self.setup.canopy, self.setup.geometry, fpar_inf, leaves)[0](lai)
 
-    def absorbed(self, lai, canopy, leaves="green"):
-        """Fraction of light absorbed by the leaves of a canopy of numbers, as `absorbed_light.fpar` from energy."""
+    def absorbed(self, lai, canopy, suns=None):
+        """Light absorbed by green leaves of a canopy of numbers for each sun, by default that of the image. [1]"""
         stand = landscapes.canopies_of(landscapes.Land(None), absorbed_light.PAR_BANDS, canopy)[None]
-        kernel, rasters = absorbed_light.sunlit_kernel(None, stand, self.air, float(self.setup.geometry.sza), leaves)
-        return kernel(lai, *(each.values for each in rasters))[0]
+        suns = (float(self.setup.geometry.sza),) if suns is None else suns
+        kernel, rasters = absorbed_light.sunlit_kernel(None, stand, self.air, suns, "green")
+        return kernel(lai, *(each.values for each in rasters))
 
     def toa(self, reflectance):
         """Apparent reflectance at the top of the atmosphere, as `steps.to_toa`."""

@@ -50,8 +50,9 @@ def test_only_green_leaves_produce(lai):
     np.testing.assert_allclose(lai.fifesim.gpp(model="farquhar", canopy=half), expected, rtol=1e-12)
     land = lai.to_dataset(name="lai").assign(brown=xr.full_like(lai, 0.5).drop_attrs())
     np.testing.assert_allclose(land.fifesim.gpp(model="farquhar"), expected, rtol=1e-12)
-    green = lai.fifesim.fpar(method="energy", leaves="green", canopy=half)
-    np.testing.assert_array_equal(lai.fifesim.gpp(canopy=half), lai.fifesim.gpp(fpar=green))
+    at = {"time": "1987-06-06T15:00Z"}
+    green = lai.fifesim.fpar(method="energy", leaves="green", canopy=half, **at)
+    np.testing.assert_allclose(lai.fifesim.gpp(canopy=half, **at), lai.fifesim.gpp(fpar=green, **at), rtol=1e-3)
 
 
 def test_albedo_equals_the_two_stream_model_of_each_band(lai):

@@ -1,6 +1,7 @@
 """Bias and variance of the error of a quantity that is computed from retrieved leaf area, by stage."""
 
 from collections.abc import Callable
+from functools import partial
 from inspect import Parameter, signature
 from itertools import product
 from typing import Annotated, Any, NamedTuple, TypeAlias
@@ -205,14 +206,13 @@ def of_cells(scene, target, ground):
 def of_pixels(scene, target, canopy, lai):
     """Quantity in pixels with the mean canopy of the scene, shape of the leaf area."""
     fpar, flat = None, np.ascontiguousarray(lai).reshape(-1)
-    if target.takes_fpar:
-        fpar = scene.driver.absorbed(flat, canopy)
     if target.quantity in models.LAND_MODELS:
+        suns = models.suns_over(scene.grid, scene.setup.geometry, scene.driver.air)
         green = flat * (1 - canopy.brown) if target.model.of_green_leaves else flat
-        sza = float(scene.setup.geometry.sza)
-        return models.evaluated(target.model, target.weather, sza, green, flat if fpar is None else fpar).reshape(
-            lai.shape
-        )
+        absorbed = partial(scene.driver.absorbed, canopy=canopy, suns=suns.sza) if target.takes_fpar else None
+        return models.kernel_of_leaf_area(target.model, target.weather, suns, absorbed)(green).reshape(lai.shape)
+    if target.takes_fpar:
+        fpar = scene.driver.absorbed(flat, canopy)[0]
     return _evaluated(target, flat, fpar).reshape(lai.shape)
 
 
