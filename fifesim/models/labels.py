@@ -86,6 +86,12 @@ def _farquhar(lai, fpar, weather, sza):
     return production.farquhar_canopy(lai, *light, sza, weather.temperature) * weather.day_length * 3600 * CARBON
 
 
+def _c4(lai, fpar, weather, sza):
+    light = photon_flux(weather), weather.diffuse_fraction
+    rate = production.c4_canopy(lai, *light, sza, weather.temperature, pressure_pa=weather.pressure)
+    return rate * weather.day_length * 3600 * CARBON
+
+
 def _penman_monteith(lai, fpar, weather, sza):
     found = evaporation.penman_monteith(
         weather.temperature, 100 * weather.humidity, weather.pressure, lai, fpar, weather.net_radiation,
@@ -117,7 +123,10 @@ LAND_MODELS = {
         ),
         "photosynthesis": LandModel(_photosynthesis, ("shortwave", "day_length"), "Monsi and Saeki", True),
         "farquhar": LandModel(
-            _farquhar, ("temperature", "shortwave", "diffuse_fraction", "day_length"), "two leaves", True
+            _farquhar,
+            ("temperature", "pressure", "shortwave", "diffuse_fraction", "day_length"),
+            "two leaves, C3",
+            True,
         ),
     },
     "evapotranspiration": {
@@ -126,6 +135,13 @@ LAND_MODELS = {
     },
 }
 """Models by quantity and name; the first is the default. Results are per day, at the means of the weather."""
+
+
+def of_pathway(model, pathway):
+    """Model of leaves with a pathway; only the biochemistry of two leaves depends on it."""
+    if model.function is not _farquhar or pathway == "C3":
+        return model
+    return model._replace(function=_c4, words="two leaves, C4")
 
 
 _LIT = "shortwave", "net_radiation", "ground_heat"
@@ -207,6 +223,7 @@ def gpp(
     atmosphere: Atmosphere | None = None,
     geometry: Directions | None = None,
     time: Time | None = None,
+    pathway: Literal["C3", "C4"] | None = None,
 ) -> xr.DataArray:
     """
     Gross primary production: the sum of a day, or the flux at one time.
@@ -232,6 +249,9 @@ def gpp(
         coordinates of ``lai``, else its ``time``, which may be at night, or the day of the paper on the FIFE site.
     time : str or datetime, optional
         Return the flux at this time instead of the sum of the day.
+    pathway : {"C3", "C4"}, optional
+        Photosynthesis of the leaves, for "farquhar" only. The default is C4 for FIFE's tallgrass, and C3 with a warning
+        elsewhere.
 
     Returns
     -------
@@ -242,7 +262,7 @@ def gpp(
     ------
     ValueError
         If LAI, FPAR or weather are out of range, if FPAR is given for a model that does not use it, or with a canopy
-        or atmosphere.
+        or atmosphere, or a pathway for another model than "farquhar".
 
     Warns
     -----
@@ -261,12 +281,12 @@ def gpp(
 
     References
     ----------
-    [Running2004]_; [MonsiSaeki1953]_; [DePury1997]_
+    [Running2004]_; [MonsiSaeki1953]_; [DePury1997]_; [Collatz1992]_
 
     See Also
     --------
     fifesim.models.production.light_use_gpp, fifesim.models.production.canopy_photosynthesis,
-    fifesim.models.production.farquhar_canopy
+    fifesim.models.production.farquhar_canopy, fifesim.models.production.c4_canopy
 
     Examples
     --------
@@ -276,7 +296,7 @@ def gpp(
     >>> round(float(lai.fifesim.gpp().mean()), 1)
     4.1
     """
-    return _map("gpp", lai, weather, model, fpar, canopy, atmosphere, geometry, time)
+    return _map("gpp", lai, weather, model, fpar, canopy, atmosphere, geometry, time, pathway)
 
 
 @by_date
@@ -342,7 +362,7 @@ def evapotranspiration(
     return _map("evapotranspiration", lai, weather, model, fpar, canopy, atmosphere, geometry, time)
 
 
-def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time):
+def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time, pathway=None):
     """Labelled result of a model, dims (y, x)."""
     land, model = land_of(lai), LAND_MODELS[quantity]["light-use" if name == "MOD17" else name]
     area = checked_scene(north_up(land.lai))
@@ -356,6 +376,11 @@ def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time)
             )
     if model.of_green_leaves and fpar is not None:
         raise ValueError(f"fpar has no effect with model={name!r}, which takes leaf area: leave it out")
+    if name != "farquhar" and pathway is not None:
+        raise ValueError(f"pathway has no effect with model={name!r}: leave it out, or use model='farquhar'")
+    if name == "farquhar" and pathway is None and not is_fife(area):
+        warn(f"the photosynthesis of {area.name or 'the raster'} is unknown: using pathway='C3'; give 'C3' or 'C4'")
+    model = of_pathway(model, pathway or ("C4" if is_fife(area) else "C3"))
     for what, given in (("canopy", canopy), ("atmosphere", atmosphere)):
         if fpar is not None and given is not None and (what == "canopy" or time is None):
             raise ValueError(f"{what} has no effect with fpar, which it would determine: leave out one of them")

@@ -14,7 +14,14 @@ AREAS = np.array([0.1, 0.25, 0.5, 0.74, 1.0, 1.41, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]
 AIR = fifesim.Atmosphere()
 CANOPY = fifesim.Canopy(leaf_optics=fifesim.Leaf(), background=0.2)
 NOON = {"2022-03-20": 0.0, "2022-06-21": 23.44, "2022-10-15": -8.5, "2022-12-21": -23.44}
-FLUXES = {"gpp": ["light-use", "photosynthesis", "farquhar"], "evapotranspiration": ["penman-monteith", "pt-jpl"]}
+FLUXES = {
+    "light-use": ("gpp", {}),
+    "photosynthesis": ("gpp", {}),
+    "C3": ("gpp", {"model": "farquhar", "pathway": "C3"}),
+    "C4": ("gpp", {"model": "farquhar", "pathway": "C4"}),
+    "penman-monteith": ("evapotranspiration", {}),
+    "pt-jpl": ("evapotranspiration", {}),
+}
 
 
 def raster(latitude, values=AREAS):
@@ -46,7 +53,9 @@ def fluxes(lai, fpar, sza, weather, light, sky):
         "light-use": production.light_use_gpp(weather.temperature_min - 273.15, deficit, fpar, 1e-6 * mean),
         "photosynthesis": production.CARBON
         * production.canopy_photosynthesis(lai, 0.5 / np.cos(np.radians(sza)), photons, 0.05, 30.0),
-        "farquhar": production.CARBON * production.farquhar_canopy(lai, photons, sky, sza, weather.temperature),
+        "C3": production.CARBON * production.farquhar_canopy(lai, photons, sky, sza, weather.temperature),
+        "C4": production.CARBON
+        * production.c4_canopy(lai, photons, sky, sza, weather.temperature, pressure_pa=weather.pressure),
         "penman-monteith": evaporation.penman_monteith(*air, lai, fpar, net, weather.temperature_min).le / heat,
         "pt-jpl": evaporation.pt_jpl(*air, 0.8 * fpar + 0.17, 0.94, lai, net, soil).le / heat,
     }
@@ -66,11 +75,11 @@ def test_day_equals_the_sum_over_144_steps(absorbed, latitude, date):
     light, sky = flux / flux.mean(), weather.diffuse_fraction * sky * flux.sum() / (sky @ flux)
     steps = [fluxes(AREAS, *each[:2], weather, *each[2:]) for each in zip(fpar, sza, light, sky, strict=True)]
     noon = fifesim.Geometry(abs(north - NOON[date]), 180.0 if north > NOON[date] else 0.0)
-    for verb, models in FLUXES.items():
-        for model in models:
-            day = getattr(lai.fifesim, verb)(weather, model=model, canopy=CANOPY, atmosphere=AIR, geometry=noon)
-            total = 3600 * weather.day_length * np.mean([each[model] for each in steps], axis=0)
-            np.testing.assert_allclose(day.values[0], total, rtol=5e-3, err_msg=f"{model} {north:.1f} {date}")
+    for name, (verb, options) in FLUXES.items():
+        given = {"model": name, "canopy": CANOPY, "atmosphere": AIR, "geometry": noon} | options
+        day = getattr(lai.fifesim, verb)(weather, **given)
+        total = 3600 * weather.day_length * np.mean([each[name] for each in steps], axis=0)
+        np.testing.assert_allclose(day.values[0], total, rtol=5e-3, err_msg=name)
 
 
 def test_instant_is_a_flux_and_a_date_is_a_day(absorbed):

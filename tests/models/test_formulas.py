@@ -1,6 +1,7 @@
 """Models of production, evaporation and albedo against tables from other programs, quadrature and limits."""
 
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,13 @@ import pytest
 from scipy.integrate import quad
 
 from fifesim.models import evaporation, production
-from fifesim.models.production import canopy_photosynthesis, farquhar_canopy, two_leaves
+from fifesim.models.production import (
+    c4_canopy,
+    c4_photosynthesis,
+    canopy_photosynthesis,
+    farquhar_canopy,
+    two_leaves,
+)
 from fifesim.models.radiation import two_stream
 
 DATA = Path(__file__).parents[1] / "data"
@@ -121,6 +128,26 @@ def test_photosynthesis_of_two_leaves_has_the_right_limits():
     assert abs(kelvin[transport.argmax()] - optimum) < 0.02
 
 
+def test_c4_leaves_agree_with_an_independent_solution():
+    """
+    Roots of the quadratics of Collatz et al. (1992) by eigenvalues, with the temperature factors of CABLE and MOSES and
+    the parameters of BioCro's c4photo (k 0.7, theta 0.83, beta 0.93, vmax 39).
+    """
+    for light, vmax, celsius, ci in product((0.0, 20.0, 400.0, 2000.0), (39.0, 15.0), (5.0, 25.0, 38.0), (2.0, 14.0)):
+        factor = 2.0 ** (0.1 * celsius - 2.5)
+        rubisco = vmax * factor / ((1 + np.exp(0.3 * (13.0 - celsius))) * (1 + np.exp(0.3 * (celsius - 36.0))))
+        lit = min(np.roots([0.83, -(rubisco + 0.067 * light), rubisco * 0.067 * light]).real)
+        carbon = 0.7e6 * (vmax / 39.0) * factor * ci / 101325
+        expected = min(np.roots([0.93, -(lit + carbon), lit * carbon]).real)
+        found = c4_photosynthesis(light, vmax, celsius + 273.15, ci)
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    # Dim light is used with the quantum yield, and the capacity of Collatz's maize at 25 degC is nearly reached.
+    leaves = two_leaves(3.0, 1e-3, 0.2, 30.0, 39.0)
+    dim = 0.067 * (leaves.light_sun + leaves.light_shade)
+    assert c4_canopy(3.0, 1e-3, 0.2, 30.0, 298.15, ci_pa=1e4) == pytest.approx(dim, rel=1e-4)
+    assert c4_photosynthesis(1e9, 39.0, 298.15, 1e9) == pytest.approx(39.0 / (1 + np.exp(-3.6)) / (1 + np.exp(-3.3)))
+
+
 def test_conductance_agrees_with_quadrature_over_leaves():
     def leaf(depth):
         flux = 0.6 * 900 * np.exp(-0.6 * depth)
@@ -152,6 +179,7 @@ def test_missing_cells_stay_missing_and_bare_ground_has_no_flux():
     results = [
         canopy_photosynthesis(lai, 0.5, 1000.0, 0.05, 30.0),
         farquhar_canopy(lai, 1000.0, 0.2, 30.0, 298.0),
+        c4_canopy(lai, 1000.0, 0.2, 30.0, 298.0),
         evaporation.penman_monteith(298.0, 50.0, 1e5, lai, 0.3 * lai, 400.0, 288.0).le,
         evaporation.canopy_conductance(lai, 1000.0, 298.0, 1000.0),
         two_stream(0.1, 0.05, 0.0, 30.0, lai, 0.15).absorbed_beam,

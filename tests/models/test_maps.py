@@ -55,6 +55,14 @@ def test_only_green_leaves_produce(lai):
     np.testing.assert_allclose(lai.fifesim.gpp(canopy=half, **at), lai.fifesim.gpp(fpar=green, **at), rtol=1e-3)
 
 
+def test_pathway_is_c4_for_the_tallgrass_of_fife(lai):
+    grass, c3 = lai.fifesim.gpp(model="farquhar"), lai.fifesim.gpp(model="farquhar", pathway="C3")
+    np.testing.assert_array_equal(grass, lai.fifesim.gpp(model="farquhar", pathway="C4"))
+    assert "C4" in grass.history and "C3" in c3.history and float(grass.mean()) > 1.2 * float(c3.mean())
+    with pytest.raises(ValueError, match="pathway has no effect with model='light-use'"):
+        lai.fifesim.gpp(pathway="C4")
+
+
 def test_albedo_equals_the_two_stream_model_of_each_band(lai):
     leaf, ground = (0.3, 0.2), 0.15
     made = lai.fifesim.albedo(canopy=fifesim.Canopy(leaf_optics=leaf, background=ground), chi=0.2)

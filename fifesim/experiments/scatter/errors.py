@@ -25,6 +25,7 @@ from fifesim.experiments.scatter.stages import (
 )
 from fifesim.grids import cf
 from fifesim.grids import grid as grids
+from fifesim.grids.sites import on_fife_site
 from fifesim.ground.canopy.description import is_raster
 from fifesim.models import labels as models
 from fifesim.models.weather import fife_weather
@@ -195,12 +196,19 @@ def of_cells(scene, target, ground):
     light = {"canopy": canopy, "atmosphere": scene.driver.air, "geometry": setup.geometry}
     lai = ground.land["lai"].values
     if target.quantity in models.LAND_MODELS:
+        if target.name == "farquhar":
+            light["pathway"] = _pathway(scene)
         verb = getattr(models, target.quantity)
         return verb(ground.land, target.weather, model=target.name, **light).values
     fpar = None
     if target.takes_fpar:
         fpar = absorbed_fraction(ground.land, method="energy", leaves="green", **light).values
     return _evaluated(target, lai, fpar)
+
+
+def _pathway(scene):
+    """Photosynthesis of the leaves: C4 of the tallgrass on the FIFE site."""
+    return "C4" if on_fife_site(scene.grid) else "C3"
 
 
 def of_pixels(scene, target, canopy, lai):
@@ -210,7 +218,8 @@ def of_pixels(scene, target, canopy, lai):
         suns = models.suns_over(scene.grid, scene.setup.geometry, scene.driver.air)
         green = flat * (1 - canopy.brown) if target.model.of_green_leaves else flat
         absorbed = partial(scene.driver.absorbed, canopy=canopy, suns=suns.sza) if target.takes_fpar else None
-        return models.kernel_of_leaf_area(target.model, target.weather, suns, absorbed)(green).reshape(lai.shape)
+        model = models.of_pathway(target.model, _pathway(scene))
+        return models.kernel_of_leaf_area(model, target.weather, suns, absorbed)(green).reshape(lai.shape)
     if target.takes_fpar:
         fpar = scene.driver.absorbed(flat, canopy)[0]
     return _evaluated(target, flat, fpar).reshape(lai.shape)
