@@ -82,7 +82,8 @@ def budget(
         By default the case of the paper, with pixels at the interval of Table 1.
     quantity : str or callable, optional
         "gpp", "evapotranspiration", one of their models such as "photosynthesis" or "pt-jpl", "lai", "fpar", or a
-        function of arrays of LAI, or of LAI and FPAR. FPAR is the light that green leaves absorb.
+        function of arrays of LAI, or of LAI and FPAR. FPAR is the light that green leaves absorb. Production and
+        evapotranspiration are sums of the day; "farquhar" has C4 leaves on the FIFE site, C3 elsewhere.
     retrieval : "line" or Retrieval, optional
         The regression line of the true leaf area on NDVI, fitted for each set of stages; or a retrieval from
         `fifesim.train`, which estimates LAI from reflectance. Stages that it needs cannot be made ideal: their shares

@@ -59,6 +59,16 @@ def test_concave_models_are_biased_by_the_curvature_of_the_truth():
     np.testing.assert_allclose(found.bias.sel(stage="scaling").item(), expected.item(), rtol=0.05)
 
 
+def test_truth_is_the_sum_of_the_day():
+    """The sun of the overpass gives 12 % more, and C3 leaves half of it."""
+    (case,) = budget_cases(fifesim.Scenario(**BURNED), realisations=1, cells=333)
+    lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
+    found = shares_of(BURNED, "farquhar", realisations=1)
+    # Pixels at the edge have no data.
+    np.testing.assert_allclose(found.truth, float(lai.fifesim.gpp(model="farquhar").mean()), rtol=0.03)
+    assert abs(found.total_bias.item()) < 0.15 * found.truth.item()
+
+
 def test_shares_of_a_linear_quantity_and_a_regression_line_match_the_closed_form(tmp_path):
     """
     Independent cells with nearly constant leaf area, displaced by a third of a pixel.
