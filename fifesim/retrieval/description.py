@@ -20,7 +20,7 @@ from fifesim.sensor.description.fields import Name, Positive, Share, errors_in_w
 RETRIEVED = {"lai": (0.0, 20.0), "fpar": (0.0, 1.0), "green_fpar": (0.0, 1.0)}
 """Quantities that a retrieval may estimate, and their physical ranges."""
 
-FORMAT = 2
+FORMAT = 3
 """Version of the file of a retrieval."""
 
 # Mark behind the NetCDF content of a file. The version and the SHA-256 of the content follow, separated by a space.

@@ -116,6 +116,8 @@ class Solution(NamedTuple):
     """Derivative of the estimate with respect to the true state, shape (n, k, k)."""
     chi_square: np.ndarray
     """Misfit to measurement and prior at the estimate, shape (n,)."""
+    misfit: np.ndarray
+    """Measurement less model at the estimate, shape (n, m)."""
     converged: np.ndarray
     """Shape (n,), bool."""
 
@@ -140,6 +142,7 @@ def optimal_estimation(
     prior_covariance: np.ndarray,
     error_covariance: np.ndarray,
     *,
+    cross_covariance: np.ndarray | None = None,
     limits: tuple[np.ndarray, np.ndarray] | None = None,
     first: np.ndarray | None = None,
     iterations: int = 20,
@@ -158,6 +161,8 @@ def optimal_estimation(
     prior_covariance : array, shape (k, k)
     error_covariance : array, shape (m, m)
         Covariance of the errors of measurement and model.
+    cross_covariance : array, shape (k, m), optional
+        Covariance of the states with these errors, by default 0.
     limits : pair of array, shape (k,), optional
         Least and largest state; steps end there.
     first : array, shape (n, k), optional
@@ -174,19 +179,32 @@ def optimal_estimation(
     References
     ----------
     [Rodgers2000]_, Eqs. 2.27, 2.78, 2.80, 5.35 and 5.36
+
+    Notes
+    -----
+    If an error e is correlated with the state x, its linear regression on the state is added to the model F:
+    y = F(x) + S_xe' S_a^-1 (x - x_a) + e', with the covariance S_e - S_xe' S_a^-1 S_xe of e'. For a linear model with
+    derivative K, this is the estimate of minimum variance with cov(x, y) = S_a K' + S_xe and cov(y) = K S_a K' + K S_xe
+    + S_xe' K' + S_e.
     """
-    weight, sharpness = np.linalg.inv(error_covariance), np.linalg.inv(prior_covariance)
-    count, size = len(measured), len(prior)
+    sharpness, size, count = np.linalg.inv(prior_covariance), len(prior), len(measured)
+    # The expected error of a state is a part of the model, and the rest does not depend on the state.
+    expected = np.zeros((size, measured.shape[1])) if cross_covariance is None else sharpness @ cross_covariance
+    weight = np.linalg.inv(error_covariance - expected.T @ prior_covariance @ expected)
     lowest, highest = (np.full(size, -np.inf), np.full(size, np.inf)) if limits is None else limits
     state = np.clip(np.broadcast_to(prior, (count, size)) if first is None else first, lowest, highest).astype(float)
     is_known = np.isfinite(measured).all(axis=1)
     converged, damping = np.zeros(count, bool), np.full(count, _FIRST_DAMPING)
 
+    def model(states, pixels):
+        values, slopes = forward(states, pixels)
+        return values + (states - prior) @ expected, slopes + expected.T
+
     def cost_of(states, modelled, at):
         misfit, departure = measured[at] - modelled, states - prior
         return _square(misfit, weight) + _square(departure, sharpness)
 
-    modelled, slope = (np.array(each, float) for each in forward(state, np.arange(count)))
+    modelled, slope = (np.array(each, float) for each in model(state, np.arange(count)))
     cost = cost_of(state, modelled, np.arange(count))
     active = np.flatnonzero(is_known)
     for _ in range(iterations):
@@ -201,7 +219,7 @@ def optimal_estimation(
         step = np.linalg.solve(damped, downhill[..., None])[..., 0]
         tried = np.clip(state[active] + step, lowest, highest)
         moved = tried - state[active]
-        values, slopes = forward(tried, active)
+        values, slopes = model(tried, active)
         found = cost_of(tried, values, active)
         length = np.sqrt(np.einsum("ni,nij,nj->n", moved, inverse, moved) / size)
         better = found <= cost[active] * (1 + _ROUNDING)
@@ -216,7 +234,7 @@ def optimal_estimation(
     kernel = covariance @ (inverse - sharpness)
     for each in (state, cost, covariance, kernel):
         each[~is_known] = np.nan
-    return Solution(state, covariance, kernel, cost, converged)
+    return Solution(state, covariance, kernel, cost, measured - modelled, converged)
 
 
 def _square(vectors, matrix):

@@ -167,26 +167,65 @@ def by_quantiles(tables, reflectance, angles, levels):
 
 
 def fit_optimal_estimation(pixels, study, states, level, bands, quantities):
-    """Tables of reflectance and quantities, and the prior and the covariance of the error."""
-    # The unknowns are the truth of the pixels.
-    axes, angles = axes_of(pixels.truth, states, pixels.angles), pixels.angles.mean(0)
+    """Tables of reflectance and quantities, covariances of prior and error, and the remainder of each quantity."""
+    # The unknowns are the truth of the pixels, and the quantities follow them.
+    unknowns = len(states)
+    true, wanted = pixels.truth[:, :unknowns], pixels.truth[:, unknowns:]
+    axes, angles = axes_of(true, states, pixels.angles), pixels.angles.mean(0)
     light, values = simulated_tables(study, level, bands, quantities, axes, angles)
     found = {f"axis_{name}": np.array(ends) for name, ends in axes.items()}
     modelled = np.empty_like(pixels.reflectance)
     for part in _parts(len(modelled)):
-        modelled[part] = interpolated(light, _axes(found), pixels.truth[part], _given(found, pixels.angles[part]))[0]
-    # Noise, blur, registration, variation within pixels and properties that are not unknowns.
+        modelled[part] = interpolated(light, _axes(found), true[part], _given(found, pixels.angles[part]))[0]
+    # Noise, blur, registration, variation within pixels and properties that are not unknowns. Blur mixes a pixel with
+    # its neighbours, so that the error decreases with the state.
     rest = pixels.reflectance - modelled
     light[(0,) * len(axes)] += rest.mean(0)
-    error, prior = (np.atleast_2d(np.cov(each.T)) for each in (rest, pixels.truth))
-    found |= {"reflectance": light, "quantities": values, "error_covariance": error + 1e-10 * np.eye(len(error))}
-    return found | {"prior_mean": pixels.truth.mean(0), "prior_covariance": prior}
+    whole = np.cov(np.hstack([true, rest]).T)
+    found |= {"reflectance": light, "quantities": values, "prior_mean": true.mean(0)}
+    found |= {"prior_covariance": whole[:unknowns, :unknowns], "cross_covariance": whole[:unknowns, unknowns:]}
+    found |= {"error_covariance": whole[unknowns:, unknowns:] + 1e-10 * np.eye(rest.shape[1])}
+    some = slice(None, None, -(-len(true) // _MEMBERS))
+    return found | _remainder(found, pixels.reflectance[some], pixels.angles[some], wanted[some])
+
+
+def _remainder(tables, reflectance, angles, truth):
+    """Regression of the truth less the table on state and misfit, and error by decile of the estimate."""
+    values, sd, inputs, *_ = _solved(tables, reflectance, angles)
+    found = {"remainder": np.linalg.lstsq(inputs, truth - values, rcond=None)[0]}
+    values += inputs @ found["remainder"]
+    parts = [np.array_split(order, _DECILES) for order in np.argsort(values, axis=0, kind="stable").T]
+
+    def by_decile(each, power=1):
+        means = [[np.mean(own[at] ** power) for at in part] for own, part in zip(each.T, parts, strict=True)]
+        return np.array(means).T ** (1 / power)
+
+    found |= {"decile": by_decile(values), "offset": by_decile(truth - values)}
+    spread = by_decile((truth - values - _at_decile(found, "offset", values)) / sd, power=2)
+    return found | {"spread": np.maximum(spread, 1e-6)}
+
+
+_DECILES = 10
+
+
+def _at_decile(tables, name, values):
+    """Values of a table between the deciles of the estimate, and those of the outermost deciles beyond."""
+    columns = zip(values.T, tables["decile"].T, tables[name].T, strict=True)
+    return np.stack([np.interp(*each) for each in columns], axis=1)
 
 
 def by_optimal_estimation(tables, reflectance, angles, levels):
-    """Most probable state, and the normal distribution of each quantity from the posterior covariance."""
-    axes, unknowns = _axes(tables), len(tables["prior_mean"])
-    score, parts = stats.norm.ppf(probabilities_of(levels)), []
+    """Estimate with the remainder of each quantity, and its normal distribution with the spread of its decile."""
+    values, sd, inputs, converged, layers = _solved(tables, reflectance, angles)
+    values += inputs @ tables["remainder"]
+    median, sd = values + _at_decile(tables, "offset", values), sd * _at_decile(tables, "spread", values)
+    score = stats.norm.ppf(probabilities_of(levels))
+    return Estimates(median, sd, median[..., None] + sd[..., None] * score, converged, tuple(layers.T))
+
+
+def _solved(tables, reflectance, angles):
+    """Quantities of the most probable state, their posterior deviation, inputs of the remainder and diagnostics."""
+    axes, unknowns, parts = _axes(tables), len(tables["prior_mean"]), []
     for part in _parts(len(reflectance)):
         given = _given(tables, angles[part])
 
@@ -199,15 +238,16 @@ def by_optimal_estimation(tables, reflectance, angles, levels):
             tables["prior_mean"],
             tables["prior_covariance"],
             tables["error_covariance"],
+            cross_covariance=tables["cross_covariance"],
             limits=tuple(axes[:unknowns].T),
         )
-        median, slope = interpolated(tables["quantities"], axes, found.state, given)
+        values, slope = interpolated(tables["quantities"], axes, found.state, given)
         sd = np.sqrt(np.einsum("nqk,nkl,nql->nq", slope, found.covariance, slope))
+        inputs = np.column_stack([np.ones(len(values)), found.state - tables["prior_mean"], found.misfit])
         kernel = np.diagonal(found.averaging_kernel, axis1=1, axis2=2)
         layers = np.column_stack([found.degrees_of_freedom, found.chi_square, kernel])
-        parts.append((median, sd, found.converged, layers))
-    median, sd, converged, layers = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return Estimates(median, sd, median[..., None] + sd[..., None] * score, converged, tuple(layers.T))
+        parts.append((values, sd, inputs, found.converged, layers))
+    return [np.concatenate(each) for each in zip(*parts, strict=True)]
 
 
 def diagnostics_of(tables):
@@ -251,13 +291,15 @@ _SHAPES = {
     "lookup": "members:km states:kq scale:bb varies:3",
     "quantiles": "input_mean:i input_spread:i centre:q scale:q weight0:ih bias0:h weight1:hg bias1:g weight2:go "
     "bias2:o",
-    "optimal-estimation": "error_covariance:bb prior_mean:u prior_covariance:uu",
+    "optimal-estimation": "error_covariance:bb cross_covariance:ub prior_mean:u prior_covariance:uu remainder:rq "
+    "decile:dq offset:dq spread:dq",
 }
 
 # Lowest and highest value of tables.
 _POSITIVE = np.nextafter(0, 1), np.inf
 _RANGES = {"prior_range:2q": (0, 20), "angle_range:23": (0, 180), "stretch:ql": (0, np.inf)}
 _RANGES |= {"domain_radius:": (0, np.inf), "varies:3": (0, 1), "input_spread:i": _POSITIVE, "scale:q": _POSITIVE}
+_RANGES |= {"spread:dq": _POSITIVE}
 
 # Columns of the table of a line: number of pixels, residual deviation and sum of squares.
 _NOT_NEGATIVE = [_LINE.index(name) for name in ("n", "residual_deviation", "x_sum_of_squares")]
@@ -273,6 +315,7 @@ def check_tables(method, tables, bands, quantities, levels):
         raise ValueError(f"the table {odd[0]} is {'unknown' if odd[0] in tables else 'missing'}")
     sizes = {"b": bands, "i": bands + 3, "q": quantities, "l": levels, "o": quantities * (2 * levels + 1)}
     sizes["m"] = bands + np.count_nonzero(tables.get("varies"))
+    sizes["r"] = 1 + bands + np.size(tables.get("prior_mean"))
     for each in wanted:
         name, _, shape = each.partition(":")
         values, (lowest, highest) = tables[name], _RANGES.get(each, (-np.inf, np.inf))
@@ -284,7 +327,7 @@ def check_tables(method, tables, bands, quantities, levels):
         is_known = np.isfinite(values) | (name == "input_spread")
         if not (is_known & (values >= lowest) & (values <= highest)).all():
             raise ValueError(f"the table {name} has values that are not finite or out of range")
-        if (name.startswith("axis_") or name.endswith("_range")) and not (values[0] <= values[1]).all():
+        if (name.startswith("axis_") or name.endswith(("_range", "decile"))) and (np.diff(values, axis=0) < 0).any():
             raise ValueError(f"the table {name} has an upper end below the lower end")
     if method == "line" and not (
         ((tables["bands"] >= 0) & (tables["bands"] < bands)).all() and (tables["line"][:, _NOT_NEGATIVE] >= 0).all()

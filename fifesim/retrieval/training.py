@@ -142,8 +142,8 @@ def train(
     tables = methods.domain_of(learned.reflectance)
     if method == "optimal-estimation":
         described, states = with_states(fitted)
-        known, kind = take(described, names=[f"state_{name}" for name in states], part="train"), (level, chosen, names)
-        tables |= methods.fit_optimal_estimation(known, _study_of_one_stand(dataset), states, *kind)
+        known = take(described, names=[*(f"state_{name}" for name in states), *names], part="train")
+        tables |= methods.fit_optimal_estimation(known, _study_of_one_stand(dataset), states, level, chosen, names)
     elif method == "line":
         tables |= methods.fit_line(learned, _red_and_near_infrared(wavelengths, chosen))
     else:

@@ -36,6 +36,24 @@ def test_linear_problems_agree_with_the_closed_form():
         assert found.chi_square[0] == pytest.approx(own["cost"][0, 0], abs=1e-9)
 
 
+def test_error_that_depends_on_the_state_agrees_with_the_estimate_of_minimum_variance():
+    """Covariances of state and measurement, which blur makes weaker than the derivative of the model alone."""
+    rng = np.random.default_rng(3)
+    slope, prior = rng.normal(size=(4, 2)), np.array([1.0, -0.5])
+    states, noise = rng.normal(size=(2, 2)), rng.normal(0, 0.3, (4, 4))
+    spread = states @ states.T + np.eye(2)
+    cross = -0.4 * spread @ slope.T
+    error = 0.16 * slope @ spread @ slope.T + noise @ noise.T + 0.01 * np.eye(4)
+    measured = rng.normal(size=(5, 4))
+    found = optimal_estimation(
+        measured, forward_of(slope), prior, spread, error, cross_covariance=cross, tolerance=1e-9
+    )
+    both = spread @ slope.T + cross
+    gain = both @ np.linalg.inv(slope @ spread @ slope.T + slope @ cross + cross.T @ slope.T + error)
+    np.testing.assert_allclose(found.state, prior + (measured - slope @ prior) @ gain.T, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.covariance, np.broadcast_to(spread - gain @ both.T, (5, 2, 2)), rtol=0, atol=1e-9)
+
+
 def saturating(states, pixels):
     """Two measurements that saturate with one state, as reflectance saturates with leaf area."""
     decay = np.exp(-states)

@@ -225,6 +225,45 @@ def test_table_of_optimal_estimation_agrees_with_the_chain(chips):
         assert slopes[:, :, at] == pytest.approx((ends[0] - ends[1]) / 2e-5, abs=1e-7)
 
 
+def test_remainder_and_spread_of_optimal_estimation_agree_with_the_posterior_of_normal_distributions(monkeypatch):
+    """
+    Two unknowns and two quantities: the first state itself, and one with a remainder that follows state and error.
+
+    The error of the measurements is anticorrelated with the state, and the tables have rounding errors only.
+    """
+    rng, count = np.random.default_rng(8), 40_000
+    states = rng.normal([1.0, 0.0], [0.2, 0.1], (count, 2))
+    slope, error = np.array([[-0.1, 0.4], [0.3, 0.5], [0.1, -0.2]]), rng.normal(0, 0.03, (count, 3))
+    light = states @ slope.T + error - 0.3 * (states[:, :1] - 1) * slope[:, 0]
+    other = 0.1 + 0.5 * states[:, 0] + 0.3 * states[:, 1] + 0.7 * error[:, 0] + rng.normal(0, 0.02, count)
+    truth = np.column_stack([states, states[:, 0], other])
+
+    def tables_of(study, level, bands, quantities, axes, angles):
+        # Chebyshev coefficients of linear functions.
+        half = [(high - low) / 2 for low, high in axes.values()]
+        light, values = np.zeros((2, 2, 3)), np.zeros((2, 2, 2))
+        middle = np.array([sum(ends) / 2 for ends in axes.values()])
+        light[0, 0], light[1, 0], light[0, 1] = slope @ middle, half[0] * slope[:, 0], half[1] * slope[:, 1]
+        values[0, 0], values[1, 0] = [middle[0], 0.5 * middle[0]], [half[0], 0.5 * half[0]]
+        return light, values
+
+    monkeypatch.setattr(methods, "simulated_tables", tables_of)
+    none = np.zeros(count, int)
+    pixels = methods.TrainingPixels(light, np.zeros((count, 3)), truth, none, none)
+    tables = methods.fit_optimal_estimation(pixels, None, ("lai", "soil"), "toa", "abc", ("lai", "fpar"))
+    found = methods.by_optimal_estimation(tables, light, pixels.angles, (0.5, 0.95))
+    wanted, own = truth[:, 2:], light - light.mean(0)
+    best = wanted.mean(0) + own @ np.linalg.lstsq(own, wanted - wanted.mean(0), rcond=None)[0]
+    rmse = np.sqrt(((wanted - best) ** 2).mean(0))
+    # The offsets of the deciles are noise here, of 1 / sqrt(2000) of the error.
+    assert (np.sqrt(((found.median - best) ** 2).mean(0)) < 0.04 * rmse).all()
+    for kind in range(2):
+        for part in np.array_split(np.argsort(found.median[:, kind]), 10):
+            rest = (wanted - found.median)[part, kind]
+            assert abs(rest.mean()) < 0.06 * rmse[kind]
+            assert np.sqrt((rest**2).mean()) == pytest.approx(found.sd[part, kind].mean(), rel=0.04)
+
+
 def test_diagnostics_of_optimal_estimation(chips, trained, light, monkeypatch):
     retrieval = trained("optimal-estimation")
     found = light.fifesim.retrieve(retrieval).compute()
@@ -370,8 +409,9 @@ def test_corrected_chips_are_trained_at_the_surface_without_a_study(chips):
 def test_files_without_a_retrieval_are_rejected(tmp_path, trained):
     xr.Dataset({"a": 1.0}).to_netcdf(tmp_path / "other.nc")
     (tmp_path / "text.nc").write_text("no")
-    replace(trained("line"), version=3).to_netcdf(tmp_path / "newer.nc")
-    messages = {"none": "no such file", "other": "is not a ret", "text": "is not a ret", "newer": "the format 3"}
+    replace(trained("line"), version=2).to_netcdf(tmp_path / "older.nc")
+    messages = {"none": "no such file", "other": "is not a ret", "text": "is not a ret"}
+    messages["older"] = "format 2 .*reads format 3: train it again"
     for name, message in messages.items():
         with pytest.raises(ValueError, match=message):
             fifesim.read_retrieval(tmp_path / f"{name}.nc")
@@ -379,7 +419,7 @@ def test_files_without_a_retrieval_are_rejected(tmp_path, trained):
 
 def sealed(content, path):
     """Write the content of a file with a valid checksum."""
-    path.write_bytes(content + f"\nfifesim retrieval 2 {hashlib.sha256(content).hexdigest()}".encode())
+    path.write_bytes(content + f"\nfifesim retrieval 3 {hashlib.sha256(content).hexdigest()}".encode())
 
 
 def test_changed_bytes_of_a_file_are_rejected(tmp_path, retrieval):
