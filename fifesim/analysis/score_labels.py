@@ -8,16 +8,26 @@ from typing import Annotated
 
 import numpy as np
 import xarray as xr
+from scipy import stats
 
 from fifesim.analysis import scores
 from fifesim.analysis.regression import totals
 from fifesim.analysis.regression_labels import check_same_quantity, matched, sound_cells
 from fifesim.base.arguments import RASTER, Kind, Pairing, described, is_a
+from fifesim.base.messages import warn
 from fifesim.grids.inputs import MASKS_TOO
 from fifesim.grids.reductions import computed, sums_by_row
 
 _BINS = 10
 _LANDSCAPE = "landscape"
+
+_DECILES = 10
+
+# Largest number of pixels from which the edges of deciles are computed, so that memory does not grow with the map.
+_SUBSET = 1_000_000
+
+# Standard errors from which `score` warns of deciles, and misses that do not matter: share of the RMSE, and of pixels.
+_SURE, _SMALL_BIAS, _SMALL_MISS = 3.0, 0.2, 0.04
 
 # Sums of a group that precede the sums of levels: count, error, squared error, CRPS.
 _FIXED = 4
@@ -66,12 +76,22 @@ def score(
     -------
     scores : xarray.Dataset
         ``n``, number of pixels; ``bias`` and ``rmse`` in the unit of the estimate; ``bias_se``, standard error of the
-        bias. If the estimate has intervals, by ``level``: ``coverage``, the share of true values inside, its standard
-        error ``coverage_se``, the mean ``width``, and ``interval_score``. With ``sd`` or members: ``crps``, of a normal
+        bias; ``slope`` of truth on estimate, which is 1 for an estimate that is the expected truth. If the estimate has
+        intervals, by ``level``: ``coverage``, the share of true values inside, its standard error ``coverage_se``, the
+        mean ``width``, and ``interval_score``. With ``sd`` or members: ``crps``, of a normal
         distribution or of the ensemble, and ``pit``, the density of the probability integral transform in ten bins,
         which is 1 for a calibrated estimate. For a mask, ``n``, ``omission``, the share of the true area that it lacks,
-        and ``commission``, the share of it that is wrong. With ``by``, a first dimension of that name. The same to the
-        bit under any chunking.
+        and ``commission``, the share of it that is wrong. With ``by``, a first dimension of that name. Without,
+        ``bias_by_estimate`` and ``coverage_by_estimate`` for each ``decile`` of the estimate, 1 to 10,
+        ``bias_by_truth`` and ``coverage_by_truth`` for each decile of the truth, and their standard errors, whose names
+        end in ``_se``. The same to the bit under any chunking.
+
+    Warns
+    -----
+    UserWarning
+        If the bias or the coverage of a decile of the estimate misses by more than 0.2 of the RMSE or 0.04, and by more
+        than chance allows: in all deciles and levels together as rarely as a normal value beyond three standard errors.
+        It needs landscapes. Highest values of an estimate that is the truth plus an independent error are too high.
 
     Raises
     ------
@@ -80,7 +100,11 @@ def score(
 
     Notes
     -----
-    A pixel counts if truth, estimate and every given limit and spread are known.
+    A pixel counts if truth, estimate and every given limit and spread are known. The edges of deciles are from a
+    regular subset of at most a million pixels. A lazy estimate is computed twice: for these edges, and for the scores.
+
+    The bias by decile of the truth is not zero for a good estimate: an estimate under uncertainty is nearer to the mean
+    of its prior than the truth is, so that it is too high in low deciles and too low in high ones.
 
     References
     ----------
@@ -108,7 +132,10 @@ def score(
     given, truth = _paired(given, truth, pair)
     group, labels = _groups(by, truth)
     values, levels = _pixel_scores(given, truth)
-    sums = _sums_by_landscape(values, group, truth, landscape, len(labels))
+    kinds = [(group, len(labels))]
+    if by is None:
+        kinds += [(each, _DECILES) for each in _deciles(values["error"] + truth, truth)]
+    sums, *by_decile = _sums_by_landscape(values, kinds, truth, landscape, len(levels))
     if not sums[..., 0].sum():
         raise ValueError(
             "no pixel has both an estimate and a true value: do the rasters overlap, and is any pixel not flagged?"
@@ -116,9 +143,11 @@ def score(
     found = _dataset(sums, levels, "crps" in values, unit)
     if "width" in found and bool((found["width"].fillna(0) == 0).all("group").any()):
         raise ValueError("low and high of a level are equal in every pixel: give both ends of the intervals")
-    if by is None:
-        return found.isel(group=0)
-    return found.assign_coords(group=labels).rename(group=_group_name(by, truth))
+    if by is not None:
+        return found.assign_coords(group=labels).rename(group=_group_name(by, truth))
+    found = found.isel(group=0).merge(_decile_scores(by_decile, levels, unit))
+    _warn_of_deciles(found, truth.name or "truth", np.count_nonzero(by_decile[0][..., 0], axis=0))
+    return found
 
 
 def _mask_scores(mask, truth, by, pair):
@@ -228,6 +257,23 @@ def _bin(values, edges):
     return np.where((number >= 0) & (number < edges.size - 1), number, np.nan)
 
 
+def _deciles(*rasters):
+    """Numbers of the deciles of rasters, 0 to 9, whose edges are from a regular subset of the pixels; computes."""
+    dims = rasters[0].dims[-2:]
+    step = int(np.ceil((rasters[0].size / _SUBSET) ** (1 / len(dims))))
+    some = [each.isel({dim: slice(None, None, step) for dim in dims}).transpose(*rasters[0].dims) for each in rasters]
+    values = np.stack([np.asarray(each, float).ravel() for each in computed(*some)])
+    values = values[:, np.isfinite(values).all(axis=0)]
+    if not values.size:
+        return [xr.zeros_like(each, dtype=float) for each in rasters]
+    inner = np.arange(1, _DECILES) / _DECILES
+    edges = [np.array([-np.inf, *np.quantile(each, inner), np.inf]) for each in values]
+    return [
+        xr.apply_ufunc(partial(_bin, edges=own), each, dask="parallelized", output_dtypes=[float])
+        for each, own in zip(rasters, edges, strict=True)
+    ]
+
+
 def _of_normal(function, value, sd, truth):
     """Score of a normal distribution, whose standard deviation is checked."""
     if np.any(sd < 0):
@@ -265,6 +311,8 @@ def _pixel_scores(given, truth):
         values[f"inside {number}"] = inside.where(low.notnull() & high.notnull())
         values[f"width {number}"] = high - low
         values[f"score {number}"] = each_pixel(partial(scores.interval_score, level=level), low, high, truth)
+    middle = values["error"].astype(float) + truth
+    values |= {"value": middle, "square": middle**2, "product": middle * values["error"]}
     return {name: each.drop_vars(set(each.coords) - set(each.dims)) for name, each in values.items()}, levels
 
 
@@ -273,8 +321,8 @@ def _mean_of_members(members):
     return reduce(np.add, np.moveaxis(members, -1, 0)) / members.shape[-1]
 
 
-def _sums_by_landscape(values, group, truth, landscape, groups):
-    """Sums of each landscape and group, shape (landscapes, groups, sums)."""
+def _sums_by_landscape(values, kinds, truth, landscape, levels):
+    """Sums of each landscape and group, shape (landscapes, groups, sums), for each kind of group."""
     if landscape in truth.dims:
         parts = [{landscape: slice(at, at + 1)} for at in range(truth.sizes[landscape])]
     elif landscape in truth.coords and truth[landscape].ndim == 1:
@@ -288,13 +336,19 @@ def _sums_by_landscape(values, group, truth, landscape, groups):
         )
     pit = values.get("pit", xr.full_like(truth, np.nan, dtype=float))
     others = [each for name, each in values.items() if name != "pit"]
-    count = len(others) + 2 + _BINS
+    names, groups = [name for name in values if name != "pit"], [count for _, count in kinds]
+    kept = [names.index(f"inside {number}") for number in range(levels)]
+    widths = [len(others) + 2 + _BINS] + [3 + levels] * (len(kinds) - 1)
+    ends = np.cumsum([count * width for count, width in zip(groups, widths, strict=True)])
     found = []
     for part in parts:
-        cells = [_as_rows(each.transpose(*truth.dims).isel(part)) for each in (group, pit, *others)]
-        rows = sums_by_row(scores.grouped_sums, *cells, count=groups * count, groups=groups, bins=_BINS)
-        found.append(totals(rows))
-    return np.reshape(found, (len(parts), groups, count))
+        cells = [
+            _as_rows(each.transpose(*truth.dims).isel(part)) for each in (*(kind for kind, _ in kinds), pit, *others)
+        ]
+        kernel = scores.sums_by_group_and_decile
+        found.append(totals(sums_by_row(kernel, *cells, count=ends[-1], groups=groups, bins=_BINS, kept=kept)))
+    split = np.split(np.array(found), ends[:-1], axis=1)
+    return [each.reshape(len(parts), count, -1) for each, count in zip(split, groups, strict=True)]
 
 
 def _as_rows(array):
@@ -316,6 +370,12 @@ def _dataset(sums, levels, is_probabilistic, unit):
             ("bias", total[:, 1] / n, "mean of estimate less truth", unit),
             ("bias_se", scores.ratio_error(sums[..., 1], count), "standard error of the bias over landscapes", unit),
             ("rmse", np.sqrt(total[:, 2] / n), "root mean square error", unit),
+            (
+                "slope",
+                _slope(n, total[:, 1], *total[:, at + 3 * len(levels) :][:, :3].T),
+                "slope of truth on estimate",
+                "1",
+            ),
         ]
         if is_probabilistic:
             bins = total[:, -_BINS:]
@@ -343,3 +403,61 @@ def _dataset(sums, levels, is_probabilistic, unit):
         },
         coords,
     )
+
+
+def _slope(n, error, value, square, product):
+    """Slope of truth on estimate from sums of error, estimate, its square and its product with the error."""
+    variance = square - value**2 / n
+    return np.where(variance > 1e-12 * square, 1 - (product - value * error / n) / variance, np.nan)
+
+
+def _decile_scores(by_decile, levels, unit):
+    """Bias and coverage by decile of estimate and truth, from sums of shape (landscapes, deciles, sums)."""
+    found, coords = {}, {"decile": np.arange(1, _DECILES + 1)} | ({"level": levels} if len(levels) else {})
+    for kind, sums in zip(("estimate", "truth"), by_decile, strict=True):
+        count, error, inside = sums[..., 0], sums[..., 1], sums[..., 3:]
+        pixels = np.broadcast_to(count[..., None], inside.shape)
+        for name, parts, own, units in (("bias", error, count, unit), ("coverage", inside, pixels, "1")):
+            if not parts.size:
+                continue
+            with np.errstate(divide="ignore", invalid="ignore"):
+                values = parts.sum(axis=0) / own.sum(axis=0)
+            dims, words = ("decile", "level")[: values.ndim], f"{name} by decile of the {kind}"
+            found[f"{name}_by_{kind}"] = dims, values, {"long_name": words, "units": units}
+            words = f"standard error of the {words} over landscapes"
+            found[f"{name}_by_{kind}_se"] = dims, scores.ratio_error(parts, own), {"long_name": words, "units": units}
+    return xr.Dataset(found, coords)
+
+
+def _warn_of_deciles(found, name, landscapes):
+    """Warn of deciles of the estimate whose bias or coverage is significantly wrong."""
+    wrong, texts = xr.zeros_like(found["decile"], dtype=bool), []
+    parts = [("bias", found["bias_by_estimate"], found["bias_by_estimate_se"], 0.0, _SMALL_BIAS * float(found["rmse"]))]
+    if "coverage_by_estimate" in found:
+        parts += [
+            (
+                f"coverage of the {100 * level:g} % interval",
+                *(each.isel(level=at) for each in shares),
+                level,
+                _SMALL_MISS,
+            )
+            for shares in [(found["coverage_by_estimate"], found["coverage_by_estimate_se"])]
+            for at, level in enumerate(found["level"].values.tolist())
+        ]
+    # As rare as three standard errors in all comparisons together. Student's t, because standard errors over few
+    # landscapes are uncertain themselves.
+    share = stats.norm.sf(_SURE) / (_DECILES * len(parts))
+    sure = xr.DataArray(stats.t.isf(share, np.maximum(landscapes - 1, 1)), dims="decile")
+    for words, values, error, expected, small in parts:
+        miss = np.abs(values - expected)
+        bad = (miss > sure * error) & (miss > small)
+        if bad.any():
+            at = int(np.nanargmax(miss.where(bad).values))
+            texts.append(f"{words} {float(values[at]):.3g} ± {float(error[at]):.2g} in decile {at + 1}")
+        wrong |= bad
+    if texts:
+        warn(
+            f"the estimate of {name} is wrong in {int(wrong.sum())} of {_DECILES} deciles of the estimate: "
+            f"{', '.join(texts)}; see bias_by_estimate and coverage_by_estimate, and calibrate the method or train it "
+            "on landscapes like these"
+        )

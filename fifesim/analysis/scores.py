@@ -163,6 +163,17 @@ def grouped_sums(group, pit, *values, groups, bins):
     return np.stack(sums, axis=-1).reshape(rows, -1)
 
 
+def sums_by_group_and_decile(*arrays, groups, bins, kept):
+    """Sums by group, and sums of the error and of the kept values by each further kind of group, next to each other."""
+    kinds, (pit, *values) = arrays[: len(groups)], arrays[len(groups) :]
+    found = [grouped_sums(kinds[0], pit, *values, groups=groups[0], bins=bins)]
+    valid = np.logical_and.reduce([np.isfinite(each) for each in values])
+    for kind, count in zip(kinds[1:], groups[1:], strict=True):
+        kind, own = np.where(valid, kind, np.nan), (values[at] for at in (0, *kept))
+        found.append(grouped_sums(kind, pit, *own, groups=count, bins=0))
+    return np.hstack(found)
+
+
 def ratio_error(parts, counts):
     """
     Standard error of a ratio of sums over independent clusters of dependent pixels.

@@ -1,6 +1,9 @@
 """Scores against quadrature and brute force, also for labelled estimates with uncertainty."""
 
+import warnings
+
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from lazy import in_chunks
@@ -11,6 +14,9 @@ import fifesim
 from fifesim.analysis import scores
 
 LEVELS = [0.5, 0.8, 0.95]
+
+# The estimates of these tests are the truth plus an independent error, so that their highest values are too high.
+pytestmark = pytest.mark.filterwarnings("ignore:the estimate of lai is wrong")
 
 
 @pytest.mark.parametrize(("mean", "sd", "truth"), [(0.2, 1.2, -1.9), (-1.4, 0.3, 0.4), (1.0, 0.5, 1.0)])
@@ -121,6 +127,7 @@ def test_groups_are_scored_separately(estimate, truth):
     found = estimate.fifesim.score(truth, by)
     assert found.cover.values.tolist() == [3, 7]
     west = estimate.isel(x=slice(10)).fifesim.score(truth.isel(x=slice(10)))
+    west = west[list(found.data_vars)]
     xr.testing.assert_allclose(found.isel(cover=0, drop=True), west, rtol=1e-12)
     # Pixels of no class are left out.
     some = estimate.fifesim.score(truth, xr.where(truth["x"] < 300, 3.0, np.nan).rename("cover"))
@@ -135,6 +142,62 @@ def test_groups_are_scored_separately(estimate, truth):
     # The upper edge belongs to the last bin.
     edge = xr.DataArray([[0.0, 1.0, 2.0]], dims=("y", "x"), name="lai", coords={"y": [0.0], "x": [0.0, 30.0, 60.0]})
     assert fifesim.score(edge.expand_dims("pixel"), edge.expand_dims("pixel"), [0, 1, 2]).n.values.tolist() == [1, 2]
+
+
+def test_deciles_and_slope_agree_with_brute_force(estimate, truth):
+    # No edge of a decile is a value of one of 8998 pixels.
+    truth = truth.where((truth.x > 0) | (truth.y > 0) | (truth.landscape > 0))
+    found, known = estimate.fifesim.score(truth), np.isfinite(truth.values)
+    value, true, landscape = estimate["lai"].values[known], truth.values[known], np.nonzero(known)[0]
+    assert float(found.slope) == pytest.approx(np.polyfit(value, true, 1)[0], rel=1e-9)
+    error, half = value - true, 0.25 * norm.ppf(0.9)
+    for kind, values in (("estimate", value), ("truth", true)):
+        number = pd.qcut(values, 10, labels=False)
+        for decile in range(10):
+            at = number == decile
+            own = found.sel(decile=decile + 1)
+            assert float(own[f"bias_by_{kind}"]) == pytest.approx(error[at].mean(), rel=1e-9)
+            inside = (np.abs(error) <= half)[at]
+            assert float(own[f"coverage_by_{kind}"].sel(level=0.8)) == pytest.approx(inside.mean(), rel=1e-9)
+            sums, counts = (np.bincount(landscape[at], each, 12) for each in (error[at], None))
+            assert float(own[f"bias_by_{kind}_se"]) == pytest.approx(scores.ratio_error(sums, counts), rel=1e-9)
+    # High estimates are too high because of their error, and high truths are missed.
+    assert float(found.bias_by_estimate[-1]) > 0.15 and float(found.bias_by_truth[-1]) == pytest.approx(0.05, abs=0.03)
+
+
+def drawn_estimates(rng, slope=1.0, spread=0.0):
+    """Expected truth of pixels whose error is partly common to a landscape, times a slope, and normal intervals."""
+    mean = rng.normal(0, 1, (20, 200))
+    sd = 0.5 * np.exp(spread * mean)
+    error = sd * (rng.normal(0, 0.4, (20, 1)) + rng.normal(0, np.sqrt(1 - 0.16), mean.shape))
+    maps = {"lai": 3 + mean * slope} | {end: 3 + mean * slope + side * half for end, side, half in (
+        ("low", -1, 0.5 * norm.ppf(0.9)), ("high", 1, 0.5 * norm.ppf(0.9)))}  # fmt: skip
+    dims = ("landscape", "pixel")
+    truth = xr.DataArray(3 + mean + error, dims=dims, name="lai")
+    return xr.Dataset({name: (dims, each) for name, each in maps.items()}, {"level": 0.8}), truth
+
+
+@pytest.mark.filterwarnings("default:the estimate of lai is wrong")
+def test_wrong_deciles_give_a_warning_without_false_alarms():
+    rng, alarms = np.random.default_rng(6), 0
+    for _ in range(60):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            found = fifesim.score(*drawn_estimates(rng))
+        alarms += len(caught)
+    assert alarms == 0
+    assert float(found.bias_by_truth[0]) > 0.2 and float(found.bias_by_truth[-1]) < -0.2
+    with pytest.warns(UserWarning, match=r"estimate of lai is wrong in \d+ of 10 deciles.*bias -0\.\d+ ± .* decile 10"):
+        fifesim.score(*drawn_estimates(rng, slope=0.6))
+    with pytest.warns(UserWarning, match=r"estimate: coverage of the 80 % interval 0\.\d+ ± 0\.\d+ in decile 10"):
+        found = fifesim.score(*drawn_estimates(rng, spread=0.4))
+    assert abs(found.coverage.item() - 0.8) < 0.06
+    estimate, truth = drawn_estimates(rng, slope=0.6)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # Dependence of the pixels is unknown without landscapes, and the error of two landscapes is uncertain.
+        fifesim.score(estimate.rename(landscape="row"), truth.rename(landscape="row"))
+        fifesim.score(estimate.isel(landscape=slice(2)), truth.isel(landscape=slice(2)))
 
 
 def test_standard_errors_match_the_spread_over_redrawn_landscapes():
