@@ -96,7 +96,8 @@ def train(
     Warns
     -----
     UserWarning
-        If a part has fewer than 10 landscapes, as in the example below.
+        If a part has fewer than 10 landscapes, as in the example below, or if bias or coverage in a decile of the
+        estimate are significantly wrong on the part ``test``, see `fifesim.score`.
 
     Raises
     ------
