@@ -19,7 +19,7 @@ from fifesim.analysis.scaling import ndvi_hessian
 from fifesim.atmosphere.adjacency import environment_function, mixed_environment_function
 from fifesim.atmosphere.clouds.field import cloud_displacement
 from fifesim.atmosphere.clouds.labels import cloud_field
-from fifesim.atmosphere.clouds.layer import layer_light, two_stream_reflectance
+from fifesim.atmosphere.clouds.layer import drops_at, layer_light, two_stream_reflectance
 from fifesim.atmosphere.coupling import TargetTerms, inhomogeneous_reflectance
 from fifesim.atmosphere.engines import band_terms
 from fifesim.atmosphere.models import Atmosphere
@@ -269,8 +269,8 @@ def _cloud_shift(of, **place):
     return cloud_displacement(**place)[("shadow east", "shadow north", "image east", "image north").index(of)]
 
 
-def _cloud_layer(part, thickness, **light):
-    return getattr(layer_light(np.array([thickness]), **light), part).item()
+def _cloud_layer(part, thickness, wavelength, **angles):
+    return getattr(layer_light(np.array([thickness]), drops_at(wavelength), **angles), part).item()
 
 
 # ---------------------------------------------------------------------------------------------------------- Sensor

@@ -84,8 +84,8 @@ figure.colorbar(shown, ax=axes, label="NDVI less clear nadir view", shrink=0.8)
 
 # %%
 # With more dates the maximum rises above the clear view at nadir, and its views are forward: the sensor faces the sun.
-# The figure shows means over 40 random choices of dates. One date lies 0.04 below the truth, with a standard deviation
-# of 0.05; 14 dates lie 0.03 above it. With clouds that reflect their albedo in all directions
+# The figure shows means over 40 random choices of dates. One date lies 0.05 below the truth, with a standard deviation
+# of 0.06; 14 dates lie 0.03 above it. With clouds that reflect their albedo in all directions
 # (`two_stream_reflectance`), one date would lie 0.07 below: thin clouds scatter mostly forward.
 
 

@@ -462,7 +462,7 @@ def cloud_tables(atmosphere, bands, geometry):
     """Tables of `layer.under_clouds` for an atmosphere, bands and one direction of sun and sensor."""
     terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
     return layer.sky_tables(
-        [layer.band_co_albedo(band) for band in bands],
+        [layer.band_drops(band) for band in bands],
         terms.gas_transmittance * terms.path_reflectance,
         terms.diffuse_fraction,
         [coupling.band_gas_transmittance(atmosphere, band, geometry, ("o3",)) for band in bands],

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_interp_spline
 
 from fifesim.atmosphere.clouds import THICKNESS
 from fifesim.atmosphere.column import wigner
@@ -14,8 +14,6 @@ from fifesim.base.bands import solar_irradiance_steps
 from fifesim.base.caches import cached
 from fifesim.base.geometry import scattering_angle_cosine
 
-ASYMMETRY = 0.85  # of drops in the visible and near infrared [Hansen1974]_ [1]
-DROP_RADIUS = 10e-4  # effective radius of drops in water clouds, as assumed by ISCCP [Rossow1999]_ [cm]
 THICKEST = THICKNESS.highest  # largest optical thickness in the table [1]
 
 
@@ -62,59 +60,6 @@ def two_stream_reflectance(optical_depth, asymmetry, ground=0.0):
     return reflected + (1 - reflected) ** 2 * ground / (1 - np.asarray(ground, float) * reflected)
 
 
-def drop_co_albedo(absorption, index, radius=DROP_RADIUS):
-    r"""
-    Share of the light meeting a large, weakly absorbing drop that is absorbed, over the light that it scatters.
-
-    .. math:: 1 - \omega = \frac{2}{3} n^2 \left[1 - (1 - n^{-2})^{3/2}\right] \kappa r
-
-    Parameters
-    ----------
-    absorption : array
-        Absorption coefficient of water, :math:`\kappa`. [cm-1]
-    index : array
-        Refractive index of water, :math:`n`. [1]
-    radius : float, optional
-        Effective radius of the drops, :math:`r`. [cm]
-
-    Returns
-    -------
-    co_albedo : array
-        One less the single scattering albedo :math:`\omega`. [1]
-
-    Notes
-    -----
-    The limit of geometrical optics for :math:`\kappa r \ll 1`, where the extinction is twice the cross section.
-
-    References
-    ----------
-    [Twomey1980]_
-
-    Examples
-    --------
-    With n = 1.33 the factor is 0.84:
-
-    >>> round(float(drop_co_albedo(1.0, 1.33, 1.0)), 2)
-    0.84
-    """
-    index = np.asarray(index, float)
-    return 2 / 3 * index**2 * (1 - (1 - index**-2.0) ** 1.5) * absorption * radius
-
-
-_NEGLIGIBLE = 1e-5  # co-albedo that changes no reflectance below thickness 100 by more than 0.4 % [1]
-
-
-@cached(64, "absorption by cloud drops")
-def band_co_albedo(band):
-    """Co-albedo of cloud drops in a band, to two digits so that bands share tables, and 0 if negligible. [1]"""
-    water, absorbing = files.table("water_index.csv"), files.table("prospect_d.csv")
-    wavelength = absorbing["wavelength"].to_numpy()
-    index = np.interp(wavelength, water["wavelength"], water["refractive_index"])
-    share = drop_co_albedo(absorbing["water"].to_numpy(), index)
-    mean = float(band.mean(share, wavelength, solar_irradiance_steps(wavelength)))
-    return 0.0 if mean < _NEGLIGIBLE else float(f"{mean:.1e}")
-
-
 class LayerLight(NamedTuple):
     """Light of a cloud layer by optical thickness, the last axis, for one sun and view. [1]"""
 
@@ -129,18 +74,85 @@ _ZENITHS = np.arange(0.0, 86.0, 5.0)  # [degree]
 _BY_ZENITH = CubicSpline(np.concatenate([-_ZENITHS[:0:-1], _ZENITHS]), np.eye(2 * _ZENITHS.size - 1))
 _STREAMS = 16  # directions per hemisphere
 _MODES = np.arange(2 * _STREAMS)  # Fourier modes in azimuth, and degrees of the phase function
-_PEAK = ASYMMETRY ** (2 * _STREAMS)  # share of the forward peak that counts as not scattered [1]
 _PER_OCTAVE = 3  # optical thicknesses in the table per doubling
 _THINNEST, _DOUBLINGS = 0.0125, 13  # thinnest layer in the table, and its doublings
-_FIRST = 18  # doublings up to this layer, from one so thin that it scatters once
+_FIRST = 10  # doublings up to this layer, from one so thin that light changes linearly within it
 
 
-def henyey_greenstein(cosine):
-    r"""Phase function :math:`(1 - g^2) / (1 + g^2 - 2 g \cos \Theta)^{3/2}` of the drops [Henyey1941]_. [1]"""
-    return (1 - ASYMMETRY**2) / (1 + ASYMMETRY**2 - 2 * ASYMMETRY * cosine) ** 1.5
+class Drops(NamedTuple):
+    """Scattering by the drops of clouds at one wavelength, or in one band."""
+
+    co_albedo: float  # one less the single scattering albedo [1]
+    peak: float  # share of the forward peak that counts as not scattered [1]
+    phase: CubicSpline  # phase function by scattering angle [degree], from 6 degrees on, mean over the sphere 1 [1]
+    row: int  # of `cloud_moments.csv`, by which light is scattered again
+    stretch: float  # thickness whose light is scattered again there over the thickness of these drops [1]
 
 
-def layer_light(optical_thickness, co_albedo, sza, vza, raa):
+_SHARED = np.array([0.4, 0.57])  # wavelengths whose tables bands without absorption share [um]
+
+
+def drops_at(wavelength):
+    """
+    Scattering by the drops of clouds at one wavelength, by Mie theory.
+
+    Parameters
+    ----------
+    wavelength : float
+        0.4 to 2.5. [um]
+
+    Returns
+    -------
+    drops : Drops
+
+    Notes
+    -----
+    Drops have a gamma distribution of sizes with the effective radius 10 um, as assumed by ISCCP, and the effective
+    variance 0.1. They scatter a rainbow at a scattering angle of 140 degrees and a glory at 180 degrees.
+
+    References
+    ----------
+    [Hansen1974]_, Eq. 2.56; [Rossow1999]_
+
+    Examples
+    --------
+    Rainbow, a minimum between, and glory in red light:
+
+    >>> drops_at(0.66).phase([140.0, 160.0, 180.0]).round(2).tolist()
+    [0.29, 0.13, 0.67]
+    """
+    return _drops(lambda values, known: make_interp_spline(known, values, k=1, axis=-1)(wavelength))
+
+
+@cached(64, "scattering by cloud drops")
+def band_drops(band):
+    """Scattering by the drops of clouds in a band, weighted with the solar irradiance."""
+    return _drops(lambda values, known: band.mean(values, known, solar_irradiance_steps(known)))
+
+
+_NEGLIGIBLE = 6e-6  # co-albedo that changes no reflectance below thickness 100 by more than 0.4 % [1]
+
+
+def _drops(mean):
+    """Scattering by drops, from a function for the mean of a spectrum."""
+    phase, table, water = (files.table(name) for name in ("cloud_phase.csv", "cloud_moments.csv", "prospect_d.csv"))
+    known, fine, absorption = (each.to_numpy() for each in (table["wavelength"], water["wavelength"], water["water"]))
+    wavelength, once, peak = (
+        float(mean(table[name].to_numpy(), known)) for name in ("wavelength", "moment_1", f"moment_{_MODES.size}")
+    )
+    # The absorption of water has bands narrower than the steps of the table, unlike the ratio of drops to water.
+    ratio = np.interp(fine, known, table["co_albedo"] / np.interp(known, fine, absorption))
+    absorbed = float(mean(ratio * absorption, fine))
+    # Two digits, so that bands share tables.
+    co_albedo = 0.0 if absorbed < _NEGLIGIBLE else float(f"{absorbed:.1e}")
+    shared = wavelength if co_albedo else _SHARED[np.argmin(np.abs(_SHARED - wavelength))]
+    row = int(np.argmin(np.abs(known - shared)))
+    function = CubicSpline(phase["angle"], mean(phase.to_numpy()[:, 1:], known))
+    # Layers of the same (1 - g) times thickness scatter alike [Liou2002]_.
+    return Drops(co_albedo, peak, function, row, (1 - once) / (1 - float(table.loc[row, "moment_1"])))
+
+
+def layer_light(optical_thickness, drops, sza, vza, raa):
     r"""
     Reflectance and transmittance of a layer of cloud drops, from a table made by doubling.
 
@@ -148,8 +160,7 @@ def layer_light(optical_thickness, co_albedo, sza, vza, raa):
     ----------
     optical_thickness : array, shape (n,)
         0 to 100. [1]
-    co_albedo : float
-        One less the single scattering albedo. [1]
+    drops : Drops
     sza, vza : float
         0 to 85. [degree]
     raa : float
@@ -162,33 +173,35 @@ def layer_light(optical_thickness, co_albedo, sza, vza, raa):
 
     Notes
     -----
-    Drops scatter by the function of Henyey and Greenstein with asymmetry 0.85, without rainbow and glory. Single
-    scattering is exact. The rest is a Fourier series in azimuth, interpolated by cubic splines over the zenith angles,
+    Single scattering is exact, with rainbow and glory. Light scattered again follows from the first 32 Legendre moments
+    of the phase function. It is a Fourier series in azimuth, interpolated by cubic splines over the zenith angles,
     every 5 degrees, and over the logarithm of the thickness, three per octave.
 
     References
     ----------
-    [Henyey1941]_; [Hansen1974]_, doubling; [Nakajima1988]_, single scattering
+    [Hansen1974]_, doubling; [Wiscombe1976]_, first layer; [Nakajima1988]_, single scattering
 
     Examples
     --------
     A thick cloud hides the ground and reflects most of the light:
 
-    >>> light = layer_light(np.array([0.0, 50.0]), 0.0, 30.0, 0.0, 0.0)
+    >>> light = layer_light(np.array([0.0, 50.0]), drops_at(0.55), 30.0, 0.0, 0.0)
     >>> light.reflectance.round(1).tolist(), light.transmittance_down.round(1).tolist()
     ([0.0, 0.9], [1.0, 0.2])
     """
-    thickness, table = np.asarray(optical_thickness, float), _table(co_albedo)
+    thickness, table = np.asarray(optical_thickness, float), _table(drops.co_albedo, drops.row)
     sun, view = _zenith_weights(sza), _zenith_weights(vza)
     # From the side of the sun, the azimuths of propagation differ by 180 degrees.
     turn = np.where(_MODES == 0, 1, 2) * np.cos(_MODES * np.radians(raa + 180))
     rescattered = np.einsum("tmvs,mv,ms,m->t", table.rescattered, view, sun, turn, optimize=True)
     down, up = table.transmittance @ sun[0], table.transmittance @ view[0]
     nodes = np.stack([rescattered, down, up, table.spherical_albedo, table.diffuse_transmittance], axis=1)
-    smooth = CubicSpline(_stretched(table.thickness), nodes)(_stretched(thickness)).T
+    spline = CubicSpline(_stretched(table.thickness), nodes)
+    again, fluxes = spline(_stretched(thickness * drops.stretch))[:, 0], spline(_stretched(thickness))[:, 1:]
     cosines = np.cos(np.radians(sza)), np.cos(np.radians(vza))
-    phase = henyey_greenstein(scattering_angle_cosine(sza, vza, raa))
-    return LayerLight(_scattered_once(thickness, co_albedo, *cosines, phase) + smooth[0], *smooth[1:])
+    phase = drops.phase(np.degrees(np.arccos(scattering_angle_cosine(sza, vza, raa))))
+    once = _scattered_once(thickness, drops.co_albedo, drops.peak, *cosines, phase)
+    return LayerLight(once + again, *fluxes.T)
 
 
 def _stretched(thickness):
@@ -204,9 +217,9 @@ def _zenith_weights(zenith):
     return weights[count - 1 :] + np.where(_MODES % 2 == 0, 1, -1)[:, None] * mirrored
 
 
-def _scattered_once(thickness, co_albedo, mu_s, mu_v, phase):
+def _scattered_once(thickness, co_albedo, peak, mu_s, mu_v, phase):
     """Reflectance by single scattering with the forward peak counted as not scattered. [1]"""
-    kept = 1 - (1 - co_albedo) * _PEAK
+    kept = 1 - (1 - co_albedo) * peak
     slant = -np.expm1(-(1 / mu_s + 1 / mu_v) * kept * thickness)
     return (1 - co_albedo) / kept * phase * slant / (4 * (mu_s + mu_v))
 
@@ -222,15 +235,18 @@ class _LayerTable(NamedTuple):
 
 
 @cached(32, "light of cloud layers")
-def _table(co_albedo):
-    """Table of cloud layers, from no cloud on, by doubling of a layer so thin that it scatters once."""
+def _table(co_albedo, row):
+    """Table of cloud layers, from no cloud on, by doubling, for the drops of a row of `cloud_moments.csv`."""
+    moments = files.table("cloud_moments.csv").loc[row, "moment_0":].to_numpy()
+    peak = moments[_MODES.size]
     points, gauss = (each[:_STREAMS] for each in quadrature(_STREAMS))
     # The zenith angles of the table have no weight in the integrals over the streams.
     mu = np.concatenate([np.cos(np.radians(_ZENITHS)), points])
     weights = np.concatenate([np.zeros(_ZENITHS.size), 2 * points * gauss])
-    backward, forward = _phase_modes(mu)
+    backward, forward = _phase_modes(mu, (2 * _MODES + 1) * (moments[:-1] - peak))
     thickness = _THINNEST * 2.0 ** (np.arange(_PER_OCTAVE) / _PER_OCTAVE - _FIRST)[:, None, None, None]
-    layer = _thin_layer(thickness, co_albedo, mu, backward, forward)
+    scattered = ((1 - co_albedo) * each / (4 * mu * mu[:, None]) for each in (backward, forward))
+    layer = _thin_layer(thickness, (1 - (1 - co_albedo) * peak) / mu, *scattered, weights)
     zeniths = _ZENITHS.size
     unscattered = np.zeros((1, _MODES.size, zeniths, zeniths)), np.ones((1, mu.size)), np.zeros((1, mu.size))
     found, depths = [unscattered], [np.zeros(1)]
@@ -238,7 +254,7 @@ def _table(co_albedo):
         layer, thickness = _twice(*layer, weights), 2 * thickness
         if number >= _FIRST - 1:
             reflectance, transmittance, direct = layer
-            once = _scattered_once(thickness, co_albedo, mu, mu[:, None], backward)
+            once = _scattered_once(thickness, co_albedo, peak, mu, mu[:, None], backward)
             passed, reflected = (weights @ each[:, 0] for each in (transmittance, reflectance))
             found.append(((reflectance - once)[..., :zeniths, :zeniths], direct[:, 0, 0] + passed, reflected))
             depths.append(thickness[:, 0, 0, 0])
@@ -246,21 +262,27 @@ def _table(co_albedo):
     return _LayerTable(np.concatenate(depths), rescattered, passed[:, :zeniths], passed @ weights, reflected @ weights)
 
 
-def _phase_modes(mu):
-    """Fourier modes of the phase function without its forward peak, backward and forward, shape (mode, mu, mu). [1]"""
-    moments = (2 * _MODES + 1) * (ASYMMETRY**_MODES - _PEAK)
+def _phase_modes(mu, moments):
+    """Fourier modes of a phase function, backward and forward, shape (mode, mu, mu), from its Legendre series. [1]"""
     functions = np.array([wigner(mode, 0, mu, _MODES.size) for mode in _MODES])
     signs = np.where((_MODES + _MODES[:, None]) % 2 == 0, 1, -1)[:, None]
     across = np.swapaxes(functions, 1, 2) * moments
     return (across * signs) @ functions, across @ functions
 
 
-def _thin_layer(thickness, co_albedo, mu, backward, forward):
-    """Diffuse reflectance and transmittance of a layer that scatters once, and its direct transmittance. [1]"""
-    kept = 1 - (1 - co_albedo) * _PEAK
-    direct = np.exp(-kept * thickness / mu)
-    passed = (1 - co_albedo) * thickness * forward / (4 * mu * mu[:, None]) * direct
-    return _scattered_once(thickness, co_albedo, mu, mu[:, None], backward), passed, direct
+def _thin_layer(thickness, lost, backward, forward, weights):
+    """
+    Diffuse reflectance and transmittance of a thin layer, and its direct transmittance, by [Wiscombe1976]_. [1]
+
+    Light within the layer is the mean of the light at both sides, which conserves energy.
+    """
+    half, one = thickness / 2, np.eye(weights.size)
+    kept = 1 / (1 + half * lost)
+    backward, forward = half * backward, half * forward
+    returned = np.linalg.solve(one / kept - forward * weights, backward)
+    again = forward + (backward * weights) @ returned
+    within = np.linalg.solve(one / kept - again * weights, again * kept)
+    return 2 * (returned * kept + (returned * weights) @ within), 2 * within, 2 * kept - 1
 
 
 def _twice(reflectance, transmittance, direct, weights):
@@ -277,8 +299,9 @@ def _twice(reflectance, transmittance, direct, weights):
 class CloudTables(NamedTuple):
     """Tables of the clouds of one scene, for `under_clouds`. [1]"""
 
-    light: np.ndarray  # fields of `LayerLight` on steps of thickness, shape (kind of drops, field, step)
-    kind: np.ndarray  # of each band, shape (band,)
+    reflectance: np.ndarray  # by steps of thickness, shape (band, step)
+    fluxes: np.ndarray  # the other fields of `LayerLight`, shape (band, field, step)
+    kind: np.ndarray  # first band with the same fluxes, shape (band,)
     path: np.ndarray  # apparent reflectance of the atmosphere over black ground, shape (band,)
     diffuse_fraction: np.ndarray  # of the irradiance without clouds, shape (band,)
     ozone: np.ndarray  # transmittance of the ozone above the clouds, down and up, shape (band,)
@@ -288,17 +311,20 @@ _STEPS = 2000  # of the root of the thickness, which interpolate reflectance to 
 _PER_ROOT = _STEPS / THICKEST**0.5
 
 
-def sky_tables(co_albedos, path, diffuse_fraction, ozone, sza, vza, raa):
+def sky_tables(drops, path, diffuse_fraction, ozone, sza, vza, raa):
     """Tables of `under_clouds` for each band; ozone, which lies above the clouds, dims the light that they reflect."""
-    kinds, kind = np.unique(co_albedos, return_inverse=True)
-    light = np.array([_steps(float(each), sza, vza, raa) for each in kinds])
-    return CloudTables(light, kind, *(np.asarray(each, float) for each in (path, diffuse_fraction, ozone)))
+    light = np.array([_steps(each, sza, vza, raa) for each in drops])
+    tables = [(each.co_albedo, each.row) for each in drops]
+    kind = np.array([tables.index(each) for each in tables])
+    return CloudTables(
+        light[:, 0], light[:, 1:], kind, *(np.asarray(each, float) for each in (path, diffuse_fraction, ozone))
+    )
 
 
-def _steps(co_albedo, sza, vza, raa):
+def _steps(drops, sza, vza, raa):
     """Light of clouds at the steps of `CloudTables`, shape (field, step). [1]"""
     thickness = np.minimum((np.arange(_STEPS + 1) / _PER_ROOT) ** 2, THICKEST)
-    return np.array(layer_light(thickness, co_albedo, sza, vza, raa))
+    return np.array(layer_light(thickness, drops, sza, vza, raa))
 
 
 @jitable
@@ -412,14 +438,17 @@ def _cloud_rows(scene, first, seen, sunlit, overhead, at_nadir, sky, cell, step,
         for field in range(6):
             # Without clouds, reflectance and albedo are 0 and transmittances are 1, so the result is bitwise unchanged.
             light[field] = 0 if field in (0, 3) else 1
-        for kind in range(len(sky.light)):
-            table = sky.light[kind]
-            for field in range(4):
-                _look_up(table[field], cell[0, :v], step[0, :v], share[0, :v], light[field])
-            _look_up(table[1], cell[1, :s], step[1, :s], share[1, :s], light[4])
-            _look_up(table[4], cell[up, :o], step[up, :o], share[up, :o], light[5])
-            for b in range(len(scene)):
+        for kind in range(len(scene)):
+            if sky.kind[kind] != kind:
+                continue
+            table = sky.fluxes[kind]
+            for field in range(3):
+                _look_up(table[field], cell[0, :v], step[0, :v], share[0, :v], light[field + 1])
+            _look_up(table[0], cell[1, :s], step[1, :s], share[1, :s], light[4])
+            _look_up(table[3], cell[up, :o], step[up, :o], share[up, :o], light[5])
+            for b in range(kind, len(scene)):
                 if sky.kind[b] == kind:
+                    _look_up(sky.reflectance[b], cell[0, :v], step[0, :v], share[0, :v], light[0])
                     _cloud_row(scene[b, first + i], light, sky.path[b], sky.diffuse_fraction[b], sky.ozone[b])
     return False
 
