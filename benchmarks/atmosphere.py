@@ -30,7 +30,7 @@ def modis_year(count=24):
     """Seconds for a year of 365 dates of MODIS over the site with clouds, from some of its dates."""
     grid = fifesim.fife_site(30)
     lai = fifesim.lai_scene(grid, seed=7)
-    dates = fifesim.overpasses("MODIS", "2001-01-01T00:00Z", "2002-01-01T00:00Z", (39.06, -96.54))
+    dates = fifesim.sensor.overpasses("MODIS", "2001-01-01T00:00Z", "2002-01-01T00:00Z", (39.06, -96.54))
     dates = dates.isel(time=np.linspace(0, dates.sizes["time"] - 1, count).astype(int))
 
     def call():

@@ -191,14 +191,14 @@ def steps():
     thick = fifesim.Atmosphere(aerosol="urban", visibility=8, engine="successive-orders")
     coarse = fifesim.fife_site(30, window=((0, 27), (0, 27)))
     away = {"nadir_offset": -60e3, "heading": 193.6}
-    view = fifesim.scan_geometry("TM", lai.odc.geobox, **away).assign(sza=28.5, saa=117.0)
+    view = fifesim.sensor.scan_geometry("TM", lai.odc.geobox, **away).assign(sza=28.5, saa=117.0)
     swath = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=view).fifesim.to_toa()
     dates = np.array(["1987-05-01T16:35", "1987-07-10T16:35"], "M8[ns]")
     growing = lai * xr.DataArray([0.3, 1.2], coords={"time": dates}, dims="time")
     found = {
         "lai": lai,
         "lai, periodic": fifesim.lai_scene(lai.odc.geobox, arp=0.15, seed=7, method="periodic"),
-        "lai, downscaled": fifesim.downscale(truth, lai.odc.geobox, seed=7),
+        "lai, downscaled": fifesim.ground.downscale(truth, lai.odc.geobox, seed=7),
         "hills": dem,
         "slope": dem.fifesim.slope(),
         "aspect": dem.fifesim.aspect(),
@@ -225,7 +225,7 @@ def steps():
         "as_seen_by": rho.fifesim.as_seen_by("OLI", bands=["OLI4", "OLI5"]),
         "sense_swath": swath.fifesim.sense_swath("TM", **away),
         "season": growing.fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().fifesim.sense(),
-        "fields": xr.Dataset(fifesim.correlated_fields(coarse, {"soil": 0.24, "brown": 0.1}, seed=7)),
+        "fields": xr.Dataset(fifesim.ground.correlated_fields(coarse, {"soil": 0.24, "brown": 0.1}, seed=7)),
         "compare": fifesim.compare(lai, ["TM", "OLI"]),
     }
     return {key: value for name, result in found.items() for key, value in of_result(name, result).items()}
@@ -263,11 +263,11 @@ def landscapes():
     """A landscape of classes and drawn fields, through the chain."""
     _, dem, _ = ground()
     fields = {
-        "soil": fifesim.Field(sd=0.03, arp=0.05, coarser=4),
-        "brown": fifesim.Field(mean=0.15, sd=0.06, arp=0.05, coarser=4),
-        "moisture": fifesim.Field(mean=0.25, sd=0.08, arp=0.242, coarser=4),
+        "soil": fifesim.ground.Field(sd=0.03, arp=0.05, coarser=4),
+        "brown": fifesim.ground.Field(mean=0.15, sd=0.06, arp=0.05, coarser=4),
+        "moisture": fifesim.ground.Field(mean=0.25, sd=0.08, arp=0.242, coarser=4),
     }
-    patches, covary = fifesim.Patches("voronoi", size=200), {"wetness": 0.4, "soil": -0.3}
+    patches, covary = fifesim.ground.Patches("voronoi", size=200), {"wetness": 0.4, "soil": -0.3}
     land = fifesim.landscape(dem.odc.geobox, cover=patches, **fields, covary=covary, dem=dem, seed=7)
     rho = land.fifesim.surface_reflectance("MSI", bands=["MSI4", "MSI8"], dem=dem)
     found = of_result("landscape", land) | of_result("landscape, truth", land.fifesim.aggregate(30))
@@ -298,7 +298,7 @@ def experiments():
         grid={"width": 900, "height": 900}, sensor={"instrument": "L4TM", "offset": [0.2, 0.0], "noise": ["all"]}
     )
     found |= of_result("budget, L4TM", fifesim.budget(scenario, realisations=2, cells=120))
-    found |= of_result("sweep", fifesim.sweep(scenario, {"arp": [0.05, 0.24], "visibility": [10, 45]}))
+    found |= of_result("sweep", fifesim.scenario.sweep(scenario, {"arp": [0.05, 0.24], "visibility": [10, 45]}))
     return found
 
 
@@ -307,9 +307,9 @@ def chips():
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "study.toml"
         path.write_text(STUDY, encoding="utf-8")
-        study = fifesim.read_study(path)
+        study = fifesim.scenario.read_study(path)
         found = of_result("dataset", fifesim.dataset(study, Path(folder) / "chips.zarr", n=20).load())
-    whole = fifesim.simulate(fifesim.chips_of(study, 20).scenario(4), complete=True)
+    whole = fifesim.simulate(fifesim.scenario.chips_of(study, 20).scenario(4), complete=True)
     for part in ("scene", "image", "truth"):
         found |= of_result(f"dataset, chip 4, {part}", whole[part].to_dataset())
     return found
@@ -319,7 +319,7 @@ def hashes():
     """All hashes by name."""
     parts = {name: partial(command, name) for name in COMMANDS}
     parts |= {part.__name__: part for part in (steps, canopies, landscapes, experiments, chips)}
-    parts |= {name: partial(instrument, name) for name in fifesim.instrument_names()}
+    parts |= {name: partial(instrument, name) for name in fifesim.sensor.instrument_names()}
     found = {}
     for name, part in parts.items():
         start = time.perf_counter()

@@ -33,7 +33,7 @@ def table(classes):
 def main():
     """Print a table of ratios."""
     grid = fifesim.fife_site(30 / 9, window=((0, CELLS), (0, CELLS)))
-    patches = fifesim.Patches("voronoi", 300)
+    patches = fifesim.ground.Patches("voronoi", 300)
     found = {}
     for number in (1, 3, 20):
         classes = table(number)

@@ -23,11 +23,13 @@ def cases(cells):
     dem = fifesim.flint_hills(grid, seed=7)
     ground = of_elevation(dem, ["elevation", "wetness", "illumination"])
     lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7)
-    score = fifesim.correlated_fields(grid, {"soil": 0.24}, seed=7)["soil"]
+    score = fifesim.ground.correlated_fields(grid, {"soil": 0.24}, seed=7)["soil"]
     soil, moisture = 0.04 * score, 0.3 + 0.04 * score
 
     def fields(arps, correlations=None, covariates=None):
-        return lambda: fifesim.correlated_fields(grid, arps, correlations, seed=next(seeds), covariates=covariates)
+        return lambda: fifesim.ground.correlated_fields(
+            grid, arps, correlations, seed=next(seeds), covariates=covariates
+        )
 
     def reflectance(**properties):
         canopy = fifesim.Canopy(**properties)
@@ -43,7 +45,7 @@ def cases(cells):
         "leaf area that follows elevation": fields({"lai": 0.15}, {("lai", "elevation"): 0.3}, ground),
         "leaf area that follows three": fields({"lai": 0.15}, {"lai": follows}, ground),
         "three, and soil of two arps": fields(ARPS, {"lai": follows | {"soil": -0.4}}, ground),
-        "wetness": lambda: fifesim.wetness(dem),
+        "wetness": lambda: fifesim.terrain.wetness(dem),
         "reflectance, even soil": reflectance(),
         "reflectance, soil by cell": reflectance(soil=soil),
         "reflectance, moisture by cell": reflectance(moisture=moisture),

@@ -13,10 +13,10 @@ BANDS = ["TM3", "TM4"]
 CELLS, LAZY_CELLS = 2000, 4500
 
 FIELDS = {
-    "soil": fifesim.Field(sd=0.03, arp=0.05, coarser=4),
-    "brown": fifesim.Field(mean=0.15, sd=0.06, arp=0.05, coarser=4),
-    "crown_cover": fifesim.Field(mean=0.8, sd=0.1, arp=0.05, coarser=4),
-    "moisture": fifesim.Field(mean=0.25, sd=0.08, arp=0.05, coarser=4),
+    "soil": fifesim.ground.Field(sd=0.03, arp=0.05, coarser=4),
+    "brown": fifesim.ground.Field(mean=0.15, sd=0.06, arp=0.05, coarser=4),
+    "crown_cover": fifesim.ground.Field(mean=0.8, sd=0.1, arp=0.05, coarser=4),
+    "moisture": fifesim.ground.Field(mean=0.25, sd=0.08, arp=0.05, coarser=4),
 }
 COVARY = {"wetness": 0.4, "elevation": -0.2, "soil": -0.3}
 

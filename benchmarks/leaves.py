@@ -60,8 +60,8 @@ def main():
     for name, options in cases.items():
         spent = spent_on(options, exact=name.endswith("exact"))
         print(f"| {name} | {spent / floor:.3g} | {spent / lai.size * 1e6:.2g} |")
-    one = seconds(lambda: fifesim.canopy_spectra(canopies, "OLI", bands=SIX), 2)
-    jacobian = seconds(lambda: fifesim.canopy_spectra(canopies, "OLI", bands=SIX, derivatives=list(canopies)), 2)
+    one = seconds(lambda: fifesim.ground.canopy_spectra(canopies, "OLI", bands=SIX), 2)
+    jacobian = seconds(lambda: fifesim.ground.canopy_spectra(canopies, "OLI", bands=SIX, derivatives=list(canopies)), 2)
     work = f"{SPECTRA} uniform canopies in {len(SIX)} bands, {len(canopies)} quantities drawn"
     print(f"\n{work}: {one:.2g} s of processor time; with all derivatives {jacobian / one:.2g} times that")
 

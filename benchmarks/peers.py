@@ -51,7 +51,7 @@ class Work(NamedTuple):
 
 def ours_field(side):
     grid = grid_of(side)
-    return lambda: fifesim.correlated_fields(grid, {"lai": ARP}, seed=next(SEEDS))["lai"].values
+    return lambda: fifesim.ground.correlated_fields(grid, {"lai": ARP}, seed=next(SEEDS))["lai"].values
 
 
 def covariance_error(field, model):

@@ -3,8 +3,7 @@
 import re
 from importlib import import_module
 
-import fifesim
-from fifesim.accessor import PUBLIC
+from fifesim.accessor import PUBLIC, find
 
 _PATH = re.compile(r"\bfifesim(?:\.\w+)*\.(\w+)\.(\w+)\b")
 _MODULE = re.compile(r"(?<![`.\w])`?\b(\w+)\.([A-Z]\w+)\b(?=`?)")
@@ -49,16 +48,16 @@ def _public(found):
         inner = getattr(import_module(path), name, None)
     except ImportError:
         return found[0]
-    outer = getattr(fifesim, name)
+    outer = find(name)
     same = inner is outer or inner is getattr(outer, "__wrapped__", None)
-    return f"fifesim.{name}" if same else found[0]
+    return PUBLIC[name].path if same else found[0]
 
 
 def _of_module(found):
     """A class of the package by its module's last name, `models.Atmosphere`."""
     if found[0].startswith("`") or found[2] not in PUBLIC:
         return found[0]
-    return f"fifesim.{found[2]}"
+    return PUBLIC[found[2]].path
 
 
 def raised(line):

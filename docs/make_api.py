@@ -1,14 +1,10 @@
 """Write the page of the public names, by group, from the table of the package."""
 
-from itertools import groupby
 from pathlib import Path
 
 from fifesim.accessor import PUBLIC
 
 PAGE = Path(__file__).parent / "api" / "functions.rst"
-
-# Functions of a module of the API that is public as a whole.
-_BESIDE = {"Atmosphere": ["atmosphere.spectrum"]}
 
 _HEAD = """Functions and classes
 =====================
@@ -29,10 +25,10 @@ def groups():
     -------
     groups : dict of str to list of str
     """
-    return {
-        group: list(dict(members))
-        for group, members in groupby(PUBLIC.items(), key=lambda item: item[1].group)
-    }
+    found = {}
+    for name, public in PUBLIC.items():
+        found.setdefault(public.group, []).append(name)
+    return found
 
 
 def functions():
@@ -47,7 +43,7 @@ def functions():
 
 
 def _group(group, names):
-    listed = "\n".join(f"   {name}" for name in names + _BESIDE.get(group, []))
+    listed = "\n".join(f"   {PUBLIC[name].path.removeprefix('fifesim.')}" for name in names)
     parts = [f"\n{group}\n{'-' * len(group)}\n", _SUMMARY.format(names=listed)]
     for kind, called in (("DataArray", "a raster"), ("DataTree", "the result of ``compare``")):
         if methods := [f"``{name}``" for name in names if kind in PUBLIC[name].methods_of]:
@@ -58,10 +54,8 @@ def _group(group, names):
 def write():
     """Write the page, and remove pages of names that are no longer public."""
     PAGE.parent.mkdir(exist_ok=True)
-    names = [
-        name for group, listed in groups().items() for name in listed + _BESIDE.get(group, [])
-    ]
+    names = {public.path for public in PUBLIC.values()}
     for page in PAGE.parent.rglob("*.rst"):
-        if page.stem.removeprefix("fifesim.") not in names:
+        if page.stem not in names:
             page.unlink()
     PAGE.write_text(functions(), encoding="utf-8")

@@ -12,4 +12,4 @@ def write():
     """Write the page unless it is newer than the package, because its 432 simulations take a minute."""
     newest = max(path.stat().st_mtime for path in PACKAGE.rglob("*") if path.suffix != ".pyc")
     if not PAGE.exists() or PAGE.stat().st_mtime < newest:
-        fifesim.explore(path=PAGE, overwrite=True)
+        fifesim.experiments.explore(path=PAGE, overwrite=True)

@@ -20,7 +20,7 @@ _FILE = Path(__file__).parent / "_static" / "scene_and_image.png"
 
 def run():
     """Image, its NDVI and the truth of a part of the ground of the default run, and the cells of a part of that."""
-    whole = fifesim.default_scenario()
+    whole = fifesim.scenario.default_scenario()
     grid = {"west": WEST, "north": NORTH, "width": WIDTH, "height": HEIGHT}
     tree = fifesim.simulate(
         whole.model_copy(update={"grid": whole.grid.model_copy(update=grid)})

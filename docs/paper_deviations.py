@@ -169,7 +169,7 @@ def sky(case):
 
 def facet(dem):
     """Factor of Eq. 5 at nadir, the cosine of the slope: at 20 degrees, and over the synthetic hills."""
-    cosine = np.cos(np.radians(fifesim.slope(dem).values))
+    cosine = np.cos(np.radians(fifesim.terrain.slope(dem).values))
     return {
         "at_20": np.cos(np.radians(20)),
         "mean": np.nanmean(cosine),

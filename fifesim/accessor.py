@@ -21,28 +21,44 @@ from fifesim.base.messages import nearest, spelled
 
 # One line of the table: where a name lives, and whether it is a method of a DataArray, of a Dataset too, or of a
 # DataTree instead.
-_LINE = re.compile(r"from \.([\w.]+) import (\w+) as \2(?:  # method(, of a Dataset too| of a DataTree)?)?")
+_LINE = re.compile(r"from (\.+)([\w.]+) import (\w+) as \3(?:  # method(, of a Dataset too| of a DataTree)?)?")
 _KINDS = {None: ("DataArray",), ", of a Dataset too": ("DataArray", "Dataset"), " of a DataTree": ("DataTree",)}
 
 
+NAMESPACES = (
+    *("ground", "terrain", "atmosphere", "sensor", "scaling"),
+    *("retrieval", "models", "output", "scenario", "experiments"),
+)
+"""Submodules with public names."""
+
+
 class Public(NamedTuple):
-    """Public name: its module, the kinds of raster with it as a method, and its group on the API page."""
+    """Public name: its module, the kinds of raster with it as a method, its group on the API page, and its path."""
 
     module: str
     methods_of: tuple[str, ...]
     group: str
+    namespace: str
+    path: str
 
 
 def _table():
-    """Public names of ``__init__.pyi``, by name."""
-    found, group = {}, ""
-    for line in Path(__file__).with_name("__init__.pyi").read_text(encoding="utf-8").splitlines():
-        if line.startswith("# "):
-            group = line[2:]
-        elif match := _LINE.fullmatch(line):
-            module, name, which = match.groups()
-            methods_of = _KINDS[which] if "  # method" in line else ()
-            found[name] = Public(f"fifesim.{module}", methods_of, group)
+    """Public names of ``__init__.pyi`` and of the stubs of the submodules, by name."""
+    found, package = {}, Path(__file__).parent
+    for namespace in ("", *NAMESPACES):
+        folder = package / namespace
+        stub = folder / "__init__.pyi" if folder.is_dir() else folder.with_suffix(".pyi")
+        inside, group = ("fifesim", namespace)[: 2 if namespace and folder.is_dir() else 1], ""
+        for line in stub.read_text(encoding="utf-8").splitlines():
+            if line.startswith("# "):
+                group = line[2:]
+            elif match := _LINE.fullmatch(line):
+                dots, module, name, which = match.groups()
+                methods_of = _KINDS[which] if "  # method" in line else ()
+                module = ".".join([*inside[: len(inside) + 1 - len(dots)], module])
+                found[name] = Public(
+                    module, methods_of, group, namespace, ".".join(filter(None, ("fifesim", namespace, name)))
+                )
     return found
 
 
@@ -67,8 +83,20 @@ def find(name):
     # Importing it is slow.
     function = checked(found, import_module("fifesim.grids.inputs").opened)
     # Pickle looks a function up where it says that it lives.
-    function.__module__, function.__qualname__ = "fifesim", name
+    function.__module__, function.__qualname__ = PUBLIC[name].path.rpartition(".")[0], name
     return function
+
+
+def namespace_of(namespace):
+    """Functions ``__getattr__`` and ``__dir__`` of a submodule with public names."""
+    names = sorted(name for name, public in PUBLIC.items() if public.namespace == namespace)
+
+    def get(name):
+        if name not in names:
+            raise AttributeError(f"module 'fifesim.{namespace}' has no attribute {name!r}: {nearest(name, names)}")
+        return find(name)
+
+    return get, lambda: names
 
 
 # Classes below find the functions that draw them here.
@@ -96,7 +124,7 @@ class _Accessor:
         elif name in PUBLIC:
             kinds = " or ".join(f"an xarray.{kind}" for kind in PUBLIC[name].methods_of)
             what = f"a method of {kinds}" if kinds else "no method of a raster"
-            function = f"fifesim.{name} is the function"
+            function = f"{PUBLIC[name].path} is the function"
             if kinds and self.kind == "DataTree":
                 function = f"call it at each node, such as tree[path].dataset[name].fifesim.{name}(...)"
             elif "DataArray" in PUBLIC[name].methods_of:

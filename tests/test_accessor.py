@@ -11,9 +11,9 @@ import xarray as xr
 
 import fifesim
 from fifesim import accessor
-from fifesim.accessor import PUBLIC
+from fifesim.accessor import NAMESPACES, PUBLIC, find
 
-METHODS = {name: getattr(fifesim, name) for name, found in PUBLIC.items() if "DataArray" in found.methods_of}
+METHODS = {name: find(name) for name, found in PUBLIC.items() if "DataArray" in found.methods_of}
 
 
 def test_methods_are_the_public_functions(lai):
@@ -24,14 +24,31 @@ def test_methods_are_the_public_functions(lai):
 
 def test_every_line_of_the_stub_is_read():
     """A line of another form would define a name for editors but not for the package."""
-    table = Path(fifesim.__file__).with_name("__init__.pyi").read_text(encoding="utf-8")
-    assert len(re.findall(r"\nfrom \.\w", table)) == len(PUBLIC) == len(fifesim.__all__) - 1
+    package = Path(fifesim.__file__).parent
+    stubs = [*package.glob("*.pyi"), *package.glob("*/__init__.pyi")]
+    assert sum(len(re.findall(r"\nfrom \.+\w", stub.read_text(encoding="utf-8"))) for stub in stubs) == len(PUBLIC)
+    listed = {f"fifesim.{space}.{name}" for space in NAMESPACES for name in dir(getattr(fifesim, space))}
+    own = {f"fifesim.{name}" for name in {*fifesim.__all__} - {*NAMESPACES, "__version__"}}
+    assert listed | own == {public.path for public in PUBLIC.values()}
+
+
+def test_the_package_itself_has_at_most_60_names():
+    assert len(fifesim.__all__) - len(NAMESPACES) <= 60
+
+
+def test_moved_names_still_work_with_a_warning():
+    for name, public in PUBLIC.items():
+        if public.namespace:
+            with pytest.warns(FutureWarning, match=re.escape(f"fifesim.{name} is now {public.path}:")):
+                assert getattr(fifesim, name) is find(name)
+    with pytest.raises(AttributeError, match=r"module 'fifesim\.terrain' has no attribute 'slop'"):
+        _ = fifesim.terrain.slop
 
 
 def test_only_functions_of_rasters_are_methods():
     """A function is a method if its first parameter is documented as a raster."""
     for name, found in PUBLIC.items():
-        function = getattr(fifesim, name)
+        function = find(name)
         if not inspect.isfunction(function):
             assert not found.methods_of
             continue
@@ -44,7 +61,7 @@ def test_only_functions_of_rasters_are_methods():
 def test_stub_names_the_defining_module():
     """The stub gives the module that defines the name or is meant for its import."""
     for name, found in PUBLIC.items():
-        defined = getattr(inspect.unwrap(getattr(fifesim, name)), "__module__", found.module)
+        defined = getattr(inspect.unwrap(find(name)), "__module__", found.module)
         assert defined == found.module or not defined.startswith("fifesim"), name
 
 
@@ -58,7 +75,7 @@ def test_accessors_of_classes_datasets_and_trees_have_their_functions(lai):
     assert accessor.DataArrayAccessor.fpar is fifesim.fpar
     assert lai.to_dataset(name="lai").fifesim.to_geotiff.__func__ is fifesim.to_geotiff
     tree = xr.DataTree.from_dict({"/TM": lai.to_dataset(name="lai")})
-    assert tree.fifesim.comparison_table.__func__ is fifesim.comparison_table
+    assert tree.fifesim.comparison_table.__func__ is fifesim.sensor.comparison_table
     assert tree.fifesim.comparison_table.__self__ is tree
 
 

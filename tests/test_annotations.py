@@ -13,7 +13,7 @@ import pytest
 import typed_use
 
 import fifesim
-from fifesim.accessor import PUBLIC
+from fifesim.accessor import PUBLIC, find
 
 ROOT = Path(__file__).parents[1]
 
@@ -28,14 +28,14 @@ def methods(of, found):
             yield f"{of}.{each}", function
 
 
-FUNCTIONS = {"atmosphere.spectrum": fifesim.atmosphere.spectrum}
+FUNCTIONS = {}
 CLASSES = {}
 for public in PUBLIC:
-    if inspect.isclass(getattr(fifesim, public)):
-        CLASSES[public] = getattr(fifesim, public)
+    if inspect.isclass(find(public)):
+        CLASSES[public] = find(public)
         FUNCTIONS |= dict(methods(public, CLASSES[public]))
     else:
-        FUNCTIONS[public] = inspect.unwrap(getattr(fifesim, public))
+        FUNCTIONS[public] = inspect.unwrap(find(public))
 
 
 def test_functions_and_fields_are_annotated():

@@ -141,7 +141,7 @@ def test_page_has_every_command_option_and_help_text(tables):
 def test_page_has_a_source_for_every_instrument_value(tables):
     page = tables.instruments()
     found = {name.partition("\n")[0]: text for name, text in sections(page).items()}
-    for name in fifesim.instrument_names():
+    for name in fifesim.sensor.instrument_names():
         item, text = fifesim.instrument(name), found[name]
         by_quantity = rows(text)
         for number in tables.given_numbers(item):

@@ -115,7 +115,7 @@ def camera(altitude="705000.0", gsd="30", bits="12", center="0.668", width="0.01
     band = f'name = "red", center = {center}, width = {width}, snr = {snr}, snr_radiance = 100.0{more}'
     text = f'name = "Camera"\naltitude = {altitude}\ngsd = {gsd}\n{bits}bands = [{{ {band} }}]\n'
     Path("camera.toml").write_text(text)
-    return fifesim.read_instrument("camera.toml")
+    return fifesim.sensor.read_instrument("camera.toml")
 
 
 def simulate(**sections):
@@ -138,7 +138,7 @@ def canopy(**options):
 
 def fine(arp=0.2, **options):
     """LAI of the cells, downscaled from the truth."""
-    return fifesim.downscale(shared()["truth"], shared()["grid"], arp=arp, seed=7, **options)
+    return fifesim.ground.downscale(shared()["truth"], shared()["grid"], arp=arp, seed=7, **options)
 
 
 def own_lai():

@@ -18,7 +18,7 @@ import fifesim
 grid = fifesim.fife_site(cell=30 / 9, window=((1800, 2700), (900, 1800)))
 dem = fifesim.flint_hills(grid, seed=7)
 land = fifesim.landscape(
-    grid, soil=fifesim.Field(sd=0.03, arp=0.24), covary={"wetness": 0.5}, dem=dem, seed=7
+    grid, soil=fifesim.ground.Field(sd=0.03, arp=0.24), covary={"wetness": 0.5}, dem=dem, seed=7
 )
 land.lai.fifesim.plot()
 print(land)

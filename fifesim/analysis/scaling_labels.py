@@ -75,7 +75,7 @@ def scale_bias(
     >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
     >>> lai = fifesim.lai_scene(grid, seed=7)
     >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
-    >>> bias = fifesim.scale_bias(fifesim.ndvi, rho)["bias"]
+    >>> bias = fifesim.scaling.scale_bias(fifesim.ndvi, rho)["bias"]
     >>> bias.shape, bool((bias < 0.01).all())
     ((10, 10), True)
     """
@@ -124,7 +124,7 @@ def ndvi_bias(reflectance: xr.DataArray, pixel: Metres = 30.0) -> xr.DataArray:
     >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
     >>> lai = fifesim.lai_scene(grid, seed=7)
     >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
-    >>> simulated = fifesim.scale_bias(fifesim.ndvi, rho)["bias"]
+    >>> simulated = fifesim.scaling.scale_bias(fifesim.ndvi, rho)["bias"]
     >>> predicted = rho.fifesim.ndvi_bias()
     >>> bool(abs(predicted - simulated).max() < 1e-3)
     True

@@ -82,8 +82,8 @@ def read_aerosol(
     The amount of the aerosol is given as optical thickness:
 
     >>> import fifesim
-    >>> tables = fifesim.aerosol_tables("continental")
-    >>> haze = fifesim.read_aerosol(tables)
+    >>> tables = fifesim.atmosphere.aerosol_tables("continental")
+    >>> haze = fifesim.atmosphere.read_aerosol(tables)
     >>> fifesim.Atmosphere(aerosol=haze, aot=0.2).aot
     0.2
     """
@@ -130,7 +130,7 @@ def aerosol_tables(aerosol: AerosolMixture) -> xr.Dataset:
     Examples
     --------
     >>> import fifesim
-    >>> tables = fifesim.aerosol_tables("continental")
+    >>> tables = fifesim.atmosphere.aerosol_tables("continental")
     >>> tables.sizes["component"], sorted(tables.data_vars)
     (3, ['asymmetry', 'extinction', 'phase', 'polarization', 'single_scattering_albedo'])
     """

@@ -135,7 +135,7 @@ def known_aerosol(text):
     if text not in _KNOWN:
         raise ValueError(
             f"aerosol {text!r} is user-defined, and its tables have not been read in this session: "
-            f"read them first with fifesim.read_aerosol({text.partition('#')[0] + '.nc'!r})"
+            f"read them first with fifesim.atmosphere.read_aerosol({text.partition('#')[0] + '.nc'!r})"
         )
     return _KNOWN[text]
 

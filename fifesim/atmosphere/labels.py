@@ -10,10 +10,9 @@ import xarray as xr
 from fifesim.atmosphere import adjacency_labels, coupling, engines, gases, lookup
 from fifesim.atmosphere.coupling import on_wavelengths, spectral_nodes
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base.geometry import ANGLES, fife_geometry
+from fifesim.base.geometry import ANGLES, Geometry, fife_geometry
 from fifesim.grids import cf, chunks, directions, swaths
 from fifesim.grids import grid as grids
-from fifesim.grids.directions import Directions
 
 LONG_NAMES = {
     "path_reflectance": "reflectance of molecules and aerosol over a black ground, without gases",
@@ -29,7 +28,7 @@ LONG_NAMES = {
 }
 
 
-def spectrum(atmosphere: Atmosphere | None = None, geometry: Directions | None = None) -> xr.Dataset:
+def spectrum(atmosphere: Atmosphere | None = None, geometry: Geometry | None = None) -> xr.Dataset:
     """
     Spectral terms of an atmosphere: path reflectance, transmittances, spherical albedo and optical depths.
 

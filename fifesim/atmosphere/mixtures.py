@@ -155,14 +155,14 @@ def mixture(aerosol):
         If a model or a component is unknown, a fraction is negative, or their sum is not 1 within 1e-6.
     TypeError
         If the aerosol is neither text nor mapping, or a fraction is not a number; or it is a file or a Dataset, which
-        `fifesim.read_aerosol` takes.
+        `fifesim.atmosphere.read_aerosol` takes.
     """
     is_file = isinstance(aerosol, PurePath) or (isinstance(aerosol, str) and aerosol.endswith((".nc", ".csv")))
     # A Dataset is a mapping, too.
     if is_file or hasattr(aerosol, "data_vars"):
         raise TypeError(
-            "aerosol must be a text, a mapping or the result of fifesim.read_aerosol, got a Dataset or a file: "
-            "use aerosol=fifesim.read_aerosol(...)"
+            "aerosol must be a text, a mapping or the result of fifesim.atmosphere.read_aerosol, got a Dataset or a "
+            "file: use aerosol=fifesim.atmosphere.read_aerosol(...)"
         )
     if isinstance(aerosol, Mapping):
         return _checked_fractions(aerosol, aerosol)

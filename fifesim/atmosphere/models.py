@@ -73,7 +73,7 @@ class Atmosphere:
     aerosol : str, mapping or Aerosol, optional
         Optical properties of the aerosol: "continental", "maritime", "urban", "none", or a mixture by volume of dust,
         water_soluble, oceanic and soot, such as ``{"dust": 0.5, "water_soluble": 0.5}``; or a user-defined aerosol from
-        `fifesim.read_aerosol`, which needs ``aot``.
+        `fifesim.atmosphere.read_aerosol`, which needs ``aot``.
     visibility : float, optional
         Meteorological range at the ground, 5 to 100; by default 45, unless ``aot`` is given. [km]
     altitude : float, optional

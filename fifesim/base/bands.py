@@ -153,7 +153,7 @@ class Band:
 
     Examples
     --------
-    >>> from fifesim import Band
+    >>> from fifesim.sensor import Band
     >>> round(Band("red", (0.62, 0.63, 0.68, 0.69), (0.0, 1.0, 1.0, 0.0)).center, 3)
     0.655
     """

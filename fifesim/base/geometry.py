@@ -72,7 +72,7 @@ class Geometry:
             if not is_a(getattr(self, name), "Dataset") and np.ndim(getattr(self, name)):
                 raise TypeError(
                     f"{name} of a Geometry is one number, got an array: angles by cell are an xarray.Dataset with sza, "
-                    "saa, vza and vaa, such as fifesim.scan_geometry(...).assign(sza=30.0, saa=120.0)"
+                    "saa, vza and vaa, such as fifesim.sensor.scan_geometry(...).assign(sza=30.0, saa=120.0)"
                 )
         check_fields(self)
         warn_of_radians(self.sza, self.saa)

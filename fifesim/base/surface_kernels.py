@@ -193,12 +193,12 @@ class RossLi:
 
     Examples
     --------
-    >>> from fifesim import RossLi
+    >>> from fifesim.ground import RossLi
     >>> RossLi(0.2, 0.1, 0.03).reflectance(0.0, 0.0, 0.0)
     array(0.2)
     """
 
-    _in_words: ClassVar[str] = "a fifesim.RossLi, such as fifesim.RossLi(0.2, 0.1, 0.03)"
+    _in_words: ClassVar[str] = "a fifesim.ground.RossLi, such as fifesim.ground.RossLi(0.2, 0.1, 0.03)"
 
     iso: Numbers
     vol: Numbers
@@ -238,12 +238,12 @@ class RPV:
 
     Examples
     --------
-    >>> from fifesim import RPV
+    >>> from fifesim.ground import RPV
     >>> RPV(0.2, 1.0, 0.0, 1.0).reflectance(30.0, 40.0, 90.0)
     array(0.2)
     """
 
-    _in_words: ClassVar[str] = "a fifesim.RPV, such as fifesim.RPV(0.1, 0.8, -0.1, 0.1)"
+    _in_words: ClassVar[str] = "a fifesim.ground.RPV, such as fifesim.ground.RPV(0.1, 0.8, -0.1, 0.1)"
 
     rho0: Numbers
     k: Numbers

@@ -348,7 +348,7 @@ def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands
     Examples
     --------
     >>> import fifesim
-    >>> lines = fifesim.spectral_adjustment("MSI", "OLI", bands=["OLI4"])
+    >>> lines = fifesim.sensor.spectral_adjustment("MSI", "OLI", bands=["OLI4"])
     >>> lines.source_band.item(), lines.slope.round(2).item()
     ('MSI4', 0.97)
     """

@@ -232,7 +232,8 @@ def compare_engines(
 
     Examples
     --------
-    >>> from fifesim import Atmosphere, Setup, compare_engines
+    >>> from fifesim import Atmosphere, Setup
+    >>> from fifesim.atmosphere import compare_engines
     >>> haze = Setup(atmosphere=Atmosphere(visibility=8), bands=("TM3", "TM4"))
     >>> compare_engines(haze, engines=["5S"])["toa_reflectance"].dims
     ('engine', 'band')

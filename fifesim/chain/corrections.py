@@ -284,7 +284,7 @@ def brdf_normalise(
     >>> lai = fifesim.lai_scene(grid, seed=7)
     >>> slant = fifesim.Geometry(sza=30, saa=117, vza=30, vaa=117)
     >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM4"], geometry=slant)
-    >>> nadir = rho.fifesim.brdf_normalise(fifesim.RossLi(0.3, 0.15, 0.03))
+    >>> nadir = rho.fifesim.brdf_normalise(fifesim.ground.RossLi(0.3, 0.15, 0.03))
     >>> float(nadir.vza), bool((nadir < rho).all())
     (0.0, True)
     """

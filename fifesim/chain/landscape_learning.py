@@ -94,7 +94,7 @@ def learn_landscape(
 
     See Also
     --------
-    fifesim.compare_landscapes, fifesim.landscape
+    fifesim.ground.compare_landscapes, fifesim.landscape
 
     Examples
     --------

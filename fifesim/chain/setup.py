@@ -55,7 +55,7 @@ class Setup:
     adjacency, surroundings : optional
         As in `fifesim.to_toa`.
     clouds : xarray.Dataset, optional
-        Cloud field, as in `fifesim.cast_clouds`; the same sky for all instruments.
+        Cloud field, as in `fifesim.atmosphere.cast_clouds`; the same sky for all instruments.
     onto, interval, offset, min_valid : optional
         Position of pixels and minimum valid fraction, as in `fifesim.sense`.
     noise, noise_models, seed, quantise : optional

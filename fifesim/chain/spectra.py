@@ -98,7 +98,7 @@ def canopy_spectra(
     Examples
     --------
     >>> import fifesim
-    >>> found = fifesim.canopy_spectra(
+    >>> found = fifesim.ground.canopy_spectra(
     ...     {"lai": [0.5, 2.0]}, "TM", bands=["TM3", "TM4"], geometry=fifesim.fife_geometry(), derivatives=["lai"]
     ... )
     >>> found.reflectance.round(3).values.tolist()

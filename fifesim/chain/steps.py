@@ -53,13 +53,13 @@ _NARROW = 0.0025
 
 # Ground below an atmosphere.
 GROUND = Kind(
-    "an xarray.DataArray, an xarray.Dataset, a fifesim.RossLi or a fifesim.RPV",
+    "an xarray.DataArray, an xarray.Dataset, a fifesim.ground.RossLi or a fifesim.ground.RPV",
     lambda value: isinstance(value, xr.DataArray | xr.Dataset | RossLi | RPV),
     dimensions=2,
 )
 # Ground whose directional shape is known.
 KNOWN_SHAPE = Kind(
-    "a fifesim.RossLi, a fifesim.RPV or a fifesim.Canopy",
+    "a fifesim.ground.RossLi, a fifesim.ground.RPV or a fifesim.Canopy",
     lambda value: isinstance(value, RossLi | RPV | Canopy),
     dimensions=2,
 )

@@ -296,14 +296,14 @@ def explore(scenario: Scenario | None = None, path: FilePath = "explore.html", *
 
     See Also
     --------
-    fifesim.budget, fifesim.sweep
+    fifesim.budget, fifesim.scenario.sweep
 
     Examples
     --------
     Some minutes of simulations:
 
     >>> import fifesim
-    >>> fifesim.explore(fifesim.Scenario(), "mine.html")  # doctest: +SKIP
+    >>> fifesim.experiments.explore(fifesim.Scenario(), "mine.html")  # doctest: +SKIP
     """
     path = Path(path)
     check_file(path, overwrite)

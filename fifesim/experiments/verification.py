@@ -97,7 +97,7 @@ def verify() -> list[Deviation]:
     Examples
     --------
     >>> import fifesim
-    >>> [each.what for each in fifesim.verify() if not each.within]  # doctest: +SKIP
+    >>> [each.what for each in fifesim.experiments.verify() if not each.within]  # doctest: +SKIP
     []
     """
     rows = list(files.table("verification.csv").itertuples(index=False))

@@ -372,7 +372,7 @@ def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time,
             warn(
                 f"the weather over {area.name or 'the raster'} is unknown: using an assumed June day of the FIFE site, "
                 f"{weather.temperature:g} K, {weather.shortwave:g} W m-2 and {weather.day_length:g} h; give "
-                "weather=fifesim.Weather(...)"
+                "weather=fifesim.models.Weather(...)"
             )
     if model.of_green_leaves and fpar is not None:
         raise ValueError(f"fpar has no effect with model={name!r}, which takes leaf area: leave it out")

@@ -116,7 +116,7 @@ class Weather(ByValue):
 
     Examples
     --------
-    >>> from fifesim import fife_weather
+    >>> from fifesim.models import fife_weather
     >>> fife_weather().replace(humidity=0.4).humidity
     0.4
     >>> fife_weather().replace(temperature=25.0)
@@ -225,7 +225,7 @@ def fife_weather() -> Weather:
 
     Examples
     --------
-    >>> from fifesim import fife_weather
+    >>> from fifesim.models import fife_weather
     >>> fife_weather().temperature
     300.0
     """

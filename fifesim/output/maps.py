@@ -328,7 +328,7 @@ def write_style(path: FilePath, *, overwrite: bool = False) -> Path:
     >>> from tempfile import mkdtemp
     >>> import fifesim
     >>> lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 90), (0, 90))), seed=7)
-    >>> fifesim.write_style(lai.fifesim.to_geotiff(f"{mkdtemp()}/lai.tif")).name
+    >>> fifesim.output.write_style(lai.fifesim.to_geotiff(f"{mkdtemp()}/lai.tif")).name
     'lai.qml'
     """
     file, style = raster_file(path), Path(path).with_suffix(".qml")

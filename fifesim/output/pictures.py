@@ -161,7 +161,7 @@ def plot_fit(
     >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
     >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
     >>> truth, ndvi = lai.fifesim.aggregate(30), image.fifesim.ndvi()
-    >>> axes = fifesim.plot_fit(fifesim.regress(truth, ndvi), truth, ndvi)
+    >>> axes = fifesim.output.plot_fit(fifesim.regress(truth, ndvi), truth, ndvi)
     >>> axes.get_xlabel()
     'Normalized difference vegetation index'
     """
@@ -225,7 +225,7 @@ def plot_score(scores: Scored) -> Figure:
     >>> rng = np.random.default_rng(1)
     >>> truth = xr.DataArray(rng.normal(2, 1, (20, 500)), dims=("landscape", "pixel"), name="lai")
     >>> guess = truth + rng.normal(0, 0.3, truth.shape)
-    >>> figure = fifesim.plot_score(fifesim.score(xr.Dataset({"lai": guess, "sd": 0.3 + 0 * guess}), truth))
+    >>> figure = fifesim.output.plot_score(fifesim.score(xr.Dataset({"lai": guess, "sd": 0.3 + 0 * guess}), truth))
     >>> figure.axes[0].get_xlabel()
     'Probability of a value below the truth'
     """

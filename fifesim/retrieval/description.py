@@ -78,7 +78,7 @@ class _Description(BaseModel, extra="forbid", strict=True):
 @dataclass(frozen=True)
 class Retrieval:
     """
-    A trained retrieval, from `fifesim.train` or `fifesim.read_retrieval`.
+    A trained retrieval, from `fifesim.train` or `fifesim.retrieval.read_retrieval`.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ class Retrieval:
         ----------
         path : str or path
             Its name ends in ``.nc``. An existing file is replaced when the new one is complete. The NetCDF content is
-            followed by its SHA-256 checksum, which `fifesim.read_retrieval` compares.
+            followed by its SHA-256 checksum, which `fifesim.retrieval.read_retrieval` compares.
 
         Raises
         ------
@@ -240,7 +240,7 @@ def read_retrieval(path: FilePath) -> Retrieval:
     Examples
     --------
     >>> import fifesim
-    >>> retrieval = fifesim.read_retrieval("oli.nc")  # doctest: +SKIP
+    >>> retrieval = fifesim.retrieval.read_retrieval("oli.nc")  # doctest: +SKIP
     """
     name = in_a_line(str(path), 200)
     with reading("the retrieval", path):

@@ -109,7 +109,7 @@ def train(
 
     See Also
     --------
-    fifesim.retrieve, fifesim.read_retrieval, fifesim.dataset, fifesim.score
+    fifesim.retrieve, fifesim.retrieval.read_retrieval, fifesim.dataset, fifesim.score
 
     Examples
     --------

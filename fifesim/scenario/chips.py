@@ -146,7 +146,7 @@ def chips_of(study: Study, n: _Count) -> Chips:
     >>> import numpy as np
     >>> chip = fifesim.Scenario(grid={"width": 180, "height": 180}, terrain={"dem": "flat"})
     >>> study = fifesim.Study(chip, {"visibility": {"uniform": [10, 60]}}, landscapes=10)
-    >>> chips = fifesim.chips_of(study, 20)
+    >>> chips = fifesim.scenario.chips_of(study, 20)
     >>> np.bincount(chips.landscape).tolist()
     [2, 2, 2, 2, 2, 2, 2, 2, 2, 2]
     >>> drawn = chips.table()["atmosphere.visibility"]

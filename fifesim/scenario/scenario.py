@@ -202,7 +202,7 @@ class Scenario(Keys):
     (0.24, 45.0)
     """
 
-    _in_words: ClassVar[str] = "a fifesim.Scenario, as fifesim.read_scenario gives it"
+    _in_words: ClassVar[str] = "a fifesim.Scenario, as fifesim.scenario.read_scenario gives it"
     # Attributes of a chip beside the site, whose landscape continues that of a study on the site.
     _made_on: dict = PrivateAttr(default_factory=dict)
 
@@ -463,7 +463,7 @@ def default_scenario() -> Scenario:
     Examples
     --------
     >>> import fifesim
-    >>> sorted(fifesim.default_scenario().classes)
+    >>> sorted(fifesim.scenario.default_scenario().classes)
     ['burned-grazed', 'burned-ungrazed', 'unburned-ungrazed']
     """
     return read_scenario(files.path("fife.toml"))
@@ -508,7 +508,7 @@ def read_scenario(path: FilePath) -> Scenario:
     >>> import fifesim
     >>> path = Path(mkdtemp()) / "mine.toml"
     >>> _ = path.write_text("[ground]\\narp = 0.24\\n")
-    >>> fifesim.read_scenario(path).ground.arp
+    >>> fifesim.scenario.read_scenario(path).ground.arp
     0.24
     """
     values = with_false_colour(load_values(path))

@@ -47,9 +47,10 @@ class Study:
         Common values. Its grid has the size of a chip. The chips of a landscape are non-overlapping windows around this
         grid.
     draws : mapping
-        Distributions by key, with names as in `fifesim.sweep`: ``{"visibility": {"uniform": [10, 60]}, "ground.brown":
-        {"normal": [0.2, 0.1], "within": [0, 1]}}``. Other distributions are ``log-uniform``, ``integers`` and
-        ``choice``, optionally with ``weights``. ``arp`` is drawn once per landscape, other keys once per chip.
+        Distributions by key, with names as in `fifesim.scenario.sweep`: ``{"visibility": {"uniform": [10, 60]},
+        "ground.brown": {"normal": [0.2, 0.1], "within": [0, 1]}}``. Other distributions are ``log-uniform``,
+        ``integers`` and ``choice``, optionally with ``weights``. ``arp`` is drawn once per
+        landscape, other keys once per chip.
     sequence : {"sobol", "random"}, optional
         Sequence of points from which values are drawn.
     seed : int, optional
@@ -68,7 +69,7 @@ class Study:
 
     See Also
     --------
-    fifesim.chips_of, fifesim.dataset
+    fifesim.scenario.chips_of, fifesim.dataset
 
     Examples
     --------
@@ -170,7 +171,7 @@ def read_study(path: FilePath) -> Study:
 
     Examples
     --------
-    >>> from fifesim import read_study
+    >>> from fifesim.scenario import read_study
     >>> study = read_study("study.toml")  # doctest: +SKIP
     """
     return _study_of(load_values(path), Path(path).parent)

@@ -70,7 +70,8 @@ def sweep(
 
     Examples
     --------
-    >>> from fifesim import Scenario, sweep
+    >>> from fifesim import Scenario
+    >>> from fifesim.scenario import sweep
     >>> fit = sweep(Scenario(), {"arp": [0.05, 0.15, 0.24], "visibility": [10.0, 45.0]})
     >>> dict(fit.r2.sizes)
     {'arp': 3, 'visibility': 2, 'variable': 2}

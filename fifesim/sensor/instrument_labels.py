@@ -223,7 +223,7 @@ def psf(instrument: InstrumentLike = "TM", band: str | None = None, *, spacing: 
     Examples
     --------
     >>> import fifesim
-    >>> response = fifesim.psf("TM", "TM3", spacing=3.0)
+    >>> response = fifesim.sensor.psf("TM", "TM3", spacing=3.0)
     >>> round(float(response.sum()) * 3.0**2, 6)
     1.0
     """
@@ -284,7 +284,7 @@ def mtf(
     Examples
     --------
     >>> import fifesim
-    >>> transfer = fifesim.mtf("TM", ["TM3"], frequency=[0.0, 1 / 60])
+    >>> transfer = fifesim.sensor.mtf("TM", ["TM3"], frequency=[0.0, 1 / 60])
     >>> transfer.sel(direction="across").round(2).values
     array([[1.  , 0.28]])
     """
@@ -360,7 +360,7 @@ def noise_equivalent_radiance(instrument: InstrumentLike, band: str, radiance: N
     Examples
     --------
     >>> import fifesim
-    >>> round(fifesim.noise_equivalent_radiance("OLI", "OLI4", 22.0).item(), 3)
+    >>> round(fifesim.sensor.noise_equivalent_radiance("OLI", "OLI4", 22.0).item(), 3)
     0.096
     """
     return _noise_of(instrument, band).noise_equivalent_radiance(_checked(radiance))
@@ -391,7 +391,7 @@ def snr(instrument: InstrumentLike, band: str, radiance: Numbers) -> np.ndarray:
     Examples
     --------
     >>> import fifesim
-    >>> fifesim.snr("OLI", "OLI4", [22.0, 60.0]).round()
+    >>> fifesim.sensor.snr("OLI", "OLI4", [22.0, 60.0]).round()
     array([230., 510.])
     """
     return _noise_of(instrument, band).snr(_checked(radiance))

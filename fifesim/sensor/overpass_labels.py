@@ -71,7 +71,7 @@ def overpasses(
 
     >>> import fifesim
     >>> import numpy as np
-    >>> dates = fifesim.overpasses("TM", "1987-06-01T00:00Z", "1987-07-18T00:00Z", (39.06, -96.54))
+    >>> dates = fifesim.sensor.overpasses("TM", "1987-06-01T00:00Z", "1987-07-18T00:00Z", (39.06, -96.54))
     >>> (dates.time.diff("time").values / np.timedelta64(1, "D")).tolist()
     [16.0, 16.0]
     """
@@ -147,7 +147,7 @@ def to_gac(swath: Annotated[xr.DataArray, Kind("a swath of AVHRR, from sense_swa
     >>> import numpy as np
     >>> import xarray as xr
     >>> lines = xr.DataArray(np.arange(40.0).reshape(4, 10), dims=("line", "sample"))
-    >>> fifesim.to_gac(lines).values.tolist()
+    >>> fifesim.sensor.to_gac(lines).values.tolist()
     [[1.5, 6.5], [31.5, 36.5]]
     """
     if not {"line", "sample"} <= set(swath.dims) or swath.sizes["sample"] < 5:

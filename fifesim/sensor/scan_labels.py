@@ -83,7 +83,7 @@ def scan_geometry(
     Examples
     --------
     >>> import fifesim
-    >>> view = fifesim.scan_geometry("MODIS", fifesim.fife_site(500), nadir_offset=300_000)
+    >>> view = fifesim.sensor.scan_geometry("MODIS", fifesim.fife_site(500), nadir_offset=300_000)
     >>> view.vza.mean().round(0).item()
     26.0
     """
@@ -233,8 +233,9 @@ def _checked(means, vza, vaa, scan_vza, scan_vaa, tolerance, arguments):
     if np.any(apart > tolerance):
         raise ValueError(
             f"toa was computed for another view, vza {_span(vza)}, than the scan, vza {_span(scan_vza)}: "
-            f"up to {np.nanmax(apart):.1f} degrees apart. Compute it with geometry=fifesim.scan_geometry({arguments})"
-            ".assign(sza=..., saa=...), or give view_tolerance=180 if it does not depend on the view"
+            f"up to {np.nanmax(apart):.1f} degrees apart. Compute it with "
+            f"geometry=fifesim.sensor.scan_geometry({arguments}).assign(sza=..., saa=...), or "
+            "give view_tolerance=180 if it does not depend on the view"
         )
     return means
 
@@ -330,7 +331,7 @@ def sense_swath(
     geometry = at_pixels(geometry, pixels.row, pixels.column)
     means = _means(toa.transpose("band", "y", "x"), description, bands, pixels, min_valid)
     view = coordinates["vza"][1], coordinates["vaa"][1]
-    words = f"fifesim.Track({track.latitude:.4f}, {track.longitude:.4f}, {track.heading:.2f})"
+    words = f"fifesim.sensor.Track({track.latitude:.4f}, {track.longitude:.4f}, {track.heading:.2f})"
     means = seen_alike(means, geometry, view, view_tolerance, f"{description.name!r}, grid, {words}")
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, pixels.first, noise_models)
     image, along_band = recorded(radiance, description, bands, quantise)

@@ -149,7 +149,7 @@ def test_constant_of_level_ground_is_unknown():
 
 
 def test_brdf_normalise_converts_between_views():
-    land = fifesim.RossLi([0.1, 0.3], [0.05, 0.15], [0.01, 0.03])
+    land = fifesim.ground.RossLi([0.1, 0.3], [0.05, 0.15], [0.01, 0.03])
     slant = fifesim.Geometry(sza=40.0, saa=120.0, vza=35.0, vaa=300.0)
     nadir = fifesim.Geometry(sza=40.0, saa=120.0)
     level = scene().drop_vars(["sza", "saa", "vza", "vaa"])
@@ -160,18 +160,18 @@ def test_brdf_normalise_converts_between_views():
     np.testing.assert_allclose(found.fifesim.brdf_normalise(land, geometry=nadir, to=slant), seen, rtol=1e-12)
 
 
-ROSS = fifesim.RossLi(0.3, 0.1, 0.01)
+ROSS = fifesim.ground.RossLi(0.3, 0.1, 0.01)
 
 
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: check_surface(fifesim.RossLi(0.05, 0.19, 0.06)), r"sza .* vza .* raa"),
-        (lambda: check_surface(fifesim.RossLi([0.1, 1.1], 0.0, 0.0)), "more than it receives"),
+        (lambda: check_surface(fifesim.ground.RossLi(0.05, 0.19, 0.06)), r"sza .* vza .* raa"),
+        (lambda: check_surface(fifesim.ground.RossLi([0.1, 1.1], 0.0, 0.0)), "more than it receives"),
         (lambda: scene(DEM).fifesim.topographic_correction(DEM, "c", c=[0.1, 0.2, 0.3]), "c must be a number"),
         (lambda: scene(DEM).fifesim.topographic_correction(DEM, "minnaert", k={"TM3": 0.5}), "k has no number for TM4"),
         (
-            lambda: scene().fifesim.brdf_normalise(fifesim.RossLi(scene(), 0, 0)),
+            lambda: scene().fifesim.brdf_normalise(fifesim.ground.RossLi(scene(), 0, 0)),
             "iso must be a number, or one for",
         ),
         (lambda: scene().expand_dims(stream=2).fifesim.brdf_normalise(ROSS), "dimension stream"),

@@ -52,7 +52,7 @@ def test_equivalent_noise_of_a_line_matches_the_closed_form(scattered):
     Closed form, including the variation of the line within an increment; 900 pairs determine a deviation to 2.4 %.
     """
     lai, ndvi = scattered
-    found = fifesim.relative_equivalent_noise(lai, ndvi, 0.02)
+    found = fifesim.scaling.relative_equivalent_noise(lai, ndvi, 0.02)
     expected = np.hypot(0.03, 0.3 * 0.02 / np.sqrt(12)) / (0.3 * found["increment"])
     np.testing.assert_allclose(found["ren"], expected, rtol=0.12)
     assert found.attrs["slope"] == pytest.approx(0.3, rel=0.01)
@@ -61,9 +61,10 @@ def test_equivalent_noise_of_a_line_matches_the_closed_form(scattered):
 
 def test_equivalent_noise_is_identical_in_any_chunks(scattered):
     lai, ndvi = scattered
-    whole = fifesim.relative_equivalent_noise(lai, ndvi)
+    whole = fifesim.scaling.relative_equivalent_noise(lai, ndvi)
     xr.testing.assert_identical(
-        fifesim.relative_equivalent_noise(in_chunks(lai, {"y": 77, "x": 50}), in_chunks(ndvi, ODD_CHUNKS)), whole
+        fifesim.scaling.relative_equivalent_noise(in_chunks(lai, {"y": 77, "x": 50}), in_chunks(ndvi, ODD_CHUNKS)),
+        whole,
     )
 
 
@@ -71,10 +72,13 @@ def test_equivalent_noise_is_identical_in_any_chunks(scattered):
     ("call", "message"),
     [
         (lambda y, x: fifesim.regress(y[:10], x[20:]), "do not overlap"),
-        (lambda y, x: fifesim.relative_equivalent_noise(y, x, increment=0.0), "increment must be above 0, got 0"),
-        (lambda y, x: fifesim.relative_equivalent_noise(y, x, increment=1e-6), "take a larger one"),
-        (lambda y, x: fifesim.relative_equivalent_noise(y, x, min_count=1), "at least 2, got 1"),
-        (lambda y, x: fifesim.relative_equivalent_noise(y * np.nan, x, slope=0.4), "needs finite values"),
+        (
+            lambda y, x: fifesim.scaling.relative_equivalent_noise(y, x, increment=0.0),
+            "increment must be above 0, got 0",
+        ),
+        (lambda y, x: fifesim.scaling.relative_equivalent_noise(y, x, increment=1e-6), "take a larger one"),
+        (lambda y, x: fifesim.scaling.relative_equivalent_noise(y, x, min_count=1), "at least 2, got 1"),
+        (lambda y, x: fifesim.scaling.relative_equivalent_noise(y * np.nan, x, slope=0.4), "needs finite values"),
         *(
             (
                 lambda y, x, fill=fill: fifesim.regress(y.where(y > y.min(), fill), x),

@@ -74,7 +74,7 @@ def cube(lai, spread=1.0):
 
 def test_bias_of_a_linear_algorithm_is_zero(lai_with_hole):
     with no_compute():
-        lazy = fifesim.scale_bias(lambda array: 3 * array + 1, in_chunks(lai_with_hole, ODD_CHUNKS))
+        lazy = fifesim.scaling.scale_bias(lambda array: 3 * array + 1, in_chunks(lai_with_hole, ODD_CHUNKS))
     assert float(np.abs(lazy["bias"]).max()) < 1e-14
     assert lazy.sizes == {"y": 5, "x": 6}
 
@@ -82,8 +82,8 @@ def test_bias_of_a_linear_algorithm_is_zero(lai_with_hole):
 def test_predicted_bias_of_ndvi_agrees_with_the_simulation(lai):
     """Coefficients of variation are about 0.1; third-order terms are smaller by this factor."""
     reflectance = cube(lai, 0.5)
-    simulated = fifesim.scale_bias(fifesim.ndvi, reflectance)["bias"]
-    predicted = check_raster_function(fifesim.ndvi_bias, reflectance, quantity="ndvi_bias")
+    simulated = fifesim.scaling.scale_bias(fifesim.ndvi, reflectance)["bias"]
+    predicted = check_raster_function(fifesim.scaling.ndvi_bias, reflectance, quantity="ndvi_bias")
     np.testing.assert_allclose(predicted, simulated, rtol=0.25)
     assert float(np.abs(predicted - simulated).mean() / np.abs(simulated).mean()) < 0.08
 
@@ -91,8 +91,8 @@ def test_predicted_bias_of_ndvi_agrees_with_the_simulation(lai):
 def test_predicted_bias_of_fpar_agrees_with_the_simulation(lai):
     """The third-order term is K times skewness and standard deviation of LAI, about 0.1."""
     extinction = float(layers.extinction_coefficient(fifesim.fife_geometry().sza))
-    simulated = fifesim.scale_bias(fifesim.fpar, lai)["bias"]
-    predicted = check_raster_function(lambda lai: fifesim.fpar_bias(lai, extinction), lai, quantity="fpar_bias")
+    simulated = fifesim.scaling.scale_bias(fifesim.fpar, lai)["bias"]
+    predicted = check_raster_function(lambda lai: fifesim.scaling.fpar_bias(lai, extinction), lai, quantity="fpar_bias")
     assert (predicted < 0).all() and (simulated < 0).all()
     np.testing.assert_allclose(predicted, simulated, rtol=0.2)
 
@@ -100,7 +100,7 @@ def test_predicted_bias_of_fpar_agrees_with_the_simulation(lai):
 def test_bias_of_fpar_uses_the_asymptote_of_fpar(lai):
     """A canopy of LAI 20 absorbs the asymptotic fraction to within 1e-5."""
     dense = fifesim.fpar(lai.copy(data=np.full(lai.shape, 20.0)), geometry=fifesim.fife_geometry())
-    ratio = fifesim.fpar_bias(lai, 0.5) / fifesim.fpar_bias(lai, 0.5, fpar_inf=1.0)
+    ratio = fifesim.scaling.fpar_bias(lai, 0.5) / fifesim.scaling.fpar_bias(lai, 0.5, fpar_inf=1.0)
     np.testing.assert_allclose(ratio, float(dense[0, 0]), rtol=3e-5)
 
 
@@ -108,7 +108,7 @@ def test_white_noise_keeps_a_ninth_of_its_standard_deviation():
     """Pixels of 9 x 9 cells. The variance of 900 means is known to sqrt(2 / 900) = 5 %; tolerance four times this."""
     grid = fifesim.fife_site(CELL, window=((0, 270), (0, 270)))
     cells = fifesim.lai_scene(grid, arp=0.0, seed=1)
-    kept = fifesim.share_kept(fifesim.aggregate(cells), cells)
+    kept = fifesim.scaling.share_kept(fifesim.aggregate(cells), cells)
     assert float(kept["variance"]) == pytest.approx(1 / 81, rel=0.2)
     assert 0 < float(kept["range"]) < 0.35
     pixels = fifesim.aggregate(cells).values
@@ -118,9 +118,9 @@ def test_white_noise_keeps_a_ninth_of_its_standard_deviation():
 
 def test_density_of_a_raster_integrates_to_one_and_ignores_chunks(lai_with_hole):
     """The kernel extends beyond the range of the values, where a few percent of the mass lie."""
-    whole = fifesim.density(lai_with_hole, points=400)
+    whole = fifesim.scaling.density(lai_with_hole, points=400)
     assert 0.95 < integrate.trapezoid(whole, whole["value"]) <= 1
-    xr.testing.assert_identical(fifesim.density(in_chunks(lai_with_hole, ODD_CHUNKS), points=400), whole)
+    xr.testing.assert_identical(fifesim.scaling.density(in_chunks(lai_with_hole, ODD_CHUNKS), points=400), whole)
     values = lai_with_hole.values[np.isfinite(lai_with_hole)]
     exact = scaling.gaussian_density(values, whole["value"].values, whole.attrs["bandwidth"], reflect=True)
     # Bins of 1/2000 of the range and a bandwidth of 1/10 of it: relative error (bin / bandwidth)^2 / 24 of the
@@ -135,12 +135,12 @@ def test_density_of_lai_agrees_with_its_distribution_at_zero():
     """
     site = fifesim.fife_site(30 / 9, window=((0, 333), (0, 333)))
     lai = fifesim.lai_scene(site, arp=0.24, seed=1, method="periodic")
-    known = fifesim.lai_distribution("burned-grazed").pdf(0.0)
+    known = fifesim.ground.lai_distribution("burned-grazed").pdf(0.0)
     assert known == pytest.approx(0.853, abs=0.01)
-    assert float(fifesim.density(lai)[0]) == pytest.approx(known, rel=0.06)
-    assert float(fifesim.density(lai, reflect=False)[0]) == pytest.approx(known / 2, rel=0.1)
+    assert float(fifesim.scaling.density(lai)[0]) == pytest.approx(known, rel=0.06)
+    assert float(fifesim.scaling.density(lai, reflect=False)[0]) == pytest.approx(known / 2, rel=0.1)
     about = lai - 0.74
-    assert about.name == "lai" and float(fifesim.density(about)["value"][0]) < 0
+    assert about.name == "lai" and float(fifesim.scaling.density(about)["value"][0]) < 0
 
 
 def test_cells_without_one_band_are_ignored_in_both(lai):
@@ -148,25 +148,25 @@ def test_cells_without_one_band_are_ignored_in_both(lai):
     one = cube(lai).copy(deep=True)
     both = one.copy(deep=True)
     one[0, 0, 0] = both[:, 0, 0] = np.nan
-    xr.testing.assert_equal(fifesim.ndvi_bias(one), fifesim.ndvi_bias(both))
-    assert np.isfinite(fifesim.ndvi_bias(one)[0, 0])
+    xr.testing.assert_equal(fifesim.scaling.ndvi_bias(one), fifesim.scaling.ndvi_bias(both))
+    assert np.isfinite(fifesim.scaling.ndvi_bias(one)[0, 0])
     # The bias has the units of the algorithm.
-    squared = fifesim.scale_bias(lambda array: (array**2).assign_attrs(units="m4 m-4"), lai)
+    squared = fifesim.scaling.scale_bias(lambda array: (array**2).assign_attrs(units="m4 m-4"), lai)
     assert squared["bias"].attrs["units"] == "m4 m-4"
 
 
 def test_density_takes_any_dimensions(lai):
     """The layout of the values does not matter."""
-    whole = fifesim.density(lai, points=50)
+    whole = fifesim.scaling.density(lai, points=50)
     line = lai.stack(cell=("y", "x")).drop_vars(["cell", "y", "x", "spatial_ref"])
     for array in (line, line.chunk(cell=1000), lai.expand_dims(band=1).chunk(y=7), lai.T):
-        np.testing.assert_allclose(fifesim.density(array, points=50), whole, rtol=1e-12)
+        np.testing.assert_allclose(fifesim.scaling.density(array, points=50), whole, rtol=1e-12)
 
 
 def test_linearity_of_rasters_equals_the_kernel(lai):
     red, nir = cube(lai).values
     for chunks in ({}, ODD_CHUNKS):
-        found = fifesim.ndvi_linearity(in_chunks(cube(lai), chunks))
+        found = fifesim.scaling.ndvi_linearity(in_chunks(cube(lai), chunks))
         assert found == pytest.approx(scaling.linearity_correlation(red, nir), rel=1e-9)
 
 
@@ -174,9 +174,9 @@ def test_linearity_of_rasters_equals_the_kernel(lai):
 
 
 def test_autocovariance_is_the_same_in_blocks(monkeypatch, lai_with_hole):
-    whole = fifesim.autocovariance(lai_with_hole, 30.0)
+    whole = fifesim.scaling.autocovariance(lai_with_hole, 30.0)
     monkeypatch.setattr(variogram_raster, "_LAG_BLOCK", 16)
-    parts = fifesim.autocovariance(lai_with_hole, 30.0)
+    parts = fifesim.scaling.autocovariance(lai_with_hole, 30.0)
     np.testing.assert_array_equal(parts["count"], whole["count"])
     np.testing.assert_allclose(parts["covariance"], whole["covariance"], atol=1e-13)
     np.testing.assert_allclose(parts["semivariance"], whole["semivariance"], atol=1e-13)
@@ -184,9 +184,9 @@ def test_autocovariance_is_the_same_in_blocks(monkeypatch, lai_with_hole):
 
 def test_variogram_is_identical_in_any_chunks(monkeypatch, lai_with_hole):
     monkeypatch.setattr(variogram_raster, "_LAG_BLOCK", 16)
-    whole = fifesim.variogram(lai_with_hole, 40.0)
+    whole = fifesim.scaling.variogram(lai_with_hole, 40.0)
     for chunks in (CHUNKS, ODD_CHUNKS):
-        xr.testing.assert_identical(fifesim.variogram(in_chunks(lai_with_hole, chunks), 40.0), whole)
+        xr.testing.assert_identical(fifesim.scaling.variogram(in_chunks(lai_with_hole, chunks), 40.0), whole)
 
 
 @pytest.fixture(scope="module")
@@ -204,7 +204,7 @@ def test_variogram_of_the_autoregressive_field_is_analytic(gaussian):
     The standard error of a covariance is about sqrt(2 integral scale / cells). The squared correlation sums to 60 cells
     over all lags, so it is sqrt(2 x 60 / 176400) = 0.026; the tolerance is four times this.
     """
-    found = fifesim.variogram(gaussian, 40.0)
+    found = fifesim.scaling.variogram(gaussian, 40.0)
     expected = autoregression.autocorrelation(0.24, np.arange(found.sizes["lag"]))
     np.testing.assert_allclose(found["correlation"], np.broadcast_to(expected, (2, expected.size)), atol=0.1)
     assert found.attrs["variance"] == pytest.approx(1, abs=0.1)
@@ -215,14 +215,14 @@ def test_variogram_of_the_autoregressive_field_is_analytic(gaussian):
 @pytest.mark.parametrize("lsf", [None, fifesim.instrument("TM").line_spread])
 def test_predicted_variance_agrees_with_the_simulation(gaussian, lsf):
     """The covariance comes from the same scene, so that only the borders differ: 46 pixels along an edge, 2 %."""
-    found = fifesim.regularized_variance(gaussian, 30.0, lsf)
+    found = fifesim.scaling.regularized_variance(gaussian, 30.0, lsf)
     assert float(found["predicted"]) == pytest.approx(float(found["simulated"]), rel=0.05)
     assert float(found["predicted"]) < 0.5 * float(found["cells"])
     assert float(found["cells"]) == pytest.approx(float(gaussian.var()), rel=1e-10)
 
 
 def test_constant_rasters_have_zero_covariance(lai):
-    found = fifesim.autocovariance(lai * 0 + 0.25, 30.0)
+    found = fifesim.scaling.autocovariance(lai * 0 + 0.25, 30.0)
     assert int(found["count"].max()) == lai.size
     np.testing.assert_allclose(found["covariance"], 0, atol=1e-15)
     np.testing.assert_allclose(found["semivariance"], 0, atol=1e-15)
@@ -232,13 +232,13 @@ def test_constant_rasters_have_zero_covariance(lai):
     ("call", "message"),
     [
         (lambda lai: fifesim.aggregate(lai, 500.0), "no pixel of 500 x 500 m fits"),
-        (lambda lai: fifesim.fpar_bias(lai, 0.57, 94), r"fpar_inf must be in \(0, 1\]"),
-        (lambda lai: fifesim.autocovariance(lai, 100.0), r"at most half of the raster \(75 m\), got 100 m"),
-        (lambda lai: fifesim.autocovariance(lai * np.nan, 30.0), "no valid cells"),
+        (lambda lai: fifesim.scaling.fpar_bias(lai, 0.57, 94), r"fpar_inf must be in \(0, 1\]"),
+        (lambda lai: fifesim.scaling.autocovariance(lai, 100.0), r"at most half of the raster \(75 m\), got 100 m"),
+        (lambda lai: fifesim.scaling.autocovariance(lai * np.nan, 30.0), "no valid cells"),
         # Constant values are valid, but have neither correlation nor density.
-        (lambda lai: fifesim.variogram(lai * 0 + 0.3, 20), "a correlation needs values that vary"),
-        (lambda lai: fifesim.density(lai * 0), "a density needs values that vary"),
-        (lambda lai: fifesim.density(lai - 0.74, reflect=True), "at least 0 to be reflected"),
+        (lambda lai: fifesim.scaling.variogram(lai * 0 + 0.3, 20), "a correlation needs values that vary"),
+        (lambda lai: fifesim.scaling.density(lai * 0), "a density needs values that vary"),
+        (lambda lai: fifesim.scaling.density(lai - 0.74, reflect=True), "at least 0 to be reflected"),
     ],
 )
 def test_invalid_scales_are_refused(lai, call, message):

@@ -181,9 +181,9 @@ def test_user_aerosol_passes_through_the_chain(tables):
 
 def test_damaged_tables_and_declared_sizes_are_found_in_a_file(tmp_path):
     """The flipped bit would give another, plausible phase function."""
-    fifesim.aerosol_tables("urban").to_netcdf(tmp_path / "mine.nc")
+    fifesim.atmosphere.aerosol_tables("urban").to_netcdf(tmp_path / "mine.nc")
     whole = (tmp_path / "mine.nc").read_bytes()
-    numbers = fifesim.aerosol_tables("urban").phase.values.tobytes()[800:824]
+    numbers = fifesim.atmosphere.aerosol_tables("urban").phase.values.tobytes()[800:824]
     at = whole.index(numbers)
     (tmp_path / "damaged.nc").write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
     with netCDF4.Dataset(tmp_path / "large.nc", "w") as file:
@@ -191,4 +191,4 @@ def test_damaged_tables_and_declared_sizes_are_found_in_a_file(tmp_path):
         file.createVariable("extinction", "f8", ("wavelength",), chunksizes=(10**6,))
     for name, said in (("damaged", "HDF error"), ("large", "declares 8000000000 bytes")):
         with pytest.raises(ValueError, match=rf"cannot read the aerosol .*{name}\.nc: .*{said}"):
-            fifesim.read_aerosol(tmp_path / f"{name}.nc")
+            fifesim.atmosphere.read_aerosol(tmp_path / f"{name}.nc")

@@ -19,7 +19,7 @@ import xarray as xr
 from odc.geo.geobox import GeoBox
 
 import fifesim
-from fifesim.accessor import PUBLIC
+from fifesim.accessor import PUBLIC, find
 from fifesim.base import arguments as kinds
 from fifesim.base.arguments import (
     NUMBER,
@@ -43,7 +43,7 @@ PACKAGE = str(Path(fifesim.__file__).parent)
 CHECKED = [
     name
     for name in sorted(set(PUBLIC) - {"Instrument", "Regression", "Retrieval"})
-    if inspect.signature(getattr(fifesim, name)).parameters
+    if inspect.signature(find(name)).parameters
 ]
 
 # Accepted values that look wrong, by function and argument. In addition, the first argument of a function may be a
@@ -67,9 +67,9 @@ ACCEPTED = {
     ("Setup", "instrument"): {"str"}, ("Setup", "dem"): {"crs"},
     ("Setup", "clouds"): {"dataset"}, ("Setup", "surroundings"): ARRAYS - {"empty"},
     **{("Setup", name): {"list", "str"} for name in ("bands", "noise", "interval", "offset")},
-    **{("Weather", each.name): {"crs"} for each in fields(fifesim.Weather)},
-    **{("RPV", each.name): ARRAYS for each in fields(fifesim.RPV)},
-    **{("RossLi", each.name): ARRAYS for each in fields(fifesim.RossLi)},
+    **{("Weather", each.name): {"crs"} for each in fields(fifesim.models.Weather)},
+    **{("RPV", each.name): ARRAYS for each in fields(fifesim.ground.RPV)},
+    **{("RossLi", each.name): ARRAYS for each in fields(fifesim.ground.RossLi)},
     **{("Leaf", each.name): ARRAYS - {"list"} for each in fields(fifesim.Leaf)},
     # A Dataset is processed raster by raster, and a Dataset with sun coordinates is a geometry.
     ("aggregate", "array"): {"dataset", "crs"}, ("to_geotiff", "raster"): {"dataset", "crs"},
@@ -88,7 +88,7 @@ ACCEPTED = {
 
 def default_arguments(name):
     """Optional arguments of a public function and their default values."""
-    parameters = inspect.signature(getattr(fifesim, name)).parameters
+    parameters = inspect.signature(find(name)).parameters
     return {key: each.default for key, each in parameters.items() if each.default is not each.empty}
 
 
@@ -101,7 +101,7 @@ def message_faults(error, argument, kind):
 
 
 def required_arguments(name):
-    return set(inspect.signature(getattr(fifesim, name)).parameters) - set(default_arguments(name))
+    return set(inspect.signature(find(name)).parameters) - set(default_arguments(name))
 
 
 def reflectance_spectra(grid):
@@ -164,7 +164,7 @@ def valid_calls(tmp_path_factory):
         "start": "1987-06-01T00:00Z", "end": "1987-06-20T00:00Z", "place": (39.1, -96.5), "target": "OLI",
         "clouds": fifesim.cloud_field(grid, 0.3, length=100.0, margin=1500.0), "scene": lai, "dn": counts,
         "rho0": 0.1, "k": 0.9, "theta": -0.1, "rhoc": 0.1, "iso": 0.3, "vol": 0.15, "geo": 0.03,
-        "surface": fifesim.RossLi(0.3, 0.15, 0.03), "axes": {"visibility": [20.0, 40.0]}, "draws": study.draws,
+        "surface": fifesim.ground.RossLi(0.3, 0.15, 0.03), "axes": {"visibility": [20.0, 40.0]}, "draws": study.draws,
         "aerosol": "continental", "instruments": ["TM"], "swath": samples, "name": "TM", "thermal": 1.0, "shot": 0.1,
         "y": lai, "x": ndvi, "variable": lai, "reach": 30.0, "algorithm": np.sqrt, "extinction": 0.5, "n": 1,
         "scores": fifesim.score(estimate, lai), "retrieval": retrieval, "margin": 0.0,
@@ -206,7 +206,9 @@ def valid_calls(tmp_path_factory):
         "lai_scene": {"arp": 0.1, "seed": 1},
         "Leaf": {"structure": 1.5, "chlorophyll": 30.0, "water": 0.01, "dry_matter": 0.01},
         "surface_reflectance": {"instrument": "TM", "bands": ["TM3", "TM4"]},
-        "Weather": {each.name: getattr(fifesim.fife_weather(), each.name) for each in fields(fifesim.Weather)},
+        "Weather": {
+            each.name: getattr(fifesim.models.fife_weather(), each.name) for each in fields(fifesim.models.Weather)
+        },
         "topographic_correction": {"method": "c"},
         **{name: {"path_or_raster": dem, "grid": grid[4:6, 4:6]} for name in ("fine_dem", "source_dem")},
         **{name: {"instrument": "MSI"} for name in ("noise_equivalent_radiance", "snr")},
@@ -214,7 +216,7 @@ def valid_calls(tmp_path_factory):
         **dict.fromkeys(("sky_view", "terrain_view", "illumination", "shadow"), on_hills),
         "kt": {**on_hills, "instrument": "TM"},
         "Atmosphere": {"visibility": 45.0},
-        "read_aerosol": {"source": fifesim.aerosol_tables("continental")},
+        "read_aerosol": {"source": fifesim.atmosphere.aerosol_tables("continental")},
         **{name: {"instrument": "TM", "elevation": dem} for name in ("to_toa", "to_surface")},
         "compare_engines": {"setup": fifesim.Setup(bands=("TM3",)), "reflectance": 0.2, "engines": ("5S",)},
         "sense": {"instrument": "TM", "min_valid": 0.1, "interval": 20.0},
@@ -288,7 +290,7 @@ def accepted_kinds(name, argument, first):
 @pytest.mark.parametrize("name", CHECKED)
 def test_wrong_argument_is_named_in_one_line(valid_calls, wrong_values, name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    function, given, found = getattr(fifesim, name), valid_calls[name], []
+    function, given, found = find(name), valid_calls[name], []
     for argument in given:
         first = argument == next(iter(inspect.signature(function).parameters))
         for kind, value in wrong_values.items():
@@ -334,7 +336,7 @@ NOT_REAL = ["bool", "complex64", "datetime64[s]", "timedelta64[s]", "str", "obje
 @pytest.mark.parametrize("name", CHECKED)
 def test_rasters_must_hold_real_numbers(valid_calls, name):
     """Masks, dates, text and complex numbers could be converted to floating point and pass for a quantity."""
-    function, given = getattr(fifesim, name), valid_calls[name]
+    function, given = find(name), valid_calls[name]
     for argument, raster in given.items():
         for dtype in NOT_REAL if isinstance(raster, xr.DataArray) else ():
             if (name, dtype) in (("aggregate", "bool"), ("score", "bool")):
@@ -363,7 +365,7 @@ def test_rasters_within_an_argument_must_hold_real_numbers(valid_calls):
     with pytest.raises(TypeError, match=r"^setup must hold real numbers"):
         fifesim.compare(lai, ["TM"], fifesim.Setup(dem=mask))
     for wavelength in (["red", "nir"], np.array(["2001-01-01", "2001-01-02"], "datetime64[s]")):
-        for function, of in ((fifesim.to_bands, {"instrument": "TM"}), (fifesim.ndvi, {})):
+        for function, of in ((fifesim.sensor.to_bands, {"instrument": "TM"}), (fifesim.ndvi, {})):
             with pytest.raises(TypeError, match=r"^wavelength of \w+ must hold real numbers"):
                 function(rho.assign_coords(wavelength=("band", wavelength)), **of)
 
@@ -371,7 +373,7 @@ def test_rasters_within_an_argument_must_hold_real_numbers(valid_calls):
 @pytest.mark.parametrize("name", ["ndvi", "sense", "grid_at"])
 def test_checked_function_keeps_its_signature_and_can_be_pickled(name):
     """The name, documentation and signature are kept, and worker processes can load the function."""
-    function = getattr(fifesim, name)
+    function = find(name)
     bare = inspect.unwrap(function)
     assert bare is not function and function.__doc__ == bare.__doc__
     assert inspect.signature(function) == inspect.signature(bare)
@@ -384,7 +386,7 @@ def test_messages_name_the_argument_and_the_remedy(valid_calls):
     typed = {
         "sza of a Geometry is one number, got an array: .*xarray.Dataset": lambda: fifesim.Geometry([30, 40], 100.0),
         "surroundings must be a reflectance.*'lake'": lambda: fifesim.to_toa(rho, surroundings="lake", adjacency=True),
-        "band must be a name, got a list of 1": lambda: fifesim.psf("TM", ["TM3"]),
+        "band must be a name, got a list of 1": lambda: fifesim.sensor.psf("TM", ["TM3"]),
         "grid must be .*GeoBox.*type raster.odc.geobox": lambda: fifesim.lai_scene(lai),
         "hotspot must be a number, got an xarray.DataArray": lambda: fifesim.fpar(
             lai, canopy=fifesim.Canopy(hotspot=lai)
@@ -519,7 +521,7 @@ def test_range_in_an_annotation_is_checked(checks, given, error, message):
 def public_arguments():
     """Public functions with their parameters and annotations."""
     for name in PUBLIC:
-        function = inspect.unwrap(getattr(fifesim, name))
+        function = inspect.unwrap(find(name))
         if inspect.isfunction(function):
             hints = get_type_hints(function, include_extras=True)
             for parameter in inspect.signature(function).parameters:
@@ -557,11 +559,11 @@ def test_methods_accept_their_container(lai):
 
 def test_class_error_names_the_function_that_returns_its_objects(lai):
     with pytest.raises(
-        TypeError, match=r"^scenario must be a fifesim\.Scenario, as fifesim\.read_scenario gives it, got 5$"
+        TypeError, match=r"^scenario must be a fifesim\.Scenario, as fifesim\.scenario\.read_scenario gives it, got 5$"
     ):
         fifesim.simulate(5)
     with pytest.raises(TypeError, match=r"^fit must be a fifesim\.Regression, as fifesim\.regress gives it, got 5$"):
-        fifesim.plot_fit(5)
+        fifesim.output.plot_fit(5)
     with pytest.raises(TypeError, match=r"^setup must be a fifesim\.Setup, got 5$"):
         fifesim.compare(lai, ["TM"], 5)
 
@@ -593,7 +595,7 @@ def _packed(raster):
 
 def _outcome(name, arguments):
     try:
-        return getattr(fifesim, name)(**arguments)
+        return find(name)(**arguments)
     except (ValueError, TypeError) as error:
         return str(error)
 

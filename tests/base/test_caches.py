@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fifesim
+from fifesim.accessor import PUBLIC, find
 from fifesim.base import caches
 from fifesim.base.caches import CACHES, Results, cached, clear_caches
 
@@ -52,8 +53,8 @@ def test_every_cache_of_the_package_is_listed():
 
 
 def test_caches_are_bounded_and_have_distinct_names():
-    for name in fifesim.__all__:
-        getattr(fifesim, name)
+    for name in PUBLIC:
+        find(name)
     assert len(CACHES) > 80
     assert len({each.what for each in CACHES}) == len(CACHES)
     assert [each.what for each in CACHES if each.size is None] == ["instruments of the package"]

@@ -46,7 +46,7 @@ FOREIGN = {
     },
     fifesim.Canopy: {"lidfa": "leaf_angles", "LIDF_a": "leaf_angles", "hspot": "hotspot", "psoil": "moisture"},
     fifesim.Atmosphere: {"vis": "visibility", "aod550": "aot", "water_vapour": "h2o", "ozone": "o3"},
-    fifesim.Weather: {"rh": "humidity"},
+    fifesim.models.Weather: {"rh": "humidity"},
 }  # fmt: skip
 
 
@@ -64,7 +64,7 @@ def test_misspelt_names_give_a_suggestion(lai):
         ),
         (lambda: lai.fifesim.fpar(hspot=0.1), TypeError, r"type canopy=fifesim\.Canopy\(hotspot=...\)"),
         (
-            lambda: fifesim.canopy_spectra({"cab": 40}),
+            lambda: fifesim.ground.canopy_spectra({"cab": 40}),
             ValueError,
             "derivatives: did you mean 'leaf_chlorophyll'. There",
         ),

@@ -88,7 +88,7 @@ def test_fpar_of_varying_leaves_and_soil_agrees_with_the_model(lai, leaves, even
 def test_classes_absorb_according_to_their_leaves(site):
     pale = fifesim.Canopy(leaf_optics=fifesim.Leaf(chlorophyll=10))
     classes = {"green": fifesim.CoverClass(lai=2.0), "pale": fifesim.CoverClass(lai=2.0, canopy=pale)}
-    land = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=classes, seed=7)
+    land = fifesim.landscape(site, cover=fifesim.ground.Patches("voronoi", 30), classes=classes, seed=7)
     made = land.fifesim.fpar(method="energy")
     for code, leaf in ((1, None), (2, pale.leaf_optics)):
         by_band, shares = by_cell(np.array([2.0]), leaf=leaf)

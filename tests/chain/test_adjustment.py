@@ -233,7 +233,7 @@ def test_sun_position_follows_the_given_time(msi):
 
 def test_adjustment_lines_agree_with_hls():
     """HLS used 500 spectra from 160 Hyperion scenes, including deserts, and another blue response."""
-    lines = fifesim.spectral_adjustment("Sentinel-2A", "OLI", bands=[f"OLI{number}" for number in range(1, 8)])
+    lines = fifesim.sensor.spectral_adjustment("Sentinel-2A", "OLI", bands=[f"OLI{number}" for number in range(1, 8)])
     assert lines["source_band"].values.tolist() == ["MSI1", "MSI2", "MSI3", "MSI4", "MSI8A", "MSI11", "MSI12"]
     reflectance = 0.15
     ours = lines["slope"] * reflectance + lines["offset"]
@@ -245,11 +245,11 @@ def test_adjustment_lines_agree_with_hls():
 
 
 def test_unpublished_pairs_have_no_published_line():
-    lines = fifesim.spectral_adjustment("AVHRR", "TM")
+    lines = fifesim.sensor.spectral_adjustment("AVHRR", "TM")
     assert lines["band"].values.tolist() == ["TM2", "TM3", "TM4"]
     assert np.isnan(lines["published_slope"].values).all() and set(lines["reference"].values) == {""}
     with pytest.raises(ValueError, match="no source band overlaps TM7 of TM"):
-        fifesim.spectral_adjustment("AVHRR", "TM", bands=["TM7"])
+        fifesim.sensor.spectral_adjustment("AVHRR", "TM", bands=["TM7"])
 
 
 def grey_wave(names, period):

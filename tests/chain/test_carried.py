@@ -21,7 +21,7 @@ AIR = fifesim.Atmosphere()
 
 def narrow_terms(atmosphere):
     """Terms of narrow bands in red and near infrared, under the sun of FIFE."""
-    bands = (fifesim.Band("narrow", (at - 0.0025, at, at + 0.0025), (0.0, 1.0, 0.0)) for at in (0.665, 0.842))
+    bands = (fifesim.sensor.Band("narrow", (at - 0.0025, at, at + 0.0025), (0.0, 1.0, 0.0)) for at in (0.665, 0.842))
     return engines.band_terms(atmosphere, tuple(bands), fifesim.fife_geometry().sza, 0.0, 0.0)
 
 

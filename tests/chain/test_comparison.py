@@ -115,7 +115,7 @@ def test_table_of_other_trees_is_rejected(lai):
 
 
 def test_comparison_of_a_landscape_equals_the_chain(site):
-    land = fifesim.landscape(site, seed=3, soil=fifesim.Field(sd=0.03))
+    land = fifesim.landscape(site, seed=3, soil=fifesim.ground.Field(sd=0.03))
     images = land.fifesim.compare(["TM", "MSI"])
     rho = land.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
     xr.testing.assert_equal(images["TM"]["dn"], rho.fifesim.to_toa().fifesim.sense("TM"))
@@ -150,11 +150,11 @@ def test_equal_origins_are_no_warning(lai):
 
 
 def test_table_and_plot_state_origins_and_dashes_for_unknown_terms(mixed):
-    table = fifesim.comparison_table(mixed)
+    table = fifesim.sensor.comparison_table(mixed)
     assert table["blur"].to_dict() == {"MSI": "in-flight ± 0.03", "OLI": "assumed ± 0.06", "SuperDove": "–"}
     assert table["geolocation"].to_dict() == {"MSI": "in-flight ± 1 m", "OLI": "in-flight ± 4 m", "SuperDove": "–"}
     assert table.loc["OLI", "noise"] == "pre-launch within a factor of 1.05" and table.loc["SuperDove", "noise"] == "–"
-    figure = fifesim.plot_comparison(mixed)
+    figure = fifesim.output.plot_comparison(mixed)
     titles = [axes.get_title().splitlines()[-1] for axes in figure.axes[:3]]
     assert titles == ["blur in-flight ± 0.03", "blur assumed ± 0.06", "blur –"]
     plt.close(figure)

@@ -109,7 +109,9 @@ def test_streams_of_a_varying_property_equal_uniform_scenes(monkeypatch, name, v
         np.testing.assert_allclose(both[..., part], one[..., part], **limits)
 
 
-@pytest.mark.parametrize("surface", [fifesim.RossLi(0.3, 0.0, 0.0), fifesim.RPV([0.1] * 6, 1.0, 0.0, 1.0)])
+@pytest.mark.parametrize(
+    "surface", [fifesim.ground.RossLi(0.3, 0.0, 0.0), fifesim.ground.RPV([0.1] * 6, 1.0, 0.0, 1.0)]
+)
 def test_lambertian_surfaces_agree_with_the_uniform_equation(surface):
     terms = band_terms(HAZE, [b.response for b in fifesim.instrument("TM").select(None)], 50.0, 30.0, SLANT.raa)
     rho = float(np.ravel(surface.reflectance(0.0, 0.0, 0.0))[0])
@@ -139,7 +141,7 @@ def test_to_surface_inverts_with_the_shape_of_the_ground():
     """
     Every cell is a multiple of one RPV surface; the ratios of its reflectance factors under sun and sky are recovered.
     """
-    shape, factor = fifesim.RPV(0.1, 0.75, -0.1, 0.2), np.array([[0.5, 1.0], [2.0, 3.0]])
+    shape, factor = fifesim.ground.RPV(0.1, 0.75, -0.1, 0.2), np.array([[0.5, 1.0], [2.0, 3.0]])
     grid = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=20, height=20, cell=10)
     given = {"instrument": "TM", "geometry": SLANT}
     image = toa_of(replace(shape, rho0=wrap_xr(0.1 * factor, grid)))
@@ -148,7 +150,7 @@ def test_to_surface_inverts_with_the_shape_of_the_ground():
     np.testing.assert_allclose(ratio, np.broadcast_to(factor, found.shape), rtol=1e-9)
     direct = float(shape.reflectance(SLANT.sza, SLANT.vza, SLANT.raa))
     assert float(found[3, 0, 1]) == pytest.approx(direct, rel=0.1)
-    lambertian = fifesim.RPV(0.2, 1.0, 0.0, 1.0)
+    lambertian = fifesim.ground.RPV(0.2, 1.0, 0.0, 1.0)
     even = image.fifesim.to_surface(HAZE, like=lambertian, **given)
     np.testing.assert_allclose(even, image.fifesim.to_surface(HAZE, **given), rtol=1e-9)
 
@@ -166,13 +168,13 @@ def test_streams_of_slopes_are_scaled_like_the_reflectance_factor():
 @pytest.mark.parametrize("coupling", ["directional", "four-stream"])
 def test_setup_equals_the_steps(coupling):
     """Hills, classes, adjacency and clouds together, and a flat scene that is coupled in one pass."""
-    land = fifesim.landscape(GRID, cover=fifesim.Patches("voronoi", 60), classes=CLASSES, seed=3)
+    land = fifesim.landscape(GRID, cover=fifesim.ground.Patches("voronoi", 60), classes=CLASSES, seed=3)
     sky = fifesim.cloud_field(GRID, 0.5, seed=1, margin=3000)
     own = {"atmosphere": HAZE, "geometry": SLANT, "bands": BANDS, "dem": fifesim.flint_hills(GRID, seed=7)}
     setup = fifesim.Setup(coupling=coupling, slopes="kt", adjacency=True, clouds=sky, **own)
     image = land.fifesim.compare(["TM"], setup, bands={"TM": BANDS})["TM"]["dn"]
     streams = land.fifesim.surface_reflectance("TM", streams=True if coupling == "four-stream" else coupling, **own)
-    cast = fifesim.cast_clouds(streams.isel(stream=0, drop=True), sky, dem=own["dem"])
+    cast = fifesim.atmosphere.cast_clouds(streams.isel(stream=0, drop=True), sky, dem=own["dem"])
     expected = streams.fifesim.to_toa(adjacency=True, clouds=cast).fifesim.sense("TM")
     np.testing.assert_array_equal(image, expected)
     plain = fifesim.Setup(coupling=coupling, bands=BANDS, atmosphere=HAZE, geometry=SLANT)
@@ -180,7 +182,7 @@ def test_setup_equals_the_steps(coupling):
     assert int(abs(lazy.astype(int) - LAI.fifesim.compare(["TM"], plain, bands={"TM": BANDS})["TM"]["dn"]).max()) <= 1
 
 
-@pytest.mark.parametrize("surface", [fifesim.RossLi(0.3, 0.1, 0.02), fifesim.RPV(0.1, 0.75, -0.1, 0.2)])
+@pytest.mark.parametrize("surface", [fifesim.ground.RossLi(0.3, 0.1, 0.02), fifesim.ground.RPV(0.1, 0.75, -0.1, 0.2)])
 def test_rasters_of_brdf_parameters_agree_with_numbers(surface):
     """
     Cells and bands agree with uniform surfaces, also lazily and with NaN; adjacency changes TOA reflectance by 0.1 to
@@ -192,7 +194,7 @@ def test_rasters_of_brdf_parameters_agree_with_numbers(surface):
     by_cell = by_cell.where(LAI[0, 0] != LAI).transpose("y", "x").odc.assign_crs(GRID.crs)
     by_band = xr.concat([by_cell, 0.9 * by_cell], "band").assign_coords(band=BANDS)
     # All weights scale a Ross-Li surface; the first parameter scales RPV.
-    scaled = [first, *others] if isinstance(surface, fifesim.RossLi) else [first]
+    scaled = [first, *others] if isinstance(surface, fifesim.ground.RossLi) else [first]
     shape = {name: by_band / value * getattr(surface, name) for name in scaled}
     raster = replace(surface, **shape)
     given = {"instrument": "TM", "geometry": SLANT}
@@ -235,7 +237,7 @@ def test_to_surface_inverts_with_the_shape_of_a_canopy(lazy):
 
 
 LOW_SUN, OTHER_VIEW = replace(SLANT, sza=10.0), replace(SLANT, vza=10.0)
-ROSS, BY_CELL = fifesim.RossLi(0.2, 0.1, 0.03), (0.1 + 0 * LAI).drop_attrs()
+ROSS, BY_CELL = fifesim.ground.RossLi(0.2, 0.1, 0.03), (0.1 + 0 * LAI).drop_attrs()
 COUPLINGS = (
     r"coupling must be 'lambert', 'four-stream' or 'directional', got 'directionl': did you mean 'directional'\?$"
 )
@@ -264,12 +266,12 @@ def lazily(lai=LAI):
             "one direction of sun and view",
         ),
         (lambda: toa_of(ROSS, geometry=None), "no geometry"),
-        (lambda: toa_of(fifesim.RossLi(0.05, 0.19, 0.06)), "reflectance must not be negative"),
-        (lambda: toa_of(fifesim.RossLi(20, 10, 3)), "of the sunlight"),
-        (lambda: toa_of(fifesim.RossLi([0.2, np.nan, 0.2, 0.2, 0.2, 0.2], 0, 0)), "not finite"),
-        (lambda: toa_of(fifesim.RossLi(0.1 + 0 * LAI, 0, 0), instrument=None), "has no instrument"),
+        (lambda: toa_of(fifesim.ground.RossLi(0.05, 0.19, 0.06)), "reflectance must not be negative"),
+        (lambda: toa_of(fifesim.ground.RossLi(20, 10, 3)), "of the sunlight"),
+        (lambda: toa_of(fifesim.ground.RossLi([0.2, np.nan, 0.2, 0.2, 0.2, 0.2], 0, 0)), "not finite"),
+        (lambda: toa_of(fifesim.ground.RossLi(0.1 + 0 * LAI, 0, 0), instrument=None), "has no instrument"),
         (
-            lambda: toa_of(fifesim.RossLi(xr.where(LAI > 1, 0.05, 0.3), 0.19, 0.06)),
+            lambda: toa_of(fifesim.ground.RossLi(xr.where(LAI > 1, 0.05, 0.3), 0.19, 0.06)),
             r"RossLi\(iso=0.05, vol=0.19, geo=0.06\) reflects -",
         ),
         (lambda: toa_of(ROSS, elevation=LAI), "elevation needs rasters"),
@@ -310,7 +312,7 @@ def test_invalid_coupling_of_streams_is_rejected(streams, call, message):
     ("call", "message"),
     [
         (lambda toa: toa.fifesim.to_surface(like=GRASS.replace(model="discrete-ordinates")), "Canopy of numbers"),
-        (lambda toa: toa.fifesim.to_surface(like=fifesim.RossLi(0, 0, 0)), "no shape"),
+        (lambda toa: toa.fifesim.to_surface(like=fifesim.ground.RossLi(0, 0, 0)), "no shape"),
         (lambda toa: toa.fifesim.to_surface(like=ROSS, surroundings=0.2), "and surroundings"),
         (lambda toa: toa.fifesim.to_surface(like=ROSS, adjacency=True), "no adjacency"),
         (lambda toa: toa.isel(band=0).fifesim.to_surface(like=ROSS), "no dimension band"),

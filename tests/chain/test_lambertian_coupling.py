@@ -73,7 +73,7 @@ def errors(visibility, sza, vza=0.0, raa=0.0, lais=LAI, hotspot=0.0):
 
 
 # Ground of RAMI4ATM.
-RPV = fifesim.RPV(0.017051, 0.95, -0.1, 0.017051)
+RPV = fifesim.ground.RPV(0.017051, 0.95, -0.1, 0.017051)
 
 
 @cache

@@ -25,7 +25,7 @@ CLASSES = {
 
 
 def landscape_of(grid, grass=CLASSES["grass"], **variables):
-    cover = fifesim.Patches("voronoi", 30)
+    cover = fifesim.ground.Patches("voronoi", 30)
     return fifesim.landscape(grid, cover=cover, classes=CLASSES | {"grass": grass}, seed=7, **variables)
 
 
@@ -158,7 +158,7 @@ def test_pixel_of_two_uniform_classes_agrees_with_the_closed_form():
     np.testing.assert_allclose(ndvi[0], (nir - red) / (nir + red), rtol=0, atol=1e-9)
     sums, ratio = (sum(dense), 2 * SOIL), ((dense[1] - dense[0]) / sum(dense), 0.0)
     bias = f * (1 - f) * (ratio[0] - ratio[1]) * (sums[1] - sums[0]) / (f * sums[0] + (1 - f) * sums[1])
-    np.testing.assert_allclose(fifesim.scale_bias(fifesim.ndvi, cells)["bias"][0], bias, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(fifesim.scaling.scale_bias(fifesim.ndvi, cells)["bias"][0], bias, rtol=0, atol=1e-9)
     assert np.abs(bias).max() > 0.01
 
 

@@ -69,7 +69,7 @@ def test_missing_pixel_affects_only_its_cell_and_band(toa):
 def test_saturated_pixels_have_no_noise(toa):
     image = fifesim.sense(toa.where(toa.x < toa.x[80], 2.0), "OLI")
     number = int((image == image.attrs["saturated"]).any("band").sum())
-    std = fifesim.noise_std(image, "reflectance", noise=())
+    std = fifesim.sensor.noise_std(image, "reflectance", noise=())
     assert number and std.attrs["saturated_pixels"] == number
     np.testing.assert_array_equal(np.isnan(std), (image == 0) | (image == image.attrs["saturated"]))
 

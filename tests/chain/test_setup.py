@@ -35,7 +35,7 @@ def test_all_fields_reach_their_steps(lai, site):
     setup = Setup(instrument="TM", dem=dem, horizon=horizon, clouds=sky, **GROUND, **air, **SENSOR)
     rho = fifesim.surface_reflectance(lai, "TM", dem=dem, horizon=horizon, **GROUND)
     xr.testing.assert_identical(reflectance_of(setup, lai), rho)
-    cells = fifesim.cast_clouds(rho, sky, dem=dem)
+    cells = fifesim.atmosphere.cast_clouds(rho, sky, dem=dem)
     assert cells.cloud.any()
     image = fifesim.sense(fifesim.to_toa(rho, **air, clouds=cells), "TM", **SENSOR)
     xr.testing.assert_identical(image_of(setup, rho), image)

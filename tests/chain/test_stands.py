@@ -54,7 +54,7 @@ def test_classes_with_leaves_need_optics():
     """Water needs no leaves, and arguments of the call fill the gaps of a class."""
     water = fifesim.CoverClass(lai=0, canopy=fifesim.Canopy(background=0.03))
     forest = fifesim.CoverClass(lai=4.0, canopy=fifesim.Canopy(leaf_optics=fifesim.Leaf(chlorophyll=50)))
-    patches = fifesim.Patches("voronoi", 100)
+    patches = fifesim.ground.Patches("voronoi", 100)
     land = fifesim.landscape(ELSEWHERE, cover=patches, classes={"water": water, "forest": forest}, seed=7)
     with pytest.warns(
         UserWarning, match="vegetation of lai is unknown: using FIFE's tallgrass for soil and litter; give background"

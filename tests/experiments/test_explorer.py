@@ -115,7 +115,10 @@ def test_displayed_numbers_match_the_public_functions(page, sweep, tmp_path, wit
 def test_scenario_of_a_landscape_is_written_completely(sweep, outcomes, tmp_path):
     """Classes are separate tables; deviations and similar keys are inline tables."""
     window = sweep.scenario.grid.model_dump()
-    values = fifesim.default_scenario().model_dump(exclude_unset=True) | {"grid": window, "terrain": {"dem": "flat"}}
+    values = fifesim.scenario.default_scenario().model_dump(exclude_unset=True) | {
+        "grid": window,
+        "terrain": {"dem": "flat"},
+    }
     values["landscape"] = values["landscape"] | {"covary": {"soil": -0.3}}
     own = replace(sweep, scenario=parse_scenario(values))
     page = tmp_path / "land.html"
@@ -269,4 +272,4 @@ def test_command_writes_one_page_and_overwrites_only_on_request(sweep, small, tm
     assert CliRunner().invoke(app, [*command, "--overwrite"]).exit_code == 0
     assert (tmp_path / "pages" / "mine.html").read_bytes() == first
     with pytest.raises(ValueError, match="is a folder, and explore writes one page"):
-        fifesim.explore(path=tmp_path)
+        fifesim.experiments.explore(path=tmp_path)

@@ -63,7 +63,7 @@ def test_maps_have_no_arp_slider_and_clear_air_no_haze_slider(tmp_path):
 
 
 def test_landscape_with_many_stages_has_fewer_settings():
-    sweep = sweep_of(fifesim.default_scenario())
+    sweep = sweep_of(fifesim.scenario.default_scenario())
     assert sweep.shape == (3, 2, 2, 2, 4) and sweep_of(fifesim.Scenario()).shape == (3, 3, 3, 4, 4)
     assert sweep.hazes == (10.0, 45.0) and sweep.szas[1] == 60.0 and sweep.instruments == ("MSI", "TM")
 

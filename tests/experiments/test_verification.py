@@ -56,7 +56,7 @@ def test_results_that_are_2_percent_too_large_are_noticed(monkeypatch, only, qua
     """5 % for the variance of a sample, and 25 % for crowns, whose model has an error of 14 %."""
     rows, right, factor = only(quantity), COMPARED[quantity], {"noise variance": 1.05, "crowns": 1.25}
     monkeypatch.setitem(COMPARED, quantity, lambda **inputs: factor.get(quantity, 1.02) * right(**inputs))
-    found = fifesim.verify()
+    found = fifesim.experiments.verify()
     assert len(found) == len(rows) and not all(each.within for each in found)
 
 
@@ -78,7 +78,7 @@ def test_blas_has_one_thread(monkeypatch, only):
         return np.nan
 
     monkeypatch.setitem(COMPARED, "Ross-Li", threads)
-    fifesim.verify()
+    fifesim.experiments.verify()
     assert found and set(found) == {1}
 
 

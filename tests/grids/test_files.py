@@ -68,7 +68,7 @@ def test_gdal_reads_location_bands_and_calibration(image, tmp_path):
 def test_raster_survives_a_round_trip(image, lai, tmp_path, name, chunks):
     raster = {
         "image": image,
-        "radiance": fifesim.to_radiance(image),
+        "radiance": fifesim.sensor.to_radiance(image),
         "reflectance": fifesim.to_reflectance(image),
         "ndvi": fifesim.ndvi(image),
         "lai": lai,

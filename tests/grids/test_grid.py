@@ -296,7 +296,7 @@ UNEVEN = {
 SOURCES = {
     "open_lai": lambda raster: fifesim.open_lai(raster.rename("lai"), WINDOW),
     "fine_dem": lambda raster: fifesim.fine_dem(300 + raster, WINDOW),
-    "source_dem": lambda raster: fifesim.source_dem(300 + raster, WINDOW, margin=0.0),
+    "source_dem": lambda raster: fifesim.terrain.source_dem(300 + raster, WINDOW, margin=0.0),
     "moisture": lambda raster: fifesim.landscape(WINDOW, moisture=raster / 10),
     "cover": lambda raster: fifesim.landscape(
         WINDOW, cover=raster.astype(int), classes=[fifesim.CoverClass(str(i), lai=1.0, code=i) for i in range(10)]

@@ -332,7 +332,7 @@ CODES = {"a": fifesim.CoverClass(code=2, lai=2.0), "b": fifesim.CoverClass(code=
 BY_BAND = {
     "lai": lambda given: fifesim.open_lai(given, GRID),
     "elevation": lambda given: fifesim.fine_dem(given, GRID),
-    "DEM": lambda given: fifesim.source_dem(given, GRID, margin=0)[0],
+    "DEM": lambda given: fifesim.terrain.source_dem(given, GRID, margin=0)[0],
     "cover": lambda given: fifesim.landscape(GRID, cover=given, classes=CODES).cover,
     "brown": lambda given: 10 * fifesim.landscape(GRID, brown=given).brown,
 }

@@ -119,7 +119,7 @@ def test_rasters_that_are_no_swath_are_rejected():
     with pytest.raises(ValueError, match="takes the image of a scan"):
         grid_swath(on_grid, GRID)
     with pytest.raises(ValueError, match="method must be 'nearest' or 'mean', got 'cubic'"):
-        fifesim.grid_swath(swath(), GRID, "cubic")
+        fifesim.sensor.grid_swath(swath(), GRID, "cubic")
     with pytest.raises(ValueError, match="min_valid must be"):
         grid_swath(swath(), GRID, "mean", min_valid=2)
     far = fifesim.grid_at("EPSG:26914", 725000.0, 4334000.0, 1500.0, 1200.0, 30.0)

@@ -275,7 +275,7 @@ def untagged_copy(copy):
 def test_gdal_names_calibration_and_wavelengths_follow_the_bands(image, untagged_copy, open_changed, bands):
     untagged_copy.select(bands)
     found, expected = open_changed(untagged_copy), image.isel(band=bands)
-    np.testing.assert_allclose(fifesim.to_radiance(found), fifesim.to_radiance(expected), rtol=1e-12)
+    np.testing.assert_allclose(fifesim.sensor.to_radiance(found), fifesim.sensor.to_radiance(expected), rtol=1e-12)
     np.testing.assert_allclose(found["wavelength"], expected["wavelength"], rtol=1e-8)
     assert found["band"].values.tolist() == expected["band"].values.tolist()
 
@@ -284,7 +284,7 @@ def test_untagged_fractions_with_a_scale_are_radiance(image, untagged_copy, open
     untagged_copy.convert("float32")
     found = open_changed(untagged_copy)
     assert found.attrs["units"] == "W m-2 sr-1 um-1" and "gain" not in found.coords
-    np.testing.assert_allclose(found, fifesim.to_radiance(image), rtol=1e-6)
+    np.testing.assert_allclose(found, fifesim.sensor.to_radiance(image), rtol=1e-6)
 
 
 def test_digital_numbers_without_scale_are_rejected(untagged_copy, open_changed):

@@ -69,7 +69,7 @@ def test_day_equals_the_sum_over_144_steps(absorbed, latitude, date):
     sunset = np.arccos(-np.tan(phi) * np.tan(delta))
     angle = sunset * (2 * (np.arange(144) + 0.5) / 144 - 1)
     sza = np.degrees(np.arccos(np.sin(phi) * np.sin(delta) + np.cos(phi) * np.cos(delta) * np.cos(angle)))
-    weather = fifesim.fife_weather().replace(day_length=24 / np.pi * sunset)
+    weather = fifesim.models.fife_weather().replace(day_length=24 / np.pi * sunset)
     (flux, sky), fpar = absorbed[1](sza).T, absorbed[0](sza)
     flux = flux * np.cos(np.radians(sza))
     light, sky = flux / flux.mean(), weather.diffuse_fraction * sky * flux.sum() / (sky @ flux)
@@ -84,7 +84,7 @@ def test_day_equals_the_sum_over_144_steps(absorbed, latitude, date):
 
 def test_instant_is_a_flux_and_a_date_is_a_day(absorbed):
     lai, _ = raster(39.0)
-    given = {"canopy": CANOPY, "atmosphere": AIR, "weather": fifesim.fife_weather()}
+    given = {"canopy": CANOPY, "atmosphere": AIR, "weather": fifesim.models.fife_weather()}
     day = lai.assign_coords(time=np.datetime64("2022-06-21")).fifesim.gpp(**given)
     times = [f"2022-06-21T{hour:02d}:30Z" for hour in range(4, 18)]
     instants = [lai.fifesim.gpp(**given, time=time) for time in times]
@@ -98,7 +98,7 @@ def test_instant_is_a_flux_and_a_date_is_a_day(absorbed):
 
 def test_polar_night_is_zero_and_polar_day_has_24_hours():
     lai, _ = raster(75.0, [np.nan, 0.5, 3.0])
-    given = {"canopy": CANOPY, "atmosphere": AIR, "weather": fifesim.fife_weather().replace(day_length=24.0)}
+    given = {"canopy": CANOPY, "atmosphere": AIR, "weather": fifesim.models.fife_weather().replace(day_length=24.0)}
     with pytest.warns(UserWarning, match="does not rise on this day: gpp is 0"):
         night = lai.assign_coords(time=np.datetime64("2022-12-21T12:00")).fifesim.gpp(**given)
     np.testing.assert_array_equal(night.values[0], [np.nan, 0.0, 0.0])
@@ -107,7 +107,7 @@ def test_polar_night_is_zero_and_polar_day_has_24_hours():
     summer = lai.assign_coords(time=np.datetime64("2022-06-21T12:00")).fifesim.gpp(**given)
     assert "24.00 h" in summer.history and summer.values[0, 2] > summer.values[0, 1] > 0
     with pytest.warns(UserWarning, match="day_length 14.9 h, but the sun is over .* for 24.0 h"):
-        lai.fifesim.gpp(**given | {"weather": fifesim.fife_weather()}, time="2022-06-21T12:00Z")
+        lai.fifesim.gpp(**given | {"weather": fifesim.models.fife_weather()}, time="2022-06-21T12:00Z")
 
 
 def test_declination_follows_from_the_sun_of_any_time():

@@ -12,7 +12,7 @@ import fifesim
 from fifesim.models import production
 from fifesim.models.radiation import two_stream
 
-WEATHER = fifesim.fife_weather()
+WEATHER = fifesim.models.fife_weather()
 
 
 def field(lai, low, high):
@@ -114,7 +114,7 @@ def test_units_of_rasters_and_ranges_of_formulas_are_checked(lai):
 
 def test_weather_is_equal_by_value(lai):
     moist, dry = field(lai, 0.5, 1), field(lai, 0, 0.5)
-    assert fifesim.fife_weather() == WEATHER and hash(fifesim.fife_weather()) == hash(WEATHER)
+    assert fifesim.models.fife_weather() == WEATHER and hash(fifesim.models.fife_weather()) == hash(WEATHER)
     assert WEATHER.replace(humidity=moist) == WEATHER.replace(humidity=moist.copy())
     assert WEATHER.replace(humidity=moist) != WEATHER.replace(humidity=dry) != WEATHER
 
@@ -156,7 +156,7 @@ def test_weather_and_leaves_of_another_site_are_asked_for():
     sun, air = fifesim.Geometry(sza=40, saa=150), fifesim.Atmosphere(altitude=0.1)
     canopy = fifesim.Canopy(leaf_optics=fifesim.Leaf(), background=0.2)
     verb = partial(lai.fifesim.evapotranspiration, atmosphere=air, geometry=sun)
-    with pytest.warns(UserWarning, match=r"weather over lai is unknown.*June.*300 K.*weather=fifesim\.Weather"):
+    with pytest.warns(UserWarning, match=r"weather over lai is unknown.*June.*300 K.*weather=fifesim\.models\.Weather"):
         verb(canopy=canopy)
     for model in ("light-use", "farquhar"):
         with pytest.warns(UserWarning, match=r"weather over lai is unknown"):

@@ -65,7 +65,7 @@ def test_quantity_colours_come_from_the_table(clumping, tmp_path):
     picture = clumping.fifesim.plot().images[0]
     assert picture.get_cmap().name == "magma" and picture.get_clim() == pytest.approx((low, high))
     assert value_map(clumping, "").bar.stops == layer_words(["clumping"])["clumping"]["stops"] == magma
-    style = fifesim.write_style(clumping.fifesim.to_geotiff(tmp_path / "clumping.tif"))
+    style = fifesim.output.write_style(clumping.fifesim.to_geotiff(tmp_path / "clumping.tif"))
     shown = list(ElementTree.parse(style).getroot().iter("item"))
     assert [item.get("color") for item in shown] == magma
     ends = [float(shown[end].get("value")) for end in (0, -1)]
@@ -113,7 +113,7 @@ def test_instruments_images_and_styles_use_the_same_composite_bands(name, lai, t
     *green, red, near = (band.name for band in bands)
     assert composite_bands(image) == [near, red, green[0] if green else red]
     assert false_colour_names(image) == ([near, red, *green] if green else [])
-    style = fifesim.write_style(image.fifesim.to_geotiff(tmp_path / "image.tif"))
+    style = fifesim.output.write_style(image.fifesim.to_geotiff(tmp_path / "image.tif"))
     renderer = ElementTree.parse(style).getroot().find("pipe/rasterrenderer")
     numbers = [int(renderer.get(f"{colour}Band")) - 1 for colour in ("red", "green", "blue")]
     assert numbers == colour_composite(wavelengths)
@@ -121,7 +121,7 @@ def test_instruments_images_and_styles_use_the_same_composite_bands(name, lai, t
 
 def test_composite_is_stretched_alike_in_qgis_and_in_a_picture(whole, tmp_path):
     toa = whole["toa"]
-    style = fifesim.write_style(toa.fifesim.to_geotiff(tmp_path / "toa.tif"))
+    style = fifesim.output.write_style(toa.fifesim.to_geotiff(tmp_path / "toa.tif"))
     renderer = ElementTree.parse(style).getroot().find("pipe/rasterrenderer")
     for colour, band in (("red", "TM4"), ("green", "TM3"), ("blue", "TM3")):
         found = [float(renderer.find(f"{colour}ContrastEnhancement/{end}Value").text) for end in ("min", "max")]

@@ -234,7 +234,7 @@ def test_style_ramps_and_stretches_span_the_data(image, small_run, tmp_path):
     assert [(each.get("value"), each.get("color")) for each in (first, last)] == [("0", "#440154"), ("1", "#fde725")]
     near = image.sel(band=["TM4"]).copy()
     near[:, :, :15] = 0
-    expected = np.percentile(fifesim.to_radiance(image).sel(band="TM4")[:, 15:], (1, 99))
+    expected = np.percentile(fifesim.sensor.to_radiance(image).sel(band="TM4")[:, 15:], (1, 99))
     for name, raster in (("holed", near), ("flat", near.where(False, 7).astype("uint8"))):
         found = read_style(raster, tmp_path / f"{name}.tif").find("contrastEnhancement")
         assert found.find("algorithm").text == "StretchToMinimumMaximum"

@@ -172,7 +172,7 @@ def make_scores(spread, seed=3):
 
 def test_scores_are_drawn_by_group_with_error_bars():
     scores = make_scores(0.5)
-    figure = fifesim.plot_score(scores)
+    figure = fifesim.output.plot_score(scores)
     coverage, pit = figure.axes
     drawn_artist = [container[0] for container in coverage.containers]
     assert len(drawn_artist) == 2
@@ -191,6 +191,6 @@ def test_scores_are_drawn_by_group_with_error_bars():
 
 def test_scores_that_cannot_be_drawn_are_rejected():
     with pytest.raises(ValueError, match="neither coverage nor pit"):
-        fifesim.plot_score(make_scores(1.0)[["rmse"]])
+        fifesim.output.plot_score(make_scores(1.0)[["rmse"]])
     with pytest.raises(ValueError, match="select one"):
-        fifesim.plot_score(xr.concat([make_scores(1.0)] * 2, "product"))
+        fifesim.output.plot_score(xr.concat([make_scores(1.0)] * 2, "product"))

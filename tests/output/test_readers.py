@@ -15,7 +15,7 @@ WEST, NORTH, PIXEL, ROWS, COLUMNS = 704970.0, 4334220.0, 30.0, 20, 30
 
 
 def run_radiance(folder):
-    return fifesim.to_radiance(fifesim.open_image(folder / "image.tif"))
+    return fifesim.sensor.to_radiance(fifesim.open_image(folder / "image.tif"))
 
 
 def check_location(array):

@@ -38,7 +38,7 @@ FEW_CELLS = 3000
 # Values that the descriptions do not mention; most are invalid for most keys.
 NAMES = [
     *("EPSG:26914", "EPSG:32614", "EPSG:3857", "EPSG:5041", "EPSG:2277", "EPSG:4326", "EPSG:26914+5703", "+proj=utm"),
-    *fifesim.instrument_names(),
+    *fifesim.sensor.instrument_names(),
     *gases.PROFILES,
     *("maritime", "urban", "dust:0.5+soot:0.5", "none", "dust:1e308+soot:-1"),
     *("erectophile", "planophile", "campbell(1.5)", "verhoef(-0.35,-0.15)", "verhoef(9,9)"),

@@ -66,7 +66,7 @@ def written(kind):
     with tempfile.TemporaryDirectory() as folder:
         path = raster.fifesim.to_geotiff(Path(folder) / "written.tif")
         copy, opened = Copy(path), fifesim.open_image(path)
-    physical = fifesim.to_radiance(raster) if "gain" in opened.coords else opened
+    physical = fifesim.sensor.to_radiance(raster) if "gain" in opened.coords else opened
     wavelengths = {}
     if "wavelength" in opened.coords:
         wavelengths = dict(zip(copy.descriptions, opened["wavelength"].values, strict=True))
@@ -245,7 +245,7 @@ def check_values(found, edited, tagged):
         expected = [edited.wavelengths[name] for name in edited.names]
         np.testing.assert_allclose(found["wavelength"], expected, rtol=1e-8)
     calibrated = "gain" in found.coords
-    radiance = fifesim.to_radiance(found) if calibrated else found
+    radiance = fifesim.sensor.to_radiance(found) if calibrated else found
     units = found.attrs.get("units")
     claimed = calibrated or (units == RADIANCE if edited.counted else tagged or units is not None)
     if not claimed:

@@ -122,7 +122,7 @@ def test_training_is_reproducible_to_the_bit(chips):
 
 def test_retrieval_is_restored_from_its_file(retrieval, light, tmp_path):
     retrieval.to_netcdf(tmp_path / "mine.nc")
-    again = fifesim.read_retrieval(tmp_path / "mine.nc")
+    again = fifesim.retrieval.read_retrieval(tmp_path / "mine.nc")
     assert again == retrieval and again != replace(
         retrieval, tables=retrieval.tables | {"stretch": np.full((2, 3), 2.0)}
     )
@@ -287,7 +287,7 @@ def test_uniform_ground_is_corrected_exactly(chips):
     lai = np.linspace(0.1, 3, 900).reshape(30, 30)
     toa = uniform_reflectance(scenario, {"lai": lai})
     setup = setup_of(scenario)
-    expected = fifesim.canopy_spectra(
+    expected = fifesim.ground.canopy_spectra(
         {"lai": lai.ravel()}, "MSI", bands=setup.bands, canopy=setup.canopy, geometry=setup.geometry,
         atmosphere=setup.atmosphere,
     )  # fmt: skip
@@ -415,7 +415,7 @@ def test_files_without_a_retrieval_are_rejected(tmp_path, trained):
     messages["older"] = "format 2 .*reads format 3: train it again"
     for name, message in messages.items():
         with pytest.raises(ValueError, match=message):
-            fifesim.read_retrieval(tmp_path / f"{name}.nc")
+            fifesim.retrieval.read_retrieval(tmp_path / f"{name}.nc")
 
 
 def sealed(content, path):
@@ -433,7 +433,7 @@ def test_changed_bytes_of_a_file_are_rejected(tmp_path, retrieval):
     for content in (*damaged, whole[:-1], whole + b"0", whole[: len(whole) // 2], b""):
         path.write_bytes(content)
         with pytest.raises(ValueError, match=r"mine.nc.*train it again") as caught:
-            fifesim.read_retrieval(path)
+            fifesim.retrieval.read_retrieval(path)
         assert "\n" not in str(caught.value)
 
 
@@ -459,7 +459,7 @@ def test_files_with_impossible_content_are_rejected(tmp_path, trained, change, s
     file = change(trained("quantiles")._dataset())
     sealed(bytes(file.to_netcdf(engine="netcdf4")), tmp_path / "mine.nc")
     with pytest.raises(ValueError, match=rf"mine.nc is not a valid retrieval.*{said}.*train it again"):
-        fifesim.read_retrieval(tmp_path / "mine.nc")
+        fifesim.retrieval.read_retrieval(tmp_path / "mine.nc")
 
 
 def test_declared_size_is_checked_before_it_is_read(tmp_path):
@@ -468,7 +468,7 @@ def test_declared_size_is_checked_before_it_is_read(tmp_path):
         file.createVariable("table_stretch", "f8", ("many",), chunksizes=(10**6,))
     sealed((tmp_path / "large.nc").read_bytes(), tmp_path / "large.nc")
     with pytest.raises(ValueError, match=r"large.nc.*declares 8000000000000 bytes"):
-        fifesim.read_retrieval(tmp_path / "large.nc")
+        fifesim.retrieval.read_retrieval(tmp_path / "large.nc")
 
 
 def test_unusable_path_is_found_before_the_training(tmp_path, chips, monkeypatch):
@@ -484,4 +484,4 @@ def test_links_in_the_folder_of_a_file_are_not_followed(tmp_path, trained):
         (tmp_path / name).symlink_to("victim")
     trained("line").to_netcdf(tmp_path / "r.nc")
     assert (tmp_path / "victim").read_text() == "mine" and not (tmp_path / "r.nc").is_symlink()
-    assert fifesim.read_retrieval(tmp_path / "r.nc") == trained("line")
+    assert fifesim.retrieval.read_retrieval(tmp_path / "r.nc") == trained("line")

@@ -282,7 +282,7 @@ def by_verbs(one):
         setup.instrument, bands=setup.bands, canopy=setup.canopy, upwelling=setup.upwelling, **slopes, **air,
         streams=STREAMS[setup.coupling],
     )  # fmt: skip
-    clouds = None if setup.clouds is None else fifesim.cast_clouds(rho, clouds_of(one, grid, None), dem=dem)
+    clouds = None if setup.clouds is None else fifesim.atmosphere.cast_clouds(rho, clouds_of(one, grid, None), dem=dem)
     toa = fifesim.to_toa(rho, adjacency=setup.adjacency, clouds=clouds)
     return fifesim.sense(
         toa, setup.instrument, onto=setup.onto, interval=setup.interval, offset=setup.offset, noise=setup.noise,
@@ -303,7 +303,7 @@ def test_simulate_verbs_chips_and_sweeps_are_equal_for_scenarios_drawn_over_all_
         np.testing.assert_array_equal(by_verbs(one), run["image"]["dn"], err_msg=text)
         if "ndvi" not in image or one.sensor.interval != "product":
             continue
-        found = fifesim.sweep(one, {"ground.seed": [one.ground.seed]}).compute(scheduler="synchronous")
+        found = fifesim.scenario.sweep(one, {"ground.seed": [one.ground.seed]}).compute(scheduler="synchronous")
         for name in ("lai", "fpar"):
             fit = fifesim.regress(run["truth"][name], run["image"]["ndvi"])
             assert found["slope"].sel(variable=name).item() == fit.slope, text

@@ -68,7 +68,7 @@ def by_hand(scenario):
     """The landscape of `OWN`, built by explicit calls."""
     return fifesim.landscape(
         scenario.geobox(),
-        cover=fifesim.Patches("voronoi", 80, {"grass": 0.7, "wood": 0.3}),
+        cover=fifesim.ground.Patches("voronoi", 80, {"grass": 0.7, "wood": 0.3}),
         classes={
             "grass": fifesim.CoverClass(
                 lai="burned-ungrazed", canopy=fifesim.Canopy(hotspot=0.2, leaf_angles="spherical"), arp=0.2
@@ -76,8 +76,8 @@ def by_hand(scenario):
             "wood": fifesim.CoverClass(lai="unburned-ungrazed", canopy=fifesim.Canopy(leaf_angles="erectophile")),
         },
         arp=0.1,
-        brown=fifesim.Field(mean=0.2, sd=0.06, arp=0.1, coarser=2),
-        soil=fifesim.Field(sd=0.03, arp=0.24, coarser=2),
+        brown=fifesim.ground.Field(mean=0.2, sd=0.06, arp=0.1, coarser=2),
+        soil=fifesim.ground.Field(sd=0.03, arp=0.24, coarser=2),
         covary={"soil": -0.3},
         seed=11,
     )
@@ -169,10 +169,10 @@ def test_drawn_properties_take_mean_and_arp_from_the_ground():
         | {"landscape": {"deviations": deviations, "arps": arps}}
     )
     assert drawn_properties(case) == {
-        "soil": fifesim.Field(mean=-0.1, sd=0.03, arp=0.24),
-        "moisture": fifesim.Field(mean=0.3, sd=0.1, arp=0.1),
-        "brown": fifesim.Field(mean=0.2, sd=0.05, arp=0.0),
-        "crown_cover": fifesim.Field(mean=0.8, sd=0.07, arp=0.1),
+        "soil": fifesim.ground.Field(mean=-0.1, sd=0.03, arp=0.24),
+        "moisture": fifesim.ground.Field(mean=0.3, sd=0.1, arp=0.1),
+        "brown": fifesim.ground.Field(mean=0.2, sd=0.05, arp=0.0),
+        "crown_cover": fifesim.ground.Field(mean=0.8, sd=0.07, arp=0.1),
     }
 
 

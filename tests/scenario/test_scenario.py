@@ -39,7 +39,7 @@ SMALL = {"grid": {"width": 300.0, "height": 150.0}}
 def read_text(tmp_path, text):
     path = tmp_path / "scenario.toml"
     path.write_text(text, encoding="utf-8")
-    return fifesim.read_scenario(path)
+    return fifesim.scenario.read_scenario(path)
 
 
 def test_default_scenario_is_the_paper_case_on_the_whole_site():

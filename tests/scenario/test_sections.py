@@ -26,9 +26,9 @@ def test_complete_optics_are_passed_to_the_chain():
 
 def test_aerosol_file_is_found_next_to_the_scenario(tmp_path, monkeypatch):
     """An aerosol file needs an optical thickness, and a completed scenario holds its full path."""
-    fifesim.aerosol_tables("urban").to_netcdf(tmp_path / "mine.nc")
+    fifesim.atmosphere.aerosol_tables("urban").to_netcdf(tmp_path / "mine.nc")
     (tmp_path / "mine.toml").write_text('[atmosphere]\naerosol = "mine.nc"\naot = 0.3\n')
-    scenario = fifesim.read_scenario(tmp_path / "mine.toml")
+    scenario = fifesim.scenario.read_scenario(tmp_path / "mine.toml")
     air = scenario.model_atmosphere()
     assert (air.aerosol.name, air.aot, air.visibility) == ("mine", 0.3, None)
     assert scenario.files["atmosphere", "aerosol"] == str(tmp_path / "mine.nc")

@@ -45,7 +45,7 @@ def test_terrain_matches_explicit_calls_of_the_chain(hill):
     tree = fifesim.simulate(case)
     grid = case.geobox()
     dem = fifesim.fine_dem(case.terrain.dem, grid)
-    around, reach = fifesim.source_dem(case.terrain.dem, grid, 900)
+    around, reach = fifesim.terrain.source_dem(case.terrain.dem, grid, 900)
     lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7)
     level = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"])
     horizon = fifesim.horizon(around, reach=900)
@@ -223,7 +223,7 @@ def test_instrument_path_is_relative_to_the_scenario_and_its_tables_to_the_instr
     by_name = text.replace("sensors/mine.toml", "AVHRR9")
     (elsewhere / "named.toml").write_text(by_name, encoding="utf-8")
     mine, named = (
-        fifesim.simulate(fifesim.read_scenario(path).complete())["image"]["dn"].compute()
+        fifesim.simulate(fifesim.scenario.read_scenario(path).complete())["image"]["dn"].compute()
         for path in ("../s.toml", "named.toml")
     )
     np.testing.assert_array_equal(mine, named)

@@ -138,7 +138,7 @@ def test_only_bands_of_another_instrument_warn(recwarn):
 
 
 def test_psf_integrates_to_one():
-    spread = fifesim.psf(PAPER, "TM4")
+    spread = fifesim.sensor.psf(PAPER, "TM4")
     step = float(spread["x"][1] - spread["x"][0])
     assert float(spread.sum()) * step**2 == pytest.approx(1.0, rel=1e-12)
     np.testing.assert_allclose(spread, spread.T, rtol=1e-12)
@@ -151,29 +151,29 @@ def test_psf_integrates_to_one():
 def test_along_and_across_responses_are_on_the_right_axes():
     along, across = BoxcarResponse("boxcar", width=90 / 705e3), CosineResponse("cosine", step=4.778e-6, count=9)
     mixed = replace(PAPER, lsf=TwoAxesResponse(along, across))
-    spread = fifesim.psf(mixed, spacing=1.0)
+    spread = fifesim.sensor.psf(mixed, spacing=1.0)
     assert (spread.sum("x") > 1e-9).sum() == 91 and (spread.sum("y") > 1e-9).sum() == 31
-    transfer = fifesim.mtf(mixed, "TM3", frequency=[0.0, 1 / 90])[0]
+    transfer = fifesim.sensor.mtf(mixed, "TM3", frequency=[0.0, 1 / 90])[0]
     np.testing.assert_allclose(transfer.sel(direction="along"), [1.0, 0.0], rtol=0, atol=1e-12)
     assert transfer.sel(direction="across")[1] > 0.8
 
 
 def test_mtf_extends_to_the_sampling_frequency_of_each_band():
-    transfer = fifesim.mtf("TM", "TM3")
+    transfer = fifesim.sensor.mtf("TM", "TM3")
     assert transfer.dims == ("band", "direction", "frequency")
     assert float(transfer["frequency"][-1]) == pytest.approx(1 / 30.315)
     assert float(transfer["nyquist"].sel(band="TM3", direction="along")) == pytest.approx(0.5 / 30.315)
     np.testing.assert_allclose(transfer.sel(frequency=0), 1.0, rtol=1e-12)
-    transfer = fifesim.mtf("MSI")
+    transfer = fifesim.sensor.mtf("MSI")
     assert transfer["band"].values.tolist() == [band.name for band in instrument("MSI").bands]
     assert float(transfer["nyquist"].sel(band="MSI1", direction="across")) == pytest.approx(0.5 / 60, rel=1e-3)
     assert float(transfer["product_nyquist"].sel(band="MSI11")) == 0.5 / 20
     np.testing.assert_allclose(transfer["at_nyquist"].sel(band="MSI4"), [0.24, 0.31], rtol=0, atol=0.01)
     # A boxcar detector passes sinc(width times frequency).
-    modis = fifesim.mtf(fifesim.instrument("MODIS", response="detector"), ["MODIS1"]).sel(direction="along")
+    modis = fifesim.sensor.mtf(fifesim.instrument("MODIS", response="detector"), ["MODIS1"]).sel(direction="along")
     width = instrument("MODIS").ground_fields(instrument("MODIS").bands[0]).along
     np.testing.assert_allclose(modis["at_product_nyquist"], np.sinc(width * modis["product_nyquist"]), rtol=1e-12)
-    assert fifesim.mtf("SuperDove", "PS6")["at_nyquist"].values == pytest.approx(2 / np.pi, rel=1e-6)
+    assert fifesim.sensor.mtf("SuperDove", "PS6")["at_nyquist"].values == pytest.approx(2 / np.pi, rel=1e-6)
 
 
 # ------------------------------------------------------------------------------------------ noise
@@ -209,9 +209,9 @@ def test_snr_agrees_with_the_specification_and_the_shot_share():
             "TM3 has the wavelength 0.83 um, and TM3 of T",
         ),
         (lambda: check_wavelengths(named(TM34, WRONG, instrument="unknown")), "contradict each other"),
-        (lambda: fifesim.psf("TM", spacing=0), "spacing"),
-        (lambda: fifesim.mtf("TM", "TM9"), "TM9"),
-        (lambda: fifesim.snr(SILENT, "TM3", 50.0), "TM has no noise for TM3"),
+        (lambda: fifesim.sensor.psf("TM", spacing=0), "spacing"),
+        (lambda: fifesim.sensor.mtf("TM", "TM9"), "TM9"),
+        (lambda: fifesim.sensor.snr(SILENT, "TM3", 50.0), "TM has no noise for TM3"),
     ],
 )
 def test_unknown_instruments_bands_or_noise_raise(call, said):

@@ -103,7 +103,7 @@ def test_sense_follows_the_raster_rules_and_equals_the_kernels(toa, site, onto):
     assert image.dtype == np.uint8 and (image > 0).any()
     # Half a count, plus rounding of a division.
     inside = (image.values > 1) & (image.values < 255)
-    assert (np.abs(fifesim.to_radiance(image).values - radiance) <= 0.5 * gain * (1 + 1e-9))[inside].all()
+    assert (np.abs(fifesim.sensor.to_radiance(image).values - radiance) <= 0.5 * gain * (1 + 1e-9))[inside].all()
 
 
 def test_pixels_over_missing_cells_are_no_data(toa):
@@ -120,7 +120,7 @@ def test_radiance_and_reflectance_follow_the_raster_rules(toa):
     assert image["solar_irradiance"].values.tolist() == [band.solar_irradiance for band in RED_NIR]
     assert image.attrs["instrument"] == "TM" and directions.geometry_of(image) == SUN
     assert image.attrs["_FillValue"] == 0 and image.attrs["_FillValue"].dtype == image.dtype
-    radiance = check_raster_function(fifesim.to_radiance, image, quantity="toa_radiance")
+    radiance = check_raster_function(fifesim.sensor.to_radiance, image, quantity="toa_radiance")
     reflectance = check_raster_function(fifesim.to_reflectance, image, quantity="toa_reflectance")
     gain, offset, sun = (image[name].values[:, None, None] for name in ("gain", "offset", "solar_irradiance"))
     expected = calibration.dn_to_radiance(image.values, gain, offset)
@@ -169,10 +169,10 @@ def test_one_band_becomes_an_image_of_one_band(toa):
         (lambda toa: fifesim.sense(toa, NOISY, noise="shot", noise_models={"TM4": BARE}), "no shot noise for TM4"),
         (lambda toa: fifesim.sense(toa, NOISY, noise="all", noise_models={"TM33": BARE}), "'TM33': did you mean TM3"),
         (
-            lambda toa: fifesim.to_radiance(fifesim.sense(toa, "TM").drop_vars("gain")),
+            lambda toa: fifesim.sensor.to_radiance(fifesim.sense(toa, "TM").drop_vars("gain")),
             r"no gain: .*fifesim\.open_image",
         ),
-        (lambda toa: fifesim.to_radiance(fifesim.sense(toa, "TM").assign_attrs(units="m")), "'m', dn needs '1'"),
+        (lambda toa: fifesim.sensor.to_radiance(fifesim.sense(toa, "TM").assign_attrs(units="m")), "'m', dn needs '1'"),
     ],
 )
 def test_invalid_input_raises(toa, call, message):
@@ -311,7 +311,7 @@ CHANGES = {
     "wider": lambda image: image.astype(np.uint16) * np.uint16(2),
 }
 VERBS = {
-    "radiance": fifesim.to_radiance,
+    "radiance": fifesim.sensor.to_radiance,
     "reflectance": fifesim.to_reflectance,
     "ndvi": fifesim.ndvi,
     "index": lambda image: fifesim.index(image, "EVI2"),
@@ -346,9 +346,9 @@ def test_radiance_computed_by_hand_is_not_calibrated_again(image, change):
 
 @pytest.mark.parametrize("dtype", [np.uint16, np.int16, np.float32, np.float64])
 def test_digital_numbers_of_another_type_are_calibrated(image, dtype):
-    np.testing.assert_array_equal(fifesim.to_radiance(image.astype(dtype)), fifesim.to_radiance(image))
+    np.testing.assert_array_equal(fifesim.sensor.to_radiance(image.astype(dtype)), fifesim.sensor.to_radiance(image))
     masked = image.astype(np.float32).where(image > 0)
-    np.testing.assert_array_equal(fifesim.to_radiance(masked), fifesim.to_radiance(image))
+    np.testing.assert_array_equal(fifesim.sensor.to_radiance(masked), fifesim.sensor.to_radiance(image))
 
 
 # ------------------------------------------------------------------------------------ saturation
@@ -392,7 +392,7 @@ def test_saturated_pixels_are_no_data_in_derived_images(name, bands, options, la
         image = image.where(image > 0)
     full = counts == largest
     gone = full | (counts == 0)
-    for light in (fifesim.to_radiance(image), fifesim.to_reflectance(image)):
+    for light in (fifesim.sensor.to_radiance(image), fifesim.to_reflectance(image)):
         np.testing.assert_array_equal(np.isnan(light), gone)
         assert light.attrs.get("saturated_pixels", 0) == full.any(0).sum()
     for index in (fifesim.ndvi(image), fifesim.index(image, "EVI2"), fifesim.ndvi(fifesim.to_reflectance(image))):

@@ -11,7 +11,7 @@ PLACE, DIMS = (39.06, -96.54), ("band", "line", "sample")
 
 
 def days(name, start, end, place=PLACE, **options):
-    return fifesim.overpasses(name, f"{start}T00:00Z", f"{end}T00:00Z", place, **options)
+    return fifesim.sensor.overpasses(name, f"{start}T00:00Z", f"{end}T00:00Z", place, **options)
 
 
 @pytest.mark.parametrize(
@@ -81,9 +81,9 @@ def test_dates_do_not_depend_on_the_start_of_the_period():
             "phase must be a finite number of days, got nan",
         ),
         (lambda: days("MODIS", "1987-12-01", "1987-12-20", (80.0, 10.0)), "no pass by day over 80, 10 in this period"),
-        (lambda: fifesim.to_gac(xr.DataArray(np.ones((1, 3, 9), "u2"), dims=DIMS)), "got digital numbers"),
+        (lambda: fifesim.sensor.to_gac(xr.DataArray(np.ones((1, 3, 9), "u2"), dims=DIMS)), "got digital numbers"),
         (
-            lambda: fifesim.phenology(["1987-05-05T00:00Z"], green_up=280, senescence=125),
+            lambda: fifesim.ground.phenology(["1987-05-05T00:00Z"], green_up=280, senescence=125),
             "senescence must be after green_up",
         ),
     ],
@@ -100,7 +100,7 @@ def test_gac_averages_four_of_five_samples_in_every_third_line():
     values[0, 3, 7] = np.nan
     longitude = (179.9 + 0.0001 * np.arange(2048) + 180) % 360 - 180
     swath = xr.DataArray(values, dims=DIMS, coords={"longitude": (DIMS[1:], np.tile(longitude, (7, 1)))})
-    found = fifesim.to_gac(swath)
+    found = fifesim.sensor.to_gac(swath)
     assert found.shape == (2, 3, 409)
     means = [[[row[5 * k : 5 * k + 4].mean() for k in range(409)] for row in band[::3]] for band in values]
     np.testing.assert_allclose(found.values, means, rtol=1e-12)
@@ -110,5 +110,5 @@ def test_gac_averages_four_of_five_samples_in_every_third_line():
 
 def test_phenology_is_half_at_green_up_and_senescence():
     dates = ["1987-05-05T00:00Z", "1987-10-07T00:00Z", "1987-07-20T00:00Z", "1987-01-02T00:00Z"]
-    found = fifesim.phenology(dates, green_up=125, senescence=280, winter=0.2, width=8)
+    found = fifesim.ground.phenology(dates, green_up=125, senescence=280, winter=0.2, width=8)
     np.testing.assert_allclose(found, [0.6, 0.6, 1.0, 0.2], atol=1e-3)

@@ -30,9 +30,11 @@ SITE = fifesim.fife_site(30.0)
 
 
 def test_view_angles_are_computed_for_each_cell():
-    view = fifesim.scan_geometry(TM, SITE, nadir_offset=3e3, heading=193.0)
+    view = fifesim.sensor.scan_geometry(TM, SITE, nadir_offset=3e3, heading=193.0)
     rows, columns = np.meshgrid(*(np.arange(size) + 0.5 for size in SITE.shape), indexing="ij")
-    track = fifesim.Track(view.attrs["track_latitude"], view.attrs["track_longitude"], view.attrs["track_heading"])
+    track = fifesim.sensor.Track(
+        view.attrs["track_latitude"], view.attrs["track_longitude"], view.attrs["track_heading"]
+    )
     east, north = view_components(track, *latitude_longitude(SITE, rows, columns), 705e3)
     vza, vaa = np.radians(view["vza"].values), np.radians(view["vaa"].values)
     np.testing.assert_allclose(np.sin(vza) * np.sin(vaa), east, rtol=0, atol=1e-9)
@@ -41,13 +43,13 @@ def test_view_angles_are_computed_for_each_cell():
         check_place(view[name], SITE.crs)
         assert cf.attributes(name).items() <= view[name].attrs.items()
     with no_compute():
-        lazy = fifesim.scan_geometry(TM, SITE, nadir_offset=3e3, heading=193.0, chunks={"y": 130, "x": 77})
+        lazy = fifesim.sensor.scan_geometry(TM, SITE, nadir_offset=3e3, heading=193.0, chunks={"y": 130, "x": 77})
     xr.testing.assert_identical(lazy.compute(), view)
 
 
 def test_track_may_cross_the_scene():
     """The track lies 3 km left of the centre, i.e. in the east when flying south: vaa changes across the track."""
-    view = fifesim.scan_geometry(TM, SITE, nadir_offset=3e3)
+    view = fifesim.sensor.scan_geometry(TM, SITE, nadir_offset=3e3)
     middle = view.isel(y=250)
     assert middle["vza"].min() < 0.002
     nadir = float(middle["x"][int(middle["vza"].values.argmin())])
@@ -59,8 +61,8 @@ def test_track_may_cross_the_scene():
 
 def test_cells_outside_a_wide_swath_are_missing():
     grid = fifesim.grid_at("EPSG:5070", -1.6e6, 2.2e6, 3.2e6, 4e5, 10e3)
-    track = fifesim.Track(39.5, -96.0, 190.0)
-    view = fifesim.scan_geometry(WIDE, grid, track)
+    track = fifesim.sensor.Track(39.5, -96.0, 190.0)
+    view = fifesim.sensor.scan_geometry(WIDE, grid, track)
     seen = np.isfinite(view["vza"].values)
     assert 0.5 < seen.mean() < 0.95
     np.testing.assert_array_equal(seen, np.isfinite(view["vaa"].values))
@@ -89,7 +91,7 @@ def test_nadir_light_in_an_off_nadir_scan_raises_with_a_remedy(site):
         toa.fifesim.sense_swath("TM", **AWAY)
     said = str(refused.value)
     assert len(said) <= 500 and "\n" not in said
-    typed = said[said.index("fifesim.scan_geometry(") : said.index(".assign(")]
+    typed = said[said.index("fifesim.sensor.scan_geometry(") : said.index(".assign(")]
     view = eval(typed, {"fifesim": fifesim, "grid": site})
     image = light(site, view.assign(sza=30.0, saa=120.0)).fifesim.sense_swath("TM", **AWAY, view_tolerance=0.01)
     seen = toa.fifesim.sense_swath("TM", **AWAY, view_tolerance=180)
@@ -99,7 +101,7 @@ def test_nadir_light_in_an_off_nadir_scan_raises_with_a_remedy(site):
 
 
 def test_lazy_angles_are_checked_on_compute(site):
-    view = fifesim.scan_geometry("TM", site, **AWAY, chunks=20).assign(sza=30.0, saa=120.0)
+    view = fifesim.sensor.scan_geometry("TM", site, **AWAY, chunks=20).assign(sza=30.0, saa=120.0)
     with no_compute():
         right = light(site, view).fifesim.sense_swath("TM", **AWAY)
         wrong = light(site, view).fifesim.sense_swath("TM", nadir_offset=60e3, heading=193.6)
@@ -172,7 +174,7 @@ def test_swath_has_the_native_interval_and_the_track_heading():
 def test_swath_is_labelled_and_its_numbers_convert_to_radiance_and_reflectance():
     image, radiance = aside(quantise=True), aside(quantise=False)
     assert image.dtype == np.uint8 and image.attrs["_FillValue"] == 0
-    assert float(abs(fifesim.to_radiance(image) - radiance).max()) <= float(image["gain"].max()) / 2 * (1 + 1e-9)
+    assert float(abs(fifesim.sensor.to_radiance(image) - radiance).max()) <= float(image["gain"].max()) / 2 * (1 + 1e-9)
     reflectance = fifesim.to_reflectance(image)
     assert reflectance.dims == ("band", "line", "sample") and "latitude" in reflectance.coords
     assert radiance["latitude"].attrs["units"] == "degrees_north" and radiance.attrs["units"] == "W m-2 sr-1 um-1"
@@ -191,7 +193,7 @@ def test_fixed_pattern_noise_follows_scan_lines():
 
 def test_swath_contains_all_pixels_centred_in_the_scene():
     """The corners of the scene limit the lines and samples."""
-    track = fifesim.Track(39.1, -96.9, 193.6)
+    track = fifesim.sensor.Track(39.1, -96.9, 193.6)
     plane = scene()
     image = fifesim.sense_swath(plane, PAPER, track, quantise=False, view_tolerance=180)
     rows, columns = np.meshgrid([0, plane.sizes["y"]], [0, plane.sizes["x"]])
@@ -208,7 +210,7 @@ def lit():
     """Uniform ground with the view angles of the scan, and its image."""
     grid = grids.geobox(scene((60, 66)))
     ground = products.labelled(np.full((2, 60, 66), [[[0.05]], [[0.4]]]), grid, ["TM3", "TM4"], {}).rename("rho")
-    view = fifesim.scan_geometry("TM", grid, **AWAY).assign(sza=30.0, saa=120.0)
+    view = fifesim.sensor.scan_geometry("TM", grid, **AWAY).assign(sza=30.0, saa=120.0)
     toa = fifesim.to_toa(ground, fifesim.Atmosphere(), geometry=view, instrument="TM")
     return toa, fifesim.sense_swath(toa, "TM", **AWAY)
 
@@ -233,7 +235,12 @@ def test_swath_is_corrected_to_the_original_surface():
 
 def test_operations_on_a_lazy_scan_are_lazy_and_equal():
     _, image = lit()
-    for verb in (fifesim.to_radiance, fifesim.to_surface, lambda array: fifesim.index(array, "EVI2"), fifesim.ndvi):
+    for verb in (
+        fifesim.sensor.to_radiance,
+        fifesim.to_surface,
+        lambda array: fifesim.index(array, "EVI2"),
+        fifesim.ndvi,
+    ):
         with no_compute():
             lazy = verb(in_chunks(image, {"line": 2, "sample": 3}))
         assert lazy.chunks is not None and lazy.dims[-2:] == ("line", "sample")
@@ -248,10 +255,13 @@ NARROW = replace(PAPER, scan=Scan("whiskbroom", max_angle=7.7), sources=SCANS)
     ("call", "said"),
     [
         (
-            lambda: fifesim.scan_geometry(NARROW, SITE, nadir_offset=2e5),
+            lambda: fifesim.sensor.scan_geometry(NARROW, SITE, nadir_offset=2e5),
             r"the grid: it begins \d+ km from .*7\.7 degrees",
         ),
-        (lambda: fifesim.scan_geometry(TM, SITE, fifesim.Track(39.0, -96.0, 190.0), nadir_offset=2e5), "one of them"),
+        (
+            lambda: fifesim.sensor.scan_geometry(TM, SITE, fifesim.sensor.Track(39.0, -96.0, 190.0), nadir_offset=2e5),
+            "one of them",
+        ),
         (lambda: fifesim.sense_swath(scene(), NARROW, nadir_offset=4e5), "does not see the scene"),
         (lambda: fifesim.sense_swath(scene((6, 6)), PAPER), "simulate a larger one"),
         (lambda: fifesim.sense_swath(scene(), PAPER, view_tolerance=-1.0), "view_tolerance must be"),

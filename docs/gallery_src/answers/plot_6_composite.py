@@ -25,7 +25,9 @@ grass = fifesim.Canopy(
 # `overpasses` lists the passes of NOAA-9 by day, with sun and view. Views are within 55 degrees of nadir. Each date has
 # an independent visibility of 8 to 60 km and an independent sky, of which 40 % have thin clouds.
 
-dates = fifesim.overpasses("AVHRR", "1987-06-01T00:00Z", "1987-06-21T00:00Z", (39.06, -96.54))
+dates = fifesim.sensor.overpasses(
+    "AVHRR", "1987-06-01T00:00Z", "1987-06-21T00:00Z", (39.06, -96.54)
+)
 dates = dates.isel(time=dates.vza <= 55).isel(time=slice(0, 14))
 haze = np.random.default_rng(5).uniform(8, 60, dates.sizes["time"])  # km
 

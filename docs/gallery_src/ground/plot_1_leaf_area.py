@@ -13,7 +13,9 @@ from matplotlib.patches import Rectangle
 
 import fifesim
 
-densities = {name: fifesim.lai_distribution(name) for name in fifesim.treatments()}
+densities = {
+    name: fifesim.ground.lai_distribution(name) for name in fifesim.ground.treatments()
+}
 wide = fifesim.fife_site(30 / 9, window=((0, 900), (0, 900)))
 lai = fifesim.lai_scene(wide, "burned-grazed", arp=0.15, seed=7)
 pixels = lai.fifesim.aggregate(30)
@@ -59,7 +61,7 @@ scenes = [fifesim.lai_scene(grid, "burned-grazed", arp=arp, seed=7) for arp in a
 # sphinx_gallery_start_ignore
 figure, axes = plt.subplots(1, 3, figsize=(11, 3.9), layout="constrained", sharey=True)
 for axis, arp, scene in zip(axes, arps, scenes, strict=True):
-    length = fifesim.correlation_length(arp, cell=30 / 9)
+    length = fifesim.ground.correlation_length(arp, cell=30 / 9)
     drawn = axis.imshow(
         scene, cmap="YlGn", vmin=0, vmax=2.2, extent=(0, 480, 0, 480), interpolation="nearest"
     )

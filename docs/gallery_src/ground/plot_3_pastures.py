@@ -60,7 +60,7 @@ figure.colorbar(seen, ax=axes[2], **below)
 corner = fifesim.fife_site(cell=30 / 9, window=((3450, 3600), (2250, 2400)))
 fenced = fifesim.landscape(corner, arp=0.24, seed=7)
 alone = fifesim.landscape(
-    corner, classes=fifesim.fife_classes()["burned-grazed"], arp=0.24, seed=7
+    corner, classes=fifesim.ground.fife_classes()["burned-grazed"], arp=0.24, seed=7
 )
 
 # sphinx_gallery_start_ignore
@@ -102,7 +102,7 @@ small = fifesim.fife_site(cell=10, window=((0, 400), (0, 400)))
 figure, axes = plt.subplots(1, 3, figsize=(10, 4.4), layout="constrained", sharey=True)
 for axis, pattern in zip(axes, ("voronoi", "levels", "pastures"), strict=True):
     land = fifesim.landscape(
-        small, cover=fifesim.Patches(pattern, 400, shares), classes=table, seed=3
+        small, cover=fifesim.ground.Patches(pattern, 400, shares), classes=table, seed=3
     )
     rho = land.fifesim.surface_reflectance("OLI", bands=["OLI4", "OLI3", "OLI2"])
     axis.imshow(np.sqrt(rho / 0.2).clip(0, 1).transpose("y", "x", "band"), extent=(0, 4, 0, 4))

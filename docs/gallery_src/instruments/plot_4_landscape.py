@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 
 import fifesim
 
-default = fifesim.default_scenario().model_dump(exclude_unset=True)
+default = fifesim.scenario.default_scenario().model_dump(exclude_unset=True)
 grid = {"width": 6600.0, "height": 6600.0}
 
 

@@ -102,7 +102,7 @@ axis.legend(frameon=False)
 # **Linear adjustment.** Published tables give one line per band pair. The last figure compares lines from the spectral
 # library with NASA's.
 
-lines = fifesim.spectral_adjustment(
+lines = fifesim.sensor.spectral_adjustment(
     "MSI", "OLI", bands=[f"OLI{number}" for number in range(1, 8)]
 )
 reflectance = 0.15

@@ -14,7 +14,7 @@ import fifesim
 grid = fifesim.grid_at("EPSG:26914", 100e3, 4440e3, 1000e3, 60e3, 500.0)
 away = {"nadir_offset": 500e3, "heading": 0.0}
 lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.248, seed=7)
-view = fifesim.scan_geometry("AVHRR", grid, **away).assign(sza=40.0, saa=150.0)
+view = fifesim.sensor.scan_geometry("AVHRR", grid, **away).assign(sza=40.0, saa=150.0)
 rho = lai.fifesim.surface_reflectance(
     "AVHRR",
     geometry=view,

@@ -218,7 +218,7 @@ def _check_map(scenario):
         warn(
             f"{Path(scenario.ground.lai_file).name} has pixels of {size:.3g} m, and cells of {cell:.3g} m "
             "are interpolated between them: nothing varies within its pixels, so that non-linearity and NDVI scaling "
-            "would be 0. Use fifesim.downscale to make a map with variation"
+            "would be 0. Use fifesim.ground.downscale to make a map with variation"
         )
 
 

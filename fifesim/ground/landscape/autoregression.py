@@ -166,7 +166,7 @@ def correlation_length(arp: float, cell: float = 1.0) -> float:
     --------
     The paper's three landscapes have length scales of "roughly" 5, 15 and 30 m (section Analyses):
 
-    >>> from fifesim import correlation_length
+    >>> from fifesim.ground import correlation_length
     >>> [round(correlation_length(arp, 10 / 3), 1) for arp in (0.05, 0.15, 0.24)]
     [4.3, 8.3, 32.1]
     """
@@ -204,7 +204,7 @@ def arp_for_length(length: float, cell: float = 1.0) -> float:
 
     Examples
     --------
-    >>> from fifesim import arp_for_length, correlation_length
+    >>> from fifesim.ground import arp_for_length, correlation_length
     >>> round(arp_for_length(correlation_length(0.2)), 9)
     0.2
     """

@@ -60,7 +60,7 @@ class Field:
 
     Examples
     --------
-    >>> from fifesim import Field
+    >>> from fifesim.ground import Field
     >>> float(Field(mean=0.2, sd=0.1).distribution("brown").mean())
     0.2
     """
@@ -224,7 +224,7 @@ def fife_classes() -> dict[str, CoverClass]:
 
     Examples
     --------
-    >>> from fifesim import fife_classes
+    >>> from fifesim.ground import fife_classes
     >>> list(fife_classes())
     ['burned-grazed', 'burned-ungrazed', 'unburned-ungrazed']
     """

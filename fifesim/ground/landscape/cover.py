@@ -236,7 +236,7 @@ class Patches:
 
     Examples
     --------
-    >>> from fifesim import Patches
+    >>> from fifesim.ground import Patches
     >>> Patches("voronoi", 300, shares={"grass": 0.7, "wood": 0.3}).size
     300.0
     """

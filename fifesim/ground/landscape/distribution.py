@@ -35,7 +35,7 @@ def treatments() -> list[str]:
 
     Examples
     --------
-    >>> from fifesim import treatments
+    >>> from fifesim.ground import treatments
     >>> treatments()
     ['burned-grazed', 'burned-ungrazed', 'unburned-ungrazed']
     """
@@ -75,7 +75,7 @@ def lai_distribution(source: LaiDistribution) -> FrozenDistribution:
 
     Examples
     --------
-    >>> from fifesim import lai_distribution
+    >>> from fifesim.ground import lai_distribution
     >>> from scipy import stats
     >>> round(float(lai_distribution(stats.gamma(4, scale=0.4)).mean()), 2)
     1.6

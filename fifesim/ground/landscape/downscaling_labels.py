@@ -164,7 +164,7 @@ def downscale(
     arp : float, optional
         Autoregressive parameter of the cells, in [0, 0.2498]. [1]
     distribution : str, path or frozen scipy distribution, optional
-        Distribution of LAI over all cells, as in `fifesim.lai_distribution`.
+        Distribution of LAI over all cells, as in `fifesim.ground.lai_distribution`.
     cv : float or callable, optional
         Coefficient of variation of the cells within a pixel, or a function of an array of pixel means. The default
         follows FIFE's grass: a standard deviation of 0.4 within pixels, limited to 0.6 times the mean. [1]

@@ -150,7 +150,7 @@ def correlated_fields(
     >>> import numpy as np
     >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
     >>> pairs = {("lai", "soil"): -0.4}
-    >>> fields = fifesim.correlated_fields(grid, {"lai": 0.15, "soil": 0.15}, pairs, seed=7)
+    >>> fields = fifesim.ground.correlated_fields(grid, {"lai": 0.15, "soil": 0.15}, pairs, seed=7)
     >>> lai, soil = (fields[name].values.ravel() for name in ("lai", "soil"))
     >>> bool(-0.5 < np.corrcoef(lai, soil)[0, 1] < -0.3)
     True
@@ -314,7 +314,8 @@ def drawn_fields(grid, drawn, covary, arps, *, dem=None, geometry=None, seed=0, 
     """Standard normal fields of a landscape: leaf area scores by arp, and properties by name, dims (y, x)."""
     for name in set(covary or {}) & {"soil", *SHARES} - set(drawn):
         raise ValueError(
-            f"covary names {name}, which is no random field: give {name}=fifesim.Field(mean=..., sd=...), or remove it"
+            f"covary names {name}, which is no random field: give {name}=fifesim.ground.Field(mean=..., sd=...), or "
+            "remove it"
         )
     # Properties of the elevation are computed once for all fields.
     named = [name for name in OF_ELEVATION if name in (covary or {}) and dem is not None]

@@ -187,7 +187,7 @@ def landscape(
     --------
     >>> import fifesim
     >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
-    >>> land = fifesim.landscape(grid, soil=fifesim.Field(sd=0.03, arp=0.24), seed=7)
+    >>> land = fifesim.landscape(grid, soil=fifesim.ground.Field(sd=0.03, arp=0.24), seed=7)
     >>> sorted(land.data_vars)
     ['cover', 'lai', 'soil']
     >>> land.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).dims
@@ -243,13 +243,15 @@ def _cover(grid, cover, table, seed, chunks, allow_remote):
         if len(table) > 1 and [each.name for each in table] != list(fife_classes()):
             raise ValueError(
                 f"the layout of the {len(table)} classes is unknown: give cover= a map of their codes, or for instance "
-                'fifesim.Patches("voronoi", size=300)'
+                'fifesim.ground.Patches("voronoi", size=300)'
             )
         cover = FIFE_PASTURES
     if isinstance(cover, Patches):
         return drawn_cover(grid, cover, table, seed, chunks)
     if not (isinstance(cover, xr.DataArray) or is_path(cover)):
-        raise TypeError(f"cover must be a fifesim.Patches, the path of a map or a raster, got {described(cover)}")
+        raise TypeError(
+            f"cover must be a fifesim.ground.Patches, the path of a map or a raster, got {described(cover)}"
+        )
     cover = cover.rename("cover") if isinstance(cover, xr.DataArray) else cover
     return cover_map(cover, grid, table, chunks, allow_remote=allow_remote)
 
@@ -319,7 +321,7 @@ def _property(name, given, grid, chunks, allow_remote):
         return cf.label(xr.DataArray(check(float(given))), name, history=f"landscape: {name} {given:g}")
     if not (isinstance(given, xr.DataArray) or is_path(given)):
         raise TypeError(
-            f"{name} must be a number, a fifesim.Field, the path of a raster or an xarray.DataArray, got "
+            f"{name} must be a number, a fifesim.ground.Field, the path of a raster or an xarray.DataArray, got "
             f"{described(given)}"
         )
     source = open_source(given.rename(name) if isinstance(given, xr.DataArray) else given, name, allow_remote)

@@ -234,7 +234,7 @@ def phenology(
     --------
     >>> import fifesim
     >>> dates = ["1987-03-01T16:35Z", "1987-07-10T16:35Z"]
-    >>> fifesim.phenology(dates, green_up=125, senescence=280, winter=0.1).values.round(2).tolist()
+    >>> fifesim.ground.phenology(dates, green_up=125, senescence=280, winter=0.1).values.round(2).tolist()
     [0.1, 1.0]
     """
     if not senescence > green_up:

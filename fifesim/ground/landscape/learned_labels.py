@@ -63,12 +63,12 @@ class Landscape(Described, frozen=True):
 
     See Also
     --------
-    fifesim.learn_landscape, fifesim.compare_landscapes
+    fifesim.learn_landscape, fifesim.ground.compare_landscapes
 
     Examples
     --------
     >>> import fifesim
-    >>> konza = fifesim.Landscape.read("konza")
+    >>> konza = fifesim.ground.Landscape.read("konza")
     >>> grid = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 600.0, 600.0, 10.0)
     >>> konza.simulate(grid, seed=1)["lai"].dims
     ('y', 'x')
@@ -321,9 +321,9 @@ def compare_landscapes(one: xr.DataArray, other: xr.DataArray, dem: xr.DataArray
     --------
     >>> import fifesim
     >>> grid = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 900.0, 900.0, 10.0)
-    >>> konza = fifesim.Landscape.read("konza")
+    >>> konza = fifesim.ground.Landscape.read("konza")
     >>> maps = [konza.simulate(grid, seed=seed)["lai"] for seed in (1, 2)]
-    >>> fifesim.compare_landscapes(*maps).loc["variogram", "other"] < 0.5
+    >>> fifesim.ground.compare_landscapes(*maps).loc["variogram", "other"] < 0.5
     True
     """
     sizes = [grids.cell_size(grids.geobox(each)) for each in (one, other)]

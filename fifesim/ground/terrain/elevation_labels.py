@@ -205,7 +205,7 @@ def source_dem(
     >>> import fifesim
     >>> coarse = fifesim.flint_hills(fifesim.fife_site(30, window=((0, 40), (0, 40))), seed=7)
     >>> grid = fifesim.fife_site(10, window=((30, 90), (30, 90)))
-    >>> around = fifesim.source_dem(coarse, grid, margin=300)
+    >>> around = fifesim.terrain.source_dem(coarse, grid, margin=300)
     >>> around[0].shape
     (40, 40)
     """

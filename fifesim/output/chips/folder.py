@@ -83,8 +83,8 @@ def dataset(
 
     Notes
     -----
-    Chip k is identical to `fifesim.simulate` of ``fifesim.chips_of(study, n).scenario(k)``, for any number of workers.
-    Truth and reflectance are stored in single precision.
+    Chip k is identical to `fifesim.simulate` of ``fifesim.scenario.chips_of(study, n).scenario(k)``, for any number of
+    workers. Truth and reflectance are stored in single precision.
 
     Examples
     --------

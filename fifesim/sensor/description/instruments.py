@@ -117,7 +117,7 @@ def instrument_names() -> tuple[str, ...]:
 
     Examples
     --------
-    >>> from fifesim import instrument_names
+    >>> from fifesim.sensor import instrument_names
     >>> "TM" in instrument_names()
     True
     """
@@ -155,7 +155,7 @@ def read_instrument(path: FilePath) -> Instrument:
     >>> path = Path(mkdtemp()) / "camera.toml"
     >>> text = f'name = "Camera"\\naltitude = 120.0\\ngsd = 0.1\\nbits = 12\\nbands = [{bands}]\\n'
     >>> _ = path.write_text(text, encoding="utf-8")
-    >>> [band.name for band in fifesim.read_instrument(path).bands]
+    >>> [band.name for band in fifesim.sensor.read_instrument(path).bands]
     ['red', 'nir']
     """
     # Tables are found relative to the file, even if the working directory changes.

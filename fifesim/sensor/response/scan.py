@@ -45,7 +45,7 @@ class Track:
 
     Examples
     --------
-    >>> from fifesim import Track
+    >>> from fifesim.sensor import Track
     >>> Track(latitude=39.1, longitude=-96.6, heading=190.0).heading
     190.0
     """

@@ -29,7 +29,7 @@ def test_densities_of_figure_6_are_reflected_at_zero(found):
     """The curve of the cells begins at 0.853, as the distribution; without reflection it begins at 0.447."""
     axis = figures.plot(6, found).axes[0]
     cells = axis.get_lines()[0].get_ydata()
-    known = float(fifesim.lai_distribution("burned-grazed").pdf(0))
+    known = float(fifesim.ground.lai_distribution("burned-grazed").pdf(0))
     assert cells[0] == pytest.approx(known, rel=0.03)
 
 

@@ -31,7 +31,7 @@ def test_report_has_the_numbers_of_the_budget(tmp_path):
     assert "<b>scaling</b>" in page and "MOD17" not in page and "{{" not in page
     assert f"{table.loc['total', 'bias']:+.1f} %" in page and page.count("data:image/png") == 2
     assert "temperature 300 K" in page and 'src="http' not in page
-    assert fifesim.read_scenario(tmp_path / "out" / "scenario.toml").sensor.offset == [0.3, 0.0]
+    assert fifesim.scenario.read_scenario(tmp_path / "out" / "scenario.toml").sensor.offset == [0.3, 0.0]
 
 
 def test_maps_show_the_retrieval_and_the_width_of_its_interval(retrieval):

@@ -131,7 +131,7 @@ def test_retrieval_from_reflectance_states_why_stages_cannot_be_ideal(retrieval)
 def test_invalid_quantity_and_weather_are_named(lai, options, message):
     with pytest.raises(ValueError, match=message):
         fifesim.budget(fifesim.Scenario(**BURNED), realisations=1, each=iter, **options)
-    weather = fifesim.fife_weather().replace(shortwave=(500 + lai).drop_attrs())
+    weather = fifesim.models.fife_weather().replace(shortwave=(500 + lai).drop_attrs())
     with pytest.raises(ValueError, match="weather of numbers, got a raster of shortwave"):
         fifesim.budget(fifesim.Scenario(**BURNED), quantity="gpp", weather=weather, realisations=1)
 
@@ -142,14 +142,16 @@ CHIP = fifesim.Scenario(grid={"width": 120, "height": 120}, terrain={"dem": "fla
 def test_sensitivity_matches_a_linear_function():
     """The quantity is a sum of two parameters: twice the range has four times the variance."""
     study = fifesim.Study(CHIP, {"brown": {"uniform": [0, 0.2]}, "moisture": {"uniform": [0, 0.4]}})
-    found = fifesim.sensitivity(study, lambda each: each.ground.brown + each.ground.moisture, n=256, each=iter)
+    found = fifesim.experiments.sensitivity(
+        study, lambda each: each.ground.brown + each.ground.moisture, n=256, each=iter
+    )
     assert found.parameter.values.tolist() == ["ground.brown", "ground.moisture"]
     np.testing.assert_allclose(found["first"], [0.2, 0.8], atol=0.02)
     np.testing.assert_allclose(found["total"], [0.2, 0.8], atol=0.02)
     # Only green leaves produce, and soil hardly affects the light that they absorb.
-    gpp = fifesim.sensitivity(study, "gpp", n=16, each=iter)
+    gpp = fifesim.experiments.sensitivity(study, "gpp", n=16, each=iter)
     assert gpp["first"].sel(parameter="ground.brown") > 0.95
     with pytest.raises(ValueError, match="must return a number for a scenario, it returns list"):
-        fifesim.sensitivity(study, lambda scenario: [1, 2], n=4, each=iter)
+        fifesim.experiments.sensitivity(study, lambda scenario: [1, 2], n=4, each=iter)
     with pytest.raises(ValueError, match="n must be at least 2"):
-        fifesim.sensitivity(study, n=1)
+        fifesim.experiments.sensitivity(study, n=1)

@@ -56,7 +56,7 @@ def test_map_has_one_realisation_per_window_with_data(tmp_path):
     assert found.sizes["realisation"] == 6
     assert (found["total"].std("realisation") > 0).all()
     finer = parse_scenario({"grid": {"cell": 5.0}, "ground": {"lai_file": str(tmp_path / "lai.tif")}})
-    with pytest.warns(UserWarning, match=r"lai\.tif has pixels of 10 m, and cells of 5 m.*fifesim\.downscale"):
+    with pytest.warns(UserWarning, match=r"lai\.tif has pixels of 10 m, and cells of 5 m.*fifesim\.ground\.downscale"):
         fifesim.budget(finer, realisations=1, cells=70)
 
 

@@ -203,7 +203,7 @@ def classes():
 
 def test_a_class_inherits_only_fields_that_it_does_not_give(site, classes):
     """A class that gives the default value keeps it."""
-    land = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=classes, seed=7)
+    land = fifesim.landscape(site, cover=fifesim.ground.Patches("voronoi", 30), classes=classes, seed=7)
     scene = Canopy(brown=0.3, moisture=0.4)
     rho = land.fifesim.surface_reflectance("TM", bands=TM34, canopy=scene)
     green = land.fifesim.fpar(canopy=scene, leaves="green")
@@ -236,7 +236,7 @@ def test_every_number_is_a_scenario_key_of_ground_and_classes(name):
     assert find_key(name).attributes == {"long_name": known.meaning, "units": known.unit}
     assert find_key(f"classes.wood.{name}").name == f"classes.wood.{name}"
     small = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}})
-    assert fifesim.sweep(small, {name: [0.5, 1.0]})[name].values.tolist() == [0.5, 1.0]
+    assert fifesim.scenario.sweep(small, {name: [0.5, 1.0]})[name].values.tolist() == [0.5, 1.0]
 
 
 def vars_of(limit):

@@ -363,7 +363,7 @@ def test_upright_canopy_on_a_dem():
         scene(DEM, brown=0.3)
     sizes = {"grass": 0.0, "wood": 0.1}
     classes = [fifesim.CoverClass(name, lai=1.0, canopy=fifesim.Canopy(hotspot=h)) for name, h in sizes.items()]
-    land = fifesim.landscape(GRID, cover=fifesim.Patches("voronoi", 80), classes=classes, seed=2)
+    land = fifesim.landscape(GRID, cover=fifesim.ground.Patches("voronoi", 80), classes=classes, seed=2)
     land = land.assign(lai=HILL_LAI)
     both = land.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], dem=DEM, slopes="upright")
     for code, size in enumerate(sizes.values(), 1):

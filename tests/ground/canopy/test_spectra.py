@@ -305,8 +305,8 @@ def test_errors_of_csv_files_name_the_file(tmp_path, lai, content):
     path.write_bytes(content)
     readers = {
         "spectrum": lambda: fifesim.surface_reflectance(lai, "TM", canopy=fifesim.Canopy(background=str(path))),
-        "aerosol": lambda: fifesim.read_aerosol(path),
-        "LAI samples": lambda: fifesim.lai_distribution(path),
+        "aerosol": lambda: fifesim.atmosphere.read_aerosol(path),
+        "LAI samples": lambda: fifesim.ground.lai_distribution(path),
     }
     for what, read in readers.items():
         with pytest.raises(ValueError, match=f"cannot read the {what} .*mine.csv: .*CSV in UTF-8"):

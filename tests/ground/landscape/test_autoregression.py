@@ -36,17 +36,17 @@ def test_variance_and_autocorrelation_are_transforms_of_the_squared_response(arp
 def test_autocorrelation_is_5_percent_at_the_correlation_length():
     """Correlation lengths of whole numbers of cells, which need no interpolation."""
     for cells in (1, 2, 5, 9, 20):
-        arp = fifesim.arp_for_length(cells)
+        arp = fifesim.ground.arp_for_length(cells)
         assert autocorrelation(arp, cells) == pytest.approx(0.05, abs=1e-9)
 
 
 @pytest.mark.parametrize("cell", [1.0, 10 / 3])
 def test_arp_for_length_inverts_correlation_length(cell):
     arps = np.array([0.001, 0.05, 0.15, 0.24, 0.249, LARGEST_STREAMING_ARP])
-    lengths = [fifesim.correlation_length(arp, cell) for arp in arps]
+    lengths = [fifesim.ground.correlation_length(arp, cell) for arp in arps]
     assert np.all(np.diff(lengths) > 0)
-    np.testing.assert_allclose([fifesim.arp_for_length(length, cell) for length in lengths], arps, rtol=1e-9)
-    assert fifesim.correlation_length(0.0) == fifesim.arp_for_length(0.0) == 0.0
+    np.testing.assert_allclose([fifesim.ground.arp_for_length(length, cell) for length in lengths], arps, rtol=1e-9)
+    assert fifesim.ground.correlation_length(0.0) == fifesim.ground.arp_for_length(0.0) == 0.0
 
 
 def test_response_has_decayed_at_the_margin():
@@ -238,7 +238,7 @@ def test_arp_of_a_process_that_is_not_stationary_is_refused(arp):
     for call in (
         lambda: streaming_field(1, arp, 0, 0, (2, 2)),
         lambda: periodic_field(1, arp, (2, 2)),
-        lambda: fifesim.correlation_length(arp),
+        lambda: fifesim.ground.correlation_length(arp),
     ):
         with pytest.raises(ValueError, match=r"arp must be in \[0, 0\.25\), got"):
             call()
@@ -249,7 +249,7 @@ def test_streaming_refuses_arps_and_lengths_with_too_large_a_margin():
         streaming_field(1, 0.2499, 0, 0, (2, 2))
     assert np.isfinite(periodic_field(1, 0.2499, (50, 50))).all()
     with pytest.raises(ValueError, match="use larger cells for a longer range"):
-        fifesim.arp_for_length(1e6)
+        fifesim.ground.arp_for_length(1e6)
 
 
 def test_field_of_mixed_noise_equals_mixed_fields():

@@ -160,7 +160,7 @@ def test_impossible_shares_are_refused(mean, sd, message):
 
 def test_default_field_and_limits_of_its_numbers():
     assert Field() == Field(mean=0.0, sd=0.0, arp=0.15)
-    assert fifesim.Field is Field
+    assert fifesim.ground.Field is Field
     for limit in ({"mean": 1}, {"mean": -1}, {"sd": np.int64(0)}, {"arp": 0}, {"arp": 0.2498}, {"sd": np.float32(3)}):
         Field(**limit)
 

@@ -135,7 +135,7 @@ def kolmogorov_distance(values, distribution):
     return max(np.max(steps[1:] - below), np.max(below - steps[:-1]))
 
 
-@pytest.mark.parametrize("name", fifesim.treatments())
+@pytest.mark.parametrize("name", fifesim.ground.treatments())
 def test_quantile_map_is_monotone_and_within_the_support(name):
     field = np.array([[-40.0, -8.5, -1.0, 0.0, 1.0, 8.5, 40.0]])
     distribution = lai_distribution(name)
@@ -148,7 +148,7 @@ def test_quantile_map_is_monotone_and_within_the_support(name):
 
 @pytest.mark.parametrize(
     "distribution",
-    [*map(lai_distribution, fifesim.treatments()), stats.uniform(0.5, 2.0), stats.beta(2, 3, 0, 4)],
+    [*map(lai_distribution, fifesim.ground.treatments()), stats.uniform(0.5, 2.0), stats.beta(2, 3, 0, 4)],
     ids=lambda distribution: distribution.dist.name,
 )
 def test_quantile_map_is_within_its_error_bound(distribution):
@@ -185,7 +185,7 @@ def test_quantile_map_of_classes_equals_the_map_of_each_class():
     assert (out[numbers == 1] == 1.1).all()
 
 
-@pytest.mark.parametrize("name", fifesim.treatments())
+@pytest.mark.parametrize("name", fifesim.ground.treatments())
 def test_rank_map_reproduces_the_distribution(name):
     """Each quantile (k + 1/2) / n occurs once, which gives the smallest Kolmogorov distance of n values."""
     field = np.random.default_rng(1).normal(size=(40, 50))

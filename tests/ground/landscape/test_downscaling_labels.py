@@ -38,7 +38,7 @@ def lai_map(map_values):
 
 @pytest.fixture(scope="module")
 def scene(lai_map):
-    return fifesim.downscale(lai_map, GRID, arp=0.2, cv=0.3, seed=7)
+    return fifesim.ground.downscale(lai_map, GRID, arp=0.2, cv=0.3, seed=7)
 
 
 def means(cells):
@@ -66,11 +66,11 @@ def test_scene_has_the_same_bits_in_any_chunks(scene, lai_map, chunks):
     del expected.attrs["cv_within_pixels"]
     for given in (lai_map, lazy_map):
         with no_compute():
-            lazy = fifesim.downscale(given, GRID, arp=0.2, cv=0.3, seed=7, chunks=chunks)
+            lazy = fifesim.ground.downscale(given, GRID, arp=0.2, cv=0.3, seed=7, chunks=chunks)
         assert lazy.chunks is not None
         xr.testing.assert_identical(lazy.compute(), expected)
     with no_compute():
-        assert fifesim.downscale(lazy_map, GRID, arp=0.2, cv=0.3, seed=7).chunks is not None
+        assert fifesim.ground.downscale(lazy_map, GRID, arp=0.2, cv=0.3, seed=7).chunks is not None
 
 
 @pytest.mark.parametrize(("arp", "short"), [(0.15, False), (0.24, True)])
@@ -80,24 +80,26 @@ def test_variation_below_the_requested_one_causes_a_warning(arp, short):
     grid = fifesim.fife_site(10 / 3, window=((0, 240), (0, 270)))
     for chunks in (None, 120):
         with warnings.catch_warnings(record=True, action="always", category=UserWarning) as caught:
-            cells = fifesim.downscale(coarse, grid, cv=0.4, arp=arp, seed=1, chunks=chunks).compute()
+            cells = fifesim.ground.downscale(coarse, grid, cv=0.4, arp=arp, seed=1, chunks=chunks).compute()
         assert any("cv=0.4 was requested" in str(each.message) for each in caught) == short
         blocks = cells.values.reshape(80, 3, 90, 3)
         realised = np.sqrt(np.mean(blocks.var(axis=(1, 3)) / blocks.mean(axis=(1, 3)) ** 2))
         if chunks is None:
             np.testing.assert_allclose(cells.attrs["cv_within_pixels"], realised, rtol=1e-12)
-    part = fifesim.downscale(coarse, fifesim.fife_site(10 / 3, window=((1, 240), (2, 270))), cv=0.3, arp=0.1, seed=1)
+    part = fifesim.ground.downscale(
+        coarse, fifesim.fife_site(10 / 3, window=((1, 240), (2, 270))), cv=0.3, arp=0.1, seed=1
+    )
     inside = part.values[2:, 1:].reshape(79, 3, 89, 3)
     realised = np.sqrt(np.mean(inside.var(axis=(1, 3)) / inside.mean(axis=(1, 3)) ** 2))
     np.testing.assert_allclose(part.attrs["cv_within_pixels"], realised, rtol=1e-12)
 
 
 def test_window_within_a_pixel_equals_a_slice_and_cells_outside_the_map_are_nan(scene, lai_map):
-    window = fifesim.downscale(lai_map, GRID[31:95, 44:200], arp=0.2, cv=0.3, seed=7)
+    window = fifesim.ground.downscale(lai_map, GRID[31:95, 44:200], arp=0.2, cv=0.3, seed=7)
     np.testing.assert_array_equal(window, scene[31:95, 44:200])
     xr.testing.assert_allclose(window["x"], scene["x"][44:200], rtol=0, atol=1e-6)
 
-    larger = fifesim.downscale(lai_map, GRID.pad(9), arp=0.2, cv=0.3, seed=7)
+    larger = fifesim.ground.downscale(lai_map, GRID.pad(9), arp=0.2, cv=0.3, seed=7)
     np.testing.assert_array_equal(larger[9:-9, 9:-9], scene)
     assert np.isnan(larger[:9]).all() and np.isnan(larger[:, -9:]).all()
 
@@ -105,8 +107,8 @@ def test_window_within_a_pixel_equals_a_slice_and_cells_outside_the_map_are_nan(
 def test_tiles_have_no_seams(lai_map):
     """Shifting the map by half a tile changes no cell by more than 1e-4, relatively."""
     moved = fifesim.grid_at("EPSG:32614", SOURCE.affine.c + 840, SOURCE.affine.f - 840, 700, 500, 10)
-    there = fifesim.downscale(grids.place(lai_map, moved), moved.zoom_out(1 / 3), arp=0.2, cv=0.0)
-    here = fifesim.downscale(lai_map, GRID, arp=0.2, cv=0.0)
+    there = fifesim.ground.downscale(grids.place(lai_map, moved), moved.zoom_out(1 / 3), arp=0.2, cv=0.0)
+    here = fifesim.ground.downscale(lai_map, GRID, arp=0.2, cv=0.0)
     np.testing.assert_allclose(there.values, here.values, rtol=1e-4)
 
 
@@ -120,7 +122,7 @@ def test_only_the_needed_part_of_a_map_is_read(lai_map):
 
     lazy = da.map_blocks(block, chunks=((168,) * 6,) * 2, dtype=float, meta=np.empty((0, 0)))
     pixels = grids.place(xr.DataArray(lazy, dims=("y", "x"), name="lai"), large)
-    cells = fifesim.downscale(pixels, large.zoom_out(1 / 3), chunks=504)
+    cells = fifesim.ground.downscale(pixels, large.zoom_out(1 / 3), chunks=504)
     cells[504 * 2 + 5 : 504 * 2 + 9, 504 * 3 + 5 : 504 * 3 + 9].compute()
     assert sorted(set(read)) == [(i, j) for i in (1, 2, 3) for j in (2, 3, 4)]
 
@@ -128,18 +130,18 @@ def test_only_the_needed_part_of_a_map_is_read(lai_map):
 def test_dates_are_downscaled_one_by_one(lai_map):
     days = xr.Variable("time", np.array(["2022-06-03", "2022-07-03"], "M8[ns]"))
     cube = xr.concat([lai_map, 2 * lai_map], dim=days)
-    cells = fifesim.downscale(cube, GRID, cv=0.3)
+    cells = fifesim.ground.downscale(cube, GRID, cv=0.3)
     assert cells.dims == ("time", "y", "x")
     np.testing.assert_allclose(means(cells[1]), 2 * lai_map, rtol=1e-12)
     np.testing.assert_allclose(cells[1], 2 * cells[0], rtol=1e-5)
 
 
 def test_cells_follow_a_distribution_or_a_function_of_the_mean(lai_map):
-    low = fifesim.downscale(lai_map * 0.5, GRID, distribution="unburned-ungrazed", seed=1)
+    low = fifesim.ground.downscale(lai_map * 0.5, GRID, distribution="unburned-ungrazed", seed=1)
     np.testing.assert_allclose(means(low), 0.5 * lai_map, rtol=1e-12)
     assert low.attrs["lai_distribution"] == "unburned-ungrazed" and np.nanmax(low) < 2.75 * 1.01
-    of_mean = fifesim.downscale(lai_map, GRID, cv=lambda mean: np.where(mean > 1.5, 0.0, 0.5), seed=1)
-    smooth = fifesim.downscale(lai_map, GRID, cv=0.0)
+    of_mean = fifesim.ground.downscale(lai_map, GRID, cv=lambda mean: np.where(mean > 1.5, 0.0, 0.5), seed=1)
+    smooth = fifesim.ground.downscale(lai_map, GRID, cv=0.0)
     spread, smooth = (
         each.values.reshape(50, 3, 70, 3).std(axis=(1, 3)) / lai_map.where(lai_map > 0).values
         for each in (of_mean, smooth)
@@ -156,7 +158,9 @@ def test_cells_correlate_with_a_lai_scene_of_the_same_seed(off):
     pixels = grids.place(xr.DataArray(np.ones((45, 45)), dims=("y", "x"), name="lai"), source)
     grid = source.zoom_out(1 / 3)
     plain = fifesim.lai_scene(grid, "burned-ungrazed", arp=0.05, seed=7).values.ravel()
-    same, other = (fifesim.downscale(pixels, grid, arp=0.05, cv=0.3, seed=seed).values.ravel() for seed in (7, 8))
+    same, other = (
+        fifesim.ground.downscale(pixels, grid, arp=0.05, cv=0.3, seed=seed).values.ravel() for seed in (7, 8)
+    )
     assert np.corrcoef(plain, same)[0, 1] > 0.85
     assert abs(np.corrcoef(plain, other)[0, 1]) < 0.05
 
@@ -179,20 +183,20 @@ def test_cells_correlate_with_a_lai_scene_of_the_same_seed(off):
 )
 def test_impossible_scenes_are_refused_before_computing(lai_map, options, message):
     with no_compute(), pytest.raises(ValueError, match=message):
-        fifesim.downscale(lai_map.copy(data=da.from_array(lai_map.values)), **({"grid": GRID} | options))
+        fifesim.ground.downscale(lai_map.copy(data=da.from_array(lai_map.values)), **({"grid": GRID} | options))
 
 
 def test_unusable_maps_are_refused(lai_map):
     with pytest.raises(ValueError, match="scale"):
-        fifesim.downscale(lai_map * 30, GRID)
+        fifesim.ground.downscale(lai_map * 30, GRID)
     with pytest.raises(ValueError, match="is normalized difference vegetation index by its standard_name"):
-        fifesim.downscale(lai_map.assign_attrs(cf.attributes("ndvi")), GRID)
+        fifesim.ground.downscale(lai_map.assign_attrs(cf.attributes("ndvi")), GRID)
     with no_compute():
-        lazy = fifesim.downscale((lai_map - 0.5).chunk(100), GRID)
+        lazy = fifesim.ground.downscale((lai_map - 0.5).chunk(100), GRID)
     with pytest.raises(ValueError, match="negative"):
         lazy.compute()
     with pytest.raises(ValueError, match=r"mean LAI 2.*, which cells .* from 0 to 2.2 cannot have"):
-        fifesim.downscale(lai_map, GRID, distribution="burned-grazed")
+        fifesim.ground.downscale(lai_map, GRID, distribution="burned-grazed")
 
 
 def test_scaled_integers_and_rows_from_south_to_north_are_accepted(lai_map, scene):

@@ -172,7 +172,7 @@ def test_nan_in_a_covariate_is_nan_in_the_fields_that_follow_it(grid, ground):
 )
 def test_impossible_fields_are_refused(grid, arguments, kind, message):
     with pytest.raises(kind, match=message):
-        fifesim.correlated_fields(grid, **arguments)
+        fifesim.ground.correlated_fields(grid, **arguments)
 
 
 def test_impossible_covariates_are_refused(grid, ground):

@@ -50,7 +50,7 @@ def make(grid, hills):
     """Function that makes the landscape of this file, or variants of it."""
 
     def made(grid=grid, dem=hills, **changes):
-        options = {"cover": fifesim.Patches("voronoi", 200), "classes": CLASSES, "covary": COVARY, "seed": 7}
+        options = {"cover": fifesim.ground.Patches("voronoi", 200), "classes": CLASSES, "covary": COVARY, "seed": 7}
         return fifesim.landscape(grid, **options | DRAWN | {"dem": dem} | changes)
 
     return made
@@ -63,7 +63,7 @@ def land(make):
 
 def test_properties_are_mapped_from_correlated_fields(grid):
     """Same bits as from `correlated_fields`."""
-    scores = fifesim.correlated_fields(grid, {name: each.arp for name, each in DRAWN.items()}, seed=7)
+    scores = fifesim.ground.correlated_fields(grid, {name: each.arp for name, each in DRAWN.items()}, seed=7)
     made = drawn_fields(grid, DRAWN, None, (), seed=7)[1]
     np.testing.assert_array_equal(made["soil"], scores["soil"] * DRAWN["soil"].sd)
     brown = quantile_map(scores["brown"].values, quantile_table(DRAWN["brown"].distribution("brown")))
@@ -85,7 +85,7 @@ def test_each_class_equals_a_landscape_of_this_class(land, make):
 
 def test_without_covariance_properties_do_not_change_leaf_area(grid, make):
     plain = make(covary=None)
-    bare = fifesim.landscape(grid, cover=fifesim.Patches("voronoi", 200), classes=CLASSES, seed=7)
+    bare = fifesim.landscape(grid, cover=fifesim.ground.Patches("voronoi", 200), classes=CLASSES, seed=7)
     # The leaf area names the other variables that matter.
     del plain["lai"].attrs["landscape"]
     xr.testing.assert_identical(plain[["lai", "cover"]], bare)
@@ -150,7 +150,7 @@ def test_map_of_leaf_area_excludes_covary(make, land):
 
 
 def test_field_without_deviation_is_its_mean(site):
-    land = fifesim.landscape(site, brown=fifesim.Field(mean=0.2), soil=fifesim.Field())
+    land = fifesim.landscape(site, brown=fifesim.ground.Field(mean=0.2), soil=fifesim.ground.Field())
     assert (float(land["brown"]), float(land["soil"])) == (0.2, 0.0)
     plain = fifesim.landscape(site, brown=0.2)
     found, expected = (each.fifesim.surface_reflectance("TM", bands=["TM3"]) for each in (land, plain))
@@ -291,7 +291,7 @@ THREE_CLASSES = {
     "grass": fifesim.CoverClass(lai="burned-grazed", arp=0.24),
     "wood": fifesim.CoverClass(lai=stats.gamma(9, scale=0.4)),
 }
-PATCHES = fifesim.Patches("voronoi", 30)
+PATCHES = fifesim.ground.Patches("voronoi", 30)
 
 
 @pytest.fixture(scope="module")
@@ -329,7 +329,7 @@ def test_default_landscape_has_three_treatments_in_pastures():
     assert patched.attrs["site"] == patched.lai.attrs["site"] == "FIFE"
     assert np.unique(patched.cover).tolist() == [1, 2, 3]
     means = [float(patched.lai.where(patched.cover == code).mean()) for code in (1, 2, 3)]
-    expected = [fifesim.lai_distribution(name).mean() for name in fifesim.treatments()]
+    expected = [fifesim.ground.lai_distribution(name).mean() for name in fifesim.ground.treatments()]
     np.testing.assert_allclose(means, expected, rtol=0.03)
     fences = [(patched.cover.diff(axis) != 0).mean("x" if axis == "y" else "y").max() for axis in ("y", "x")]
     assert min(fences) > 0.1
@@ -368,9 +368,9 @@ def test_classes_are_read_from_the_attributes_of_the_cover(site, patched):
     "options, error, message",
     [
         ({"classes": THREE_CLASSES}, ValueError, "the layout of the 3 classes is unknown: give cover= a map"),
-        ({"cover": fifesim.Patches("voronoi", 9, (0.5, 0.5))}, ValueError, "2 shares for 3 classes"),
+        ({"cover": fifesim.ground.Patches("voronoi", 9, (0.5, 0.5))}, ValueError, "2 shares for 3 classes"),
         ({"cover": "map.tif"}, ValueError, "a map of cover needs classes="),
-        ({"cover": 3, "classes": THREE_CLASSES}, TypeError, "cover must be a fifesim.Patches, the path of"),
+        ({"cover": 3, "classes": THREE_CLASSES}, TypeError, "cover must be a fifesim.ground.Patches, the path of"),
         ({"cover": PATCHES, "classes": fifesim.CoverClass("water")}, ValueError, "class water has no leaf area"),
         ({"arp": 0.24999}, ValueError, "arp of the streaming field must be in"),
         ({"seed": -1}, ValueError, "seed must be"),
@@ -386,5 +386,5 @@ def test_impossible_landscapes_are_refused_before_computing(site, options, error
 def test_vertical_part_of_the_grids_crs_is_dropped(site):
     """All variables must have the same CRS."""
     above = GeoBox(site.shape, site.affine, pyproj.CRS("EPSG:26914+5703").to_wkt())
-    made = [fifesim.landscape(grid, soil=fifesim.Field(sd=0.03), brown=0.2, seed=7) for grid in (above, site)]
+    made = [fifesim.landscape(grid, soil=fifesim.ground.Field(sd=0.03), brown=0.2, seed=7) for grid in (above, site)]
     xr.testing.assert_equal(*made)

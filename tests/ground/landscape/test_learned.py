@@ -12,7 +12,7 @@ from fifesim.ground.landscape.learned import bench_noise, kept, spline_noise
 from fifesim.ground.terrain.forms import REACH, land_forms
 
 GRID = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 900.0, 600.0, 10.0)
-KONZA = fifesim.Landscape.read("konza")
+KONZA = fifesim.ground.Landscape.read("konza")
 
 # Half the mean square differences of LAI over its variance by distance [m] in the map that konza was learned from.
 REAL_VARIOGRAM = {60: 0.565, 120: 0.766, 240: 0.909, 480: 0.962}
@@ -121,7 +121,7 @@ def large():
 
 def test_level_konza_has_the_variogram_of_the_real_map(large):
     # The blur of the map, which the landscape does not have, no longer matters at 60 m.
-    found = [fifesim.compare_landscapes(each, each)["one"] for each in large]
+    found = [fifesim.ground.compare_landscapes(each, each)["one"] for each in large]
     for lag, real in REAL_VARIOGRAM.items():
         got = np.mean([each[f"variogram_{lag}_m"] for each in found])
         assert got == pytest.approx(real, rel=0.15), lag
@@ -131,7 +131,7 @@ def test_learning_recovers_a_landscape(large):
     learned = fifesim.learn_landscape(large[0])
     grid = grids.geobox(large[0])
     again = [learned.simulate(grid, seed=seed)["lai"] for seed in (11, 12)]
-    rows = [fifesim.compare_landscapes(large[0], each) for each in again]
+    rows = [fifesim.ground.compare_landscapes(large[0], each) for each in again]
     assert np.mean([row.loc["variogram", "other"] for row in rows]) < 0.15
     assert np.mean([row.loc["spectrum", "other"] for row in rows]) < 0.25
     # Three standard deviations of the difference of one realisation and the mean of two: 0.035, 0.048, 0.101 in each.
@@ -158,14 +158,14 @@ def test_learning_finds_the_response_to_the_terrain(hills):
 def test_files(tmp_path):
     path = tmp_path / "land.json"
     KONZA.save(path)
-    assert fifesim.Landscape.read(path) == KONZA
+    assert fifesim.ground.Landscape.read(path) == KONZA
     assert path.stat().st_size < 2**20
     path.write_text(path.read_text().replace('"cell": 10.0', '"cell": -10.0'))
     with pytest.raises(ValueError, match=r"land\.json is not a landscape: cell"):
-        fifesim.Landscape.read(path)
+        fifesim.ground.Landscape.read(path)
     path.write_text("{")
     with pytest.raises(ValueError, match="is not a landscape"):
-        fifesim.Landscape.read(path)
+        fifesim.ground.Landscape.read(path)
 
 
 def test_description_prints_in_ten_lines():

@@ -24,7 +24,7 @@ FUNCTIONS = {
     "terrain_view": terrain_labels.terrain_view,
     "illumination": lambda dem: terrain_labels.illumination(dem, SUN),
     "shadow": lambda dem: terrain_labels.shadow(dem, SUN),
-    "wetness": fifesim.wetness,
+    "wetness": fifesim.terrain.wetness,
 }
 
 
@@ -40,13 +40,15 @@ def test_slope_aspect_and_views_of_a_plane_on_cells_that_are_not_square(slope):
     """Slopes are exact up to the edges."""
     grid = fifesim.grid_at("EPSG:26914", 700000, 4330000, 300, 240, (3, 5))
     dem = labelled(grid, plane(tuple(grid.shape), 3.0, 5.0, slope, 250.0))
-    np.testing.assert_allclose(fifesim.slope(dem), slope, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(fifesim.terrain.slope(dem), slope, rtol=1e-9, atol=1e-9)
     if slope:
         # Grid north is 1.48 degrees east of true north, and varies by 0.002 degrees over the scene.
-        np.testing.assert_allclose(fifesim.aspect(dem), 250.0 + projection.convergence(grid), atol=0.002)
+        np.testing.assert_allclose(fifesim.terrain.aspect(dem), 250.0 + projection.convergence(grid), atol=0.002)
     # The reach of 30 m cuts the corner where the plane falls below the horizontal.
-    np.testing.assert_allclose(fifesim.sky_view(dem), (1 + np.cos(np.radians(slope))) / 2, rtol=0, atol=2e-4)
-    np.testing.assert_allclose(fifesim.terrain_view(dem), (1 - np.cos(np.radians(slope))) / 2, rtol=0, atol=2e-4)
+    np.testing.assert_allclose(fifesim.terrain.sky_view(dem), (1 + np.cos(np.radians(slope))) / 2, rtol=0, atol=2e-4)
+    np.testing.assert_allclose(
+        fifesim.terrain.terrain_view(dem), (1 - np.cos(np.radians(slope))) / 2, rtol=0, atol=2e-4
+    )
 
 
 def test_sun_azimuth_and_aspect_are_relative_to_true_north():
@@ -75,17 +77,17 @@ def test_aspect_is_relative_to_true_north(epsg, longitude, latitude):
     x, y = (grids.coordinates(grid)[axis].values for axis in "xy")
     east_of, north_of = to_map.transform(*np.meshgrid(x, y), direction="INVERSE")
     for sides, expected in ((north_of, 180.0), (-east_of, 90.0)):
-        aspect = fifesim.aspect(labelled(grid, 500 + 500 * (sides - sides.mean()) / np.ptp(sides)))
+        aspect = fifesim.terrain.aspect(labelled(grid, 500 + 500 * (sides - sides.mean()) / np.ptp(sides)))
         np.testing.assert_allclose(aspect, expected, atol=0.2)
 
 
 def test_aspect_has_the_same_bits_in_windows():
     grid = fifesim.grid_at("EPSG:3413", -1200000, -700000, 4000, 4000, 40)
     dem = labelled(grid, plane(tuple(grid.shape), 40.0, 40.0, 20.0, 250.0) ** 1.5 / 20)
-    whole = fifesim.aspect(dem)
-    np.testing.assert_array_equal(fifesim.aspect(dem[20:70, 33:90])[1:-1, 1:-1], whole[21:69, 34:89])
+    whole = fifesim.terrain.aspect(dem)
+    np.testing.assert_array_equal(fifesim.terrain.aspect(dem[20:70, 33:90])[1:-1, 1:-1], whole[21:69, 34:89])
     level = labelled(grid, np.full(tuple(grid.shape), 300.0))
-    assert (fifesim.aspect(level) == 0).all()
+    assert (fifesim.terrain.aspect(level) == 0).all()
 
 
 def test_wide_scene_with_varying_grid_north_causes_a_warning():
@@ -93,7 +95,7 @@ def test_wide_scene_with_varying_grid_north_causes_a_warning():
     wide = fifesim.grid_at("EPSG:3413", -600000, -200000, 400000, 400000, 10000)
     dem = labelled(wide, 1000 + plane(tuple(wide.shape), 10000.0, 10000.0, 5.0, 70.0) / 40)
     with pytest.warns(UserWarning, match=r"grid north rotates by up to \d+\.\d degrees"):
-        fifesim.illumination(dem, fifesim.Geometry(60.0, 120.0))
+        fifesim.terrain.illumination(dem, fifesim.Geometry(60.0, 120.0))
 
 
 def sunlight(dem):

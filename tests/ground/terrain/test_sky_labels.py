@@ -26,8 +26,8 @@ def test_coarse_horizons_agree_with_horizons_at_every_cell():
     grid = fifesim.grid_at("EPSG:26914", 700000, 4330000, 900, 900, 10 / 3)
     z = hills((270, 270), seed=2, relief=26.0, length=60.0)
     coarse, fine = labelled(grid, z, source_resolution=30.0), labelled(grid, z)
-    difference = fifesim.sky_view(coarse) - fifesim.sky_view(fine)
-    assert float(fifesim.sky_view(fine).std()) > 0.003
+    difference = fifesim.terrain.sky_view(coarse) - fifesim.terrain.sky_view(fine)
+    assert float(fifesim.terrain.sky_view(fine).std()) > 0.003
     assert float(abs(difference).max()) < 0.004
     assert float(difference.std()) < 5e-4
 
@@ -47,7 +47,7 @@ def test_rotating_scene_and_sun_by_90_degrees_rotates_the_result(size, cell, azi
         angles = Geometry(50.0, azimuth + 90 * turns, 20.0, 40.0 + 90 * turns)
         lai.attrs = {"units": "1", "site": "FIFE"}
         rho = fifesim.surface_reflectance(lai.rename("lai"), "TM", bands=["TM3", "TM4"], dem=dem, geometry=angles)
-        found.append(np.rot90([*rho.values, fifesim.sky_view(dem).values], turns, axes=(1, 2)))
+        found.append(np.rot90([*rho.values, fifesim.terrain.sky_view(dem).values], turns, axes=(1, 2)))
     assert found[0][2].std() > 0.003
     np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-12)
     np.testing.assert_array_equal(found[2], found[1])
@@ -55,7 +55,7 @@ def test_rotating_scene_and_sun_by_90_degrees_rotates_the_result(size, cell, azi
 
 def test_sun_below_the_horizon_of_all_slopes_is_refused(site):
     steep = labelled(site, plane(tuple(site.shape), 10 / 3, 10 / 3, 40.0, 0.0))
-    for function in (fifesim.shadow, fifesim.illumination):
+    for function in (fifesim.terrain.shadow, fifesim.terrain.illumination):
         with pytest.raises(ValueError, match=r"sza 60, 178.* from grid north.*below the horizon of every slope"):
             function(steep, Geometry(60.0, 180.0))
 
@@ -85,11 +85,11 @@ def test_lazy_horizon_has_as_many_chunks_as_the_scene(around, dem):
 def test_horizon_that_does_not_cover_the_scene_is_refused(lai, dem, around):
     horizon = fifesim.horizon(around.isel(x=slice(0, 90)))
     with pytest.raises(ValueError, match=r"horizon spans .* does not cover the dem's"):
-        fifesim.sky_view(dem, horizon)
+        fifesim.terrain.sky_view(dem, horizon)
     with pytest.raises(ValueError, match="give dem= too"):
         fifesim.surface_reflectance(lai, horizon=horizon)
     with pytest.raises(ValueError, match="evenly spaced"):
-        fifesim.sky_view(dem, fifesim.horizon(around).isel(direction=slice(0, 20)))
+        fifesim.terrain.sky_view(dem, fifesim.horizon(around).isel(direction=slice(0, 20)))
 
 
 @pytest.mark.parametrize(
@@ -101,8 +101,8 @@ def test_horizon_may_end_less_than_one_cell_before_the_elevation(cut):
     dem.attrs["source_resolution"] = 30.0
     horizon = fifesim.horizon(dem).isel(cut)
     with pytest.raises(ValueError, match="does not cover the dem's"):
-        fifesim.sky_view(dem, horizon)
-    np.testing.assert_allclose(fifesim.sky_view(dem.isel(cut), horizon), 1, rtol=1e-12)
+        fifesim.terrain.sky_view(dem, horizon)
+    np.testing.assert_allclose(fifesim.terrain.sky_view(dem.isel(cut), horizon), 1, rtol=1e-12)
 
 
 def test_horizons_of_small_and_coarse_rasters():
@@ -110,6 +110,6 @@ def test_horizons_of_small_and_coarse_rasters():
     tiny = labelled(
         fifesim.grid_at("EPSG:26914", 700000, 4330000, 12, 9, 3), np.full((3, 4), 7.0), source_resolution=30.0
     )
-    np.testing.assert_allclose(fifesim.sky_view(tiny), 1, rtol=1e-12)
+    np.testing.assert_allclose(fifesim.terrain.sky_view(tiny), 1, rtol=1e-12)
     wide = labelled(fifesim.grid_at("EPSG:26914", 700000, 4330000, 80000, 60000, 10000), np.full((6, 8), 7.0))
-    np.testing.assert_allclose(fifesim.sky_view(wide), 1, rtol=1e-12)
+    np.testing.assert_allclose(fifesim.terrain.sky_view(wide), 1, rtol=1e-12)

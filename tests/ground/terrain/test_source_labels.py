@@ -231,7 +231,7 @@ def test_fine_dem_has_the_same_bits_in_chunks_and_windows(path, chunks, lazy_sou
 
 def test_source_dem_has_a_margin_around_the_grid(path):
     """Cells of about the source's size; the corner of the grid is a corner of these cells."""
-    dem, reach = fifesim.source_dem(path, grid(), 450.0)
+    dem, reach = fifesim.terrain.source_dem(path, grid(), 450.0)
     assert dem.odc.geobox.affine == Affine(30, 0, WEST - 450, 0, -30, NORTH + 450)
     assert dem.shape == (60, 60)
     np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-6)
@@ -245,12 +245,12 @@ def test_source_dem_ends_at_the_edge_of_its_data_with_the_same_bits_in_chunks(tm
     values[:, :15], values[3, 40] = np.nan, np.nan
     for crs, fill, chunks in product((CRS, "EPSG:32614"), (None, 60.0), ("auto", {"y": 31, "x": 27})):
         where = write(tmp_path / "cut.tif", values, affine, crs)
-        whole, reach = fifesim.source_dem(where, grid(), 6000.0, fill=fill)
+        whole, reach = fifesim.terrain.source_dem(where, grid(), 6000.0, fill=fill)
         with no_compute():
-            lazy, same_reach = fifesim.source_dem(where, grid(), 6000.0, fill=fill, chunks=chunks)
+            lazy, same_reach = fifesim.terrain.source_dem(where, grid(), 6000.0, fill=fill, chunks=chunks)
         assert lazy.chunks is not None and reach == same_reach
         xr.testing.assert_identical(lazy.compute(), whole)
-    dem, reach = fifesim.source_dem(write(tmp_path / "cut.tif", values, affine), grid(), 6000.0)
+    dem, reach = fifesim.terrain.source_dem(write(tmp_path / "cut.tif", values, affine), grid(), 6000.0)
     assert reach == {"north": 480, "east": 600, "south": 600, "west": 150}
     assert dem.odc.geobox.affine == Affine(30, 0, WEST - 150, 0, -30, NORTH + 600)
     assert dem.shape == (70, 55)
@@ -259,12 +259,12 @@ def test_source_dem_ends_at_the_edge_of_its_data_with_the_same_bits_in_chunks(tm
     values, affine = model()
     values[45, 37] = np.nan
     tall = fifesim.grid_at(CRS, WEST, NORTH, 300.0, 900.0, 30 / 9)
-    _, reach = fifesim.source_dem(write(tmp_path / "hole.tif", values, affine), tall, 600.0)
+    _, reach = fifesim.terrain.source_dem(write(tmp_path / "hole.tif", values, affine), tall, 600.0)
     assert reach == {"north": 600, "east": 210, "south": 600, "west": 600}
     with pytest.raises(ValueError, match="does not reach the grid"):
-        fifesim.source_dem(tmp_path / "cut.tif", grid(west=WEST + 90000), 100.0)
+        fifesim.terrain.source_dem(tmp_path / "cut.tif", grid(west=WEST + 90000), 100.0)
     with pytest.raises(ValueError, match="margin must be 0 m or more"):
-        fifesim.source_dem(tmp_path / "cut.tif", grid(), -1.0)
+        fifesim.terrain.source_dem(tmp_path / "cut.tif", grid(), -1.0)
 
 
 FINE = fifesim.fife_site(10, window=((120, 180), (120, 180)))
@@ -285,7 +285,7 @@ def test_undeclared_fill_values_next_to_the_grid_are_refused(tmp_path, fill, for
     with pytest.raises(ValueError, match=rf"elevations such as {fill:.0f} m.*-a_nodata, \.rio\.write_nodata"):
         fifesim.fine_dem(given, FINE).compute()
     with pytest.raises(ValueError, match=f"elevations such as {fill:.0f} m"):
-        fifesim.source_dem(given, FINE, margin=500.0)
+        fifesim.terrain.source_dem(given, FINE, margin=500.0)
     if form != "lazy":
         declared = dem.rio.write_nodata(fill)
         expected = fifesim.fine_dem(dem.where(dem > 0).where(dem < 9000), FINE)
@@ -339,7 +339,14 @@ def test_voids_of_0_m_cause_a_warning():
 def test_elevation_may_be_of_integers_but_not_in_km_without_crs_or_south_up(dem):
     whole = dem.round().assign_attrs(dem.attrs)
     whole[3:5, 7] = 0.0  # next to the sea
-    steps = fifesim.slope, fifesim.aspect, fifesim.sky_view, fifesim.horizon, fifesim.wetness, fifesim.terrain_view
+    steps = (
+        fifesim.terrain.slope,
+        fifesim.terrain.aspect,
+        fifesim.terrain.sky_view,
+        fifesim.horizon,
+        fifesim.terrain.wetness,
+        fifesim.terrain.terrain_view,
+    )
     with warnings.catch_warnings(action="ignore", category=UserWarning):
         for step in steps:
             expected = step(whole)
@@ -355,7 +362,7 @@ def test_elevation_may_be_of_integers_but_not_in_km_without_crs_or_south_up(dem)
     }
     for message, raster in wrong.items():
         with pytest.raises(ValueError, match=message):
-            fifesim.slope(raster)
+            fifesim.terrain.slope(raster)
 
 
 def test_source_resolution_is_the_argument_or_the_attribute_or_the_cell_size(dem):

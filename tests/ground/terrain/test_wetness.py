@@ -111,7 +111,7 @@ def test_drained_area_is_divided_by_a_power_of_the_slope():
 
 def test_wetness_at_a_coarser_resolution_is_interpolated(around):
     """Every ninth cell, as in `horizon`, has the index of the coarse elevation; the index between them is linear."""
-    found, places = fifesim.wetness(around, resolution=30.0), fifesim.horizon(around, resolution=30.0)
+    found, places = fifesim.terrain.wetness(around, resolution=30.0), fifesim.horizon(around, resolution=30.0)
     cells = [np.abs(around[axis].values[:, None] - places[axis].values).argmin(axis=0).tolist() for axis in ("y", "x")]
     expected = wetness_index(around.values[np.ix_(*cells)], 30.0, 30.0)
     np.testing.assert_allclose(found.values[np.ix_(*cells)], expected, rtol=0, atol=1e-9)
@@ -121,13 +121,13 @@ def test_wetness_at_a_coarser_resolution_is_interpolated(around):
 
 
 def test_wetness_at_the_finest_resolution_is_the_wetness_of_the_cells(dem):
-    found = fifesim.wetness(dem, resolution=1.0)
+    found = fifesim.terrain.wetness(dem, resolution=1.0)
     np.testing.assert_array_equal(found, wetness_index(dem.values, 30 / 9, 30 / 9))
 
 
 def test_wetness_of_few_cells_is_finite_and_of_nan_is_nan(dem):
     tiny = labelled(fifesim.grid_at("EPSG:26914", 700000, 4330000, 12, 9, 3), np.full((3, 4), 7.0))
-    assert np.isfinite(fifesim.wetness(tiny)).all()
-    assert np.isnan(fifesim.wetness(dem * np.nan)).all()
+    assert np.isfinite(fifesim.terrain.wetness(tiny)).all()
+    assert np.isnan(fifesim.terrain.wetness(dem * np.nan)).all()
     with pytest.raises(ValueError, match="resolution of an elevation's source must be positive"):
-        fifesim.wetness(dem, resolution=0)
+        fifesim.terrain.wetness(dem, resolution=0)

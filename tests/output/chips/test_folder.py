@@ -73,7 +73,7 @@ def test_function_returns_the_written_dataset(study, whole, tmp_path):
 
 
 def test_chip_equals_its_simulated_scenario(study, whole):
-    run = fifesim.simulate(fifesim.chips_of(study, COUNT).scenario(4), complete=True)
+    run = fifesim.simulate(fifesim.scenario.chips_of(study, COUNT).scenario(4), complete=True)
     chip = xr.open_zarr(whole, mask_and_scale=False).isel(chip=4)
     image, truth = run["image"], run["truth"]
     expected = {"ndvi": image["ndvi"], "toa_reflectance": image["dn"].fifesim.to_reflectance()}
@@ -81,7 +81,9 @@ def test_chip_equals_its_simulated_scenario(study, whole):
         np.testing.assert_array_equal(chip[name], values.astype(np.float32))
     np.testing.assert_array_equal(chip.dn, image["dn"])
     assert float(chip.sza) == float(image["sza"])
-    assert float(chip["atmosphere.visibility"]) == fifesim.chips_of(study, 40).scenario(4).atmosphere.visibility
+    assert (
+        float(chip["atmosphere.visibility"]) == fifesim.scenario.chips_of(study, 40).scenario(4).atmosphere.visibility
+    )
 
 
 def test_green_fpar_equals_fpar_without_dead_leaves(whole):
@@ -202,7 +204,7 @@ def test_invalid_study_is_reported_before_anything_is_written(study, small, tmp_
     with pytest.raises(ValueError, match=r"chip \d+: landscape\.deviations: brown"):
         dataset_to_folder(Study(study.scenario, draws, landscapes=3), tmp_path / "chips.zarr", 20)
     wide = small(grid={"width": 30_000.0, "height": 30_000.0}, geometry=SUN)
-    far = fifesim.chips_of(Study(wide, DRAWS, landscapes=1, split={"all": 1.0}), 60_000)
+    far = fifesim.scenario.chips_of(Study(wide, DRAWS, landscapes=1, split={"all": 1.0}), 60_000)
     monkeypatch.setattr(chips_folder, "_LOOKED_AT", 1)
     with pytest.raises(ValueError, match=r"chip 59999: .*use more landscapes, so that chips are closer"):
         chips_folder._look_at(far)
@@ -211,7 +213,7 @@ def test_invalid_study_is_reported_before_anything_is_written(study, small, tmp_
 
 @pytest.mark.parametrize(("count", "none"), [(1, "test and (train|validation)"), (2, "(test|train|validation)")])
 def test_part_without_chips_gives_a_warning(count, none, study):
-    chips = fifesim.chips_of(study, count)
+    chips = fifesim.scenario.chips_of(study, count)
     with pytest.warns(UserWarning, match=rf"no chip for {none}: {count} chips are in as many of 3 landscapes.*-n"):
         chips_folder._warn_of_empty_parts(chips)
 
@@ -220,7 +222,7 @@ def test_drawn_file_is_an_input(tmp_path, study):
     samples = tmp_path / "mine.csv"
     samples.write_text("lai\n0.5\n0.7\n0.9\n1.1\n1.4\n")
     draws = {"distribution": {"choice": ["burned-grazed", str(samples)]}}
-    chips = fifesim.chips_of(Study(study.scenario, draws, landscapes=3), 2)
+    chips = fifesim.scenario.chips_of(Study(study.scenario, draws, landscapes=3), 2)
     assert list(chips_folder._inputs(chips)) == [str(samples)]
 
 

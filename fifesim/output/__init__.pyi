@@ -1,0 +1,8 @@
+"""Public names of ``fifesim.output``, as in ``fifesim/__init__.pyi``."""
+
+# Pictures
+# Files and runs
+from .maps import write_style as write_style
+from .pictures import plot_comparison as plot_comparison  # method of a DataTree
+from .pictures import plot_fit as plot_fit
+from .pictures import plot_score as plot_score
