@@ -29,7 +29,7 @@ from .grids.sites import sun_position as sun_position
 from .ground.landscape.lai_labels import lai_scene as lai_scene
 from .ground.landscape.lai_labels import open_lai as open_lai
 from .ground.landscape.labels import landscape as landscape
-from .chain.landscape_learning import learn_landscape as learn_landscape
+from .chain.landscape_learning import learn_landscape as learn_landscape  # method
 from .ground.landscape.classes import CoverClass as CoverClass
 from .ground.canopy.description import Canopy as Canopy
 from .ground.canopy.prospect import Leaf as Leaf

@@ -50,4 +50,4 @@ def test_tables_are_listed_and_have_sources_and_units(folder):
 @EACH
 def test_folder_has_only_tables_and_their_scripts(folder):
     extra = {path.name for path in folder.rglob("*") if path.is_file() and path not in tables_of(folder)}
-    assert [name for name in extra if name != "README.md" and not re.fullmatch(r"make_\w+\.py", name)] == []
+    assert [name for name in extra if name != "README.md" and not re.fullmatch(r"make_\w+\.py|konza\.json", name)] == []

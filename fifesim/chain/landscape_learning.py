@@ -113,7 +113,7 @@ def learn_landscape(
         raise ValueError(f"the cells of the map are {cell:g} x {across:g} m: bring it to square cells first")
     image = grids.north_up(image.transpose("y", "x"))
     values = np.asarray(image.values, float)
-    learning.check_enough(np.isfinite(values))
+    learning.check_enough(np.isfinite(values), "image")
     lai = values if quantity == "lai" else _leaf_area(values, made_on_site(grid), instrument, geometry, canopy)
     median = float(np.nanmedian(lai))
     if median < _BARE:
@@ -139,9 +139,7 @@ def _quantity(image, quantity):
     if quantity is None:
         found = [name for name in ("ndvi", "lai") if name in str(image.name).lower()]
         if len(found) != 1:
-            raise ValueError(
-                f"the quantity of the map {image.name!r} is unknown: type quantity='ndvi' or quantity='lai'"
-            )
+            raise ValueError(f"the quantity of image {image.name!r} is unknown: type quantity='ndvi' or quantity='lai'")
         quantity = found[0]
     low, high = float(image.min()), float(image.max())
     limit = (-1.0, 1.0) if quantity == "ndvi" else (0.0, 20.0)

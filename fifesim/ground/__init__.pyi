@@ -15,4 +15,4 @@ from .landscape.downscaling_labels import downscale as downscale  # method
 from .landscape.field_labels import correlated_fields as correlated_fields
 from .landscape.lai_labels import phenology as phenology
 from .landscape.learned_labels import Landscape as Landscape
-from .landscape.learned_labels import compare_landscapes as compare_landscapes
+from .landscape.learned_labels import compare_landscapes as compare_landscapes  # method

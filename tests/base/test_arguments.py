@@ -42,7 +42,7 @@ PACKAGE = str(Path(fifesim.__file__).parent)
 # Public functions with arguments, except classes of results, whose fields users do not type.
 CHECKED = [
     name
-    for name in sorted(set(PUBLIC) - {"Instrument", "Regression", "Retrieval"})
+    for name in sorted(set(PUBLIC) - {"Instrument", "Landscape", "Regression", "Retrieval"})
     if inspect.signature(find(name)).parameters
 ]
 
@@ -61,6 +61,7 @@ ACCEPTED = {
     # Any text is a valid label; None and other types are rejected.
     ("Band", "name"): {"str"}, ("CoverClass", "name"): {"str"}, ("to_geotiff", "path"): {"str"},
     ("dataset", "folder"): {"str"}, ("write_style", "path"): {"str"}, ("train", "path"): {"str"},
+    ("learn_landscape", "source"): {"str"},
     # Descriptions without a grid check rasters and spectra when they are used; see the test of canopy fields.
     **{("Canopy", name): {"list", "str", "dataset", "numpy", "1-d", "crs"} for name in PROPERTIES},
     # Setup is a description without a raster; names of bands, instruments and noise are checked by the steps.
@@ -171,6 +172,7 @@ def valid_calls(tmp_path_factory):
         "wavelength": (0.6, 0.65, 0.7), "response": (0.0, 1.0, 0.0),
     }  # fmt: skip
     on_hills = {"dem": dem, "horizon": horizon}
+    leafy = fifesim.lai_scene(fifesim.fife_site(10.0, window=((90, 150), (180, 240))), seed=1)
     given = {
         "Field": {"mean": 1.0, "sd": 0.1, "arp": 0.1},
         "CoverClass": {"name": "grass", "lai": 2.0, "arp": 0.1, "canopy": fifesim.Canopy(), "code": 3},
@@ -230,6 +232,7 @@ def valid_calls(tmp_path_factory):
         "score": {"estimate": estimate, "truth": lai.isel(y=slice(6), x=slice(6)), "pair": "index"},
         "noise_std": {"instrument": "TM", "noise_models": fifesim.NoiseModel(1.0, 0.1)},
         "density": {"points": 32},
+        "learn_landscape": {"image": leafy}, "compare_landscapes": {"one": leafy, "other": leafy},
     }  # fmt: skip
     assert set(given) <= set(CHECKED)
     return {

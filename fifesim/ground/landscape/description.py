@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field
 
-Numbers = tuple[float, ...]
-Share = Annotated[float, Field(ge=0, le=10)]
+_Numbers = tuple[float, ...]
+_Share = Annotated[float, Field(ge=0, le=10)]
 
 
 class _Part(BaseModel, extra="forbid", frozen=True):
@@ -18,19 +18,19 @@ class TerrainResponse(_Part):
     """Response to a form of the land, linear between nodes and constant beyond them."""
 
     form: str
-    nodes: Numbers
-    mean: Numbers
+    nodes: _Numbers
+    mean: _Numbers
     """Added to the score. [1]"""
-    spread: Numbers
+    spread: _Numbers
     """Added to the logarithm of the standard deviation of the residual. [1]"""
 
 
 class Beds(_Part):
     """Response to the elevation in the sequence of beds, by slope."""
 
-    elevation: Numbers
-    slope: Numbers
-    mean: tuple[Numbers, ...]
+    elevation: _Numbers
+    slope: _Numbers
+    mean: tuple[_Numbers, ...]
 
 
 class Residual(_Part):
@@ -42,7 +42,7 @@ class Residual(_Part):
 
 
 class Described(_Part):
-    """Numbers of a learned landscape."""
+    """_Numbers of a learned landscape."""
 
     source: str
     cell: Annotated[float, Field(gt=0)]
@@ -50,9 +50,9 @@ class Described(_Part):
     beds: Beds | None = None
     residual: tuple[Residual, ...] = ()
     level: tuple[Residual, ...] = ()
-    gusts: dict[str, Share]
-    level_gusts: dict[str, Share]
+    gusts: dict[str, _Share]
+    level_gusts: dict[str, _Share]
     log_scale: float = 0.0
     explained: float = 0.0
-    scores: Numbers
-    lai: Numbers
+    scores: _Numbers
+    lai: _Numbers

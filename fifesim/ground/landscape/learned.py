@@ -16,7 +16,7 @@ FINE = 40.0
 _TAPS = 4  # of a cubic spline
 
 
-def response(landscape, forms):
+def terrain_response(landscape, forms):
     """Mean score and logarithm of the standard deviation of the residual by the forms of the land, 0 where unknown."""
     mean, spread = (np.zeros(forms["elevation"].shape) for _ in range(2))
     for each in landscape.terrain:
@@ -56,7 +56,7 @@ def scores(landscape, northing, easting, seed, elevation=None, mean=0.0, spread=
     elevation : array, shape (y, x), optional
         Without it the ground is level. [m]
     mean, spread : array, shape (y, x), or float
-        As from `response`. [1]
+        As from `terrain_response`. [1]
     cell : float
         Width of cells over which fields are averaged. [m]
 
@@ -76,7 +76,10 @@ def scores(landscape, northing, easting, seed, elevation=None, mean=0.0, spread=
     scale = (0.0 if elevation is None else landscape.log_scale) + gusts["broad"] ** 2 + gusts["medium"] ** 2
     fine, coarse, benches = (0.0 for _ in range(3))
     for k, field in enumerate(landscape.level if elevation is None else landscape.residual):
-        name, deviation = field_seed(seed, f"residual {k}"), np.sqrt(field.variance * kept(field.spacing, cell))
+        name, deviation = (
+            field_seed(seed, f"residual {k}"),
+            np.sqrt(field.variance * variance_kept(field.spacing, cell)),
+        )
         if field.height:
             benches = benches + deviation * bench_noise(name, field.spacing, field.height, northing, easting, elevation)
         elif field.spacing <= FINE:
@@ -97,7 +100,7 @@ def leaf_area(landscape, scores):
     return np.interp(scores, landscape.scores, landscape.lai)
 
 
-def kept(spacing, cell):
+def variance_kept(spacing, cell):
     """Share of the variance of `spline_noise` that remains in means over cells. [1]"""
     if not cell:
         return 1.0

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import fft, ndimage, optimize, special, stats
 
 from fifesim.ground.landscape.description import Beds, Described, Residual, TerrainResponse
-from fifesim.ground.landscape.learned import GUST_LENGTHS, response, scores
+from fifesim.ground.landscape.learned import GUST_LENGTHS, scores, terrain_response
 from fifesim.ground.terrain.forms import FORMS, land_forms
 
 # Spacings of the isotropic fields. [cell of the map]
@@ -29,7 +29,7 @@ _BENCHES = (
 LAGS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96)
 """Distances of pairs. [cell]"""
 
-BLOCK = 64
+_SIDE = 64
 """Cells along the squares whose spectra are averaged."""
 
 # Ground cells along a cell of the map.
@@ -102,15 +102,15 @@ def learn(lai, values, elevation, cell, origin, blur, noise, source):
     )
     if elevation is not None:
         forms = land_forms(np.where(known, elevation, np.nan), cell)
-        made |= _terrain(forms, normal_scores(values, known), known) | {"explained": explained(values, elevation, cell)}
+        made |= _terrain(forms, rank_scores(values, known), known) | {"explained": explained(values, elevation, cell)}
         found = Described(**made)
-        mean = response(found, forms)[0]
+        mean = terrain_response(found, forms)[0]
         fitted = _residual(found, image, values, mean, [*isotropic, *_BENCHES], forms)
         made |= dict(zip(("residual", "gusts"), fitted, strict=True))
     return Described(**made | _marginal(Described(**made), image, lai, forms))
 
 
-def normal_scores(values, known):
+def rank_scores(values, known):
     """Standard normal scores by rank, 0 where unknown. [1]"""
     out = np.zeros(values.shape)
     ranks = np.empty(np.count_nonzero(known))
@@ -132,7 +132,7 @@ def statistics(values, known, elevation=None):
                 squares = squares[np.argsort(np.abs(elevation[front] - elevation[back])[pairs], kind="stable")]
             by_axis.append([each.mean() for each in np.array_split(squares, 1 if elevation is None else _THIRDS)])
         found.append(np.mean(by_axis, axis=0))
-    return np.r_[np.ravel(found), spectrum(values, known)]
+    return np.r_[np.ravel(found), ring_spectrum(values, known)]
 
 
 def lags_of(shape):
@@ -140,19 +140,19 @@ def lags_of(shape):
     return [lag for lag in LAGS if lag <= min(shape) // 3]
 
 
-def spectrum(values, known):
-    """Mean power of squares of `BLOCK` cells without unknown ones, in rings of frequency. [square of the unit]"""
-    window = np.outer(np.hanning(BLOCK), np.hanning(BLOCK))
+def ring_spectrum(values, known):
+    """Mean power of squares of `_SIDE` cells without unknown ones, in rings of frequency. [square of the unit]"""
+    window = np.outer(np.hanning(_SIDE), np.hanning(_SIDE))
     powers = []
-    for i in range(0, values.shape[0] - BLOCK + 1, BLOCK // 2):
-        for j in range(0, values.shape[1] - BLOCK + 1, BLOCK // 2):
-            part = slice(i, i + BLOCK), slice(j, j + BLOCK)
+    for i in range(0, values.shape[0] - _SIDE + 1, _SIDE // 2):
+        for j in range(0, values.shape[1] - _SIDE + 1, _SIDE // 2):
+            part = slice(i, i + _SIDE), slice(j, j + _SIDE)
             if known[part].all():
                 powers.append(np.abs(fft.fft2((values[part] - values[part].mean()) * window)) ** 2)
     if not powers:
         return np.zeros(0)
-    ring = np.rint(np.hypot(*np.meshgrid(fft.fftfreq(BLOCK), fft.fftfreq(BLOCK))) * BLOCK).astype(int)
-    return (np.bincount(ring.ravel(), np.mean(powers, axis=0).ravel()) / np.bincount(ring.ravel()))[1 : BLOCK // 2 + 1]
+    ring = np.rint(np.hypot(*np.meshgrid(fft.fftfreq(_SIDE), fft.fftfreq(_SIDE))) * _SIDE).astype(int)
+    return (np.bincount(ring.ravel(), np.mean(powers, axis=0).ravel()) / np.bincount(ring.ravel()))[1 : _SIDE // 2 + 1]
 
 
 class _Image(NamedTuple):
@@ -191,7 +191,7 @@ class _Image(NamedTuple):
         """Scores of the ground cells of a landscape."""
         terrain = {}
         if forms is not None:
-            mean, spread = response(landscape, forms)
+            mean, spread = terrain_response(landscape, forms)
             terrain = {
                 "elevation": self.ground(self.elevation),
                 "mean": self.ground(mean),
@@ -200,11 +200,11 @@ class _Image(NamedTuple):
         return scores(landscape, *self.places(), seed, **terrain)
 
 
-def check_enough(known):
+def check_enough(known, name="the map"):
     """Raise an error if too few cells are known."""
     if (count := int(np.count_nonzero(known))) < LEAST_CELLS:
         raise ValueError(
-            f"the map has {count} known cells, at least {LEAST_CELLS} are needed: give a larger or a finer map"
+            f"{name} has {count} known cells, at least {LEAST_CELLS} are needed: give a larger or a finer map"
         )
 
 
@@ -227,7 +227,7 @@ def explained(values, elevation, cell):
     """Share of the variance of normal scores that forms of the land explain in squares that were left out. [1]"""
     known = np.isfinite(values) & np.isfinite(elevation)
     check_enough(known)
-    score = normal_scores(values, known)[known]
+    score = rank_scores(values, known)[known]
     _, _, additive, beds = _columns(land_forms(np.where(known, elevation, np.nan), cell), known)
     columns = np.hstack([additive, beds])
     row, column = (place // max(1, round(_SQUARE / cell)) for place in np.nonzero(known))
@@ -316,7 +316,7 @@ def _residual(landscape, image, values, mean, kinds, forms):
     names = ("level", "level_gusts") if forms is None else ("residual", "gusts")
     known, measured = image.known, lambda each: statistics(each, image.known, image.elevation)
     table = _statistics_of(kinds, landscape, image, forms)
-    score = normal_scores(values, known)
+    score = rank_scores(values, known)
     rest = np.where(known, score - mean, 0.0)
     ordered = np.sort(values[known])
     white = np.random.default_rng(0).normal(size=values.shape) * image.noise
@@ -338,7 +338,7 @@ def _residual(landscape, image, values, mean, kinds, forms):
         got, energies, heavy = [], [], []
         for seed in range(2):
             seen = np.where(known, image.seen(image.simulated(trial, 10 * step + seed, forms)) + white, 0.0)
-            drawn = normal_scores(seen, known)
+            drawn = rank_scores(seen, known)
             got.append(measured(drawn))
             energies.append(np.var(_log_energy(drawn, known, _WIDE)))
             mapped = np.zeros(values.shape)

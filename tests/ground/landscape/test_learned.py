@@ -8,7 +8,7 @@ from scipy.interpolate import BSpline
 import fifesim
 from fifesim.grids import grid as grids
 from fifesim.ground.landscape import learning
-from fifesim.ground.landscape.learned import bench_noise, kept, spline_noise
+from fifesim.ground.landscape.learned import bench_noise, spline_noise, variance_kept
 from fifesim.ground.terrain.forms import REACH, land_forms
 
 GRID = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 900.0, 600.0, 10.0)
@@ -67,9 +67,9 @@ def test_variance_of_means_over_cells():
     place = np.arange(0.5, 3000.0)
     fields = [spline_noise(seed, 10.0, -place[:60], place) for seed in range(20)]
     means = [each.reshape(3, 20, 150, 20).mean((1, 3)) for each in fields]
-    assert np.var(means) == pytest.approx(kept(10.0, 20.0), rel=0.08)
-    assert kept(10.0, 0.0) == 1.0
-    assert kept(10.0, 0.1) == pytest.approx(1.0, abs=1e-3)
+    assert np.var(means) == pytest.approx(variance_kept(10.0, 20.0), rel=0.08)
+    assert variance_kept(10.0, 0.0) == 1.0
+    assert variance_kept(10.0, 0.1) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_bench_noise_follows_contours():
@@ -186,7 +186,7 @@ _FIELD = np.random.default_rng(0).uniform(0.3, 0.8, (60, 60))
     ("image", "options", "words"),
     [
         (_map(_FIELD[:20]), {}, "1200 known cells, at least 2000"),
-        (_map(_FIELD, "red"), {}, "quantity of the map 'red' is unknown"),
+        (_map(_FIELD, "red"), {}, "quantity of image 'red' is unknown"),
         (_map(_FIELD * 1e4, "ndvi"), {}, "apply its scale"),
         (_map(_FIELD, "ndvi"), {}, "needs instrument and geometry"),
         (_map(_FIELD * 0.01), {}, "give a map of a date with leaves"),
@@ -219,6 +219,4 @@ def test_terrain_beyond_the_learned_range_warns(hills):
 
 def test_normal_scores_are_zero_where_unknown():
     known = np.array([[True, True, False]])
-    np.testing.assert_allclose(
-        learning.normal_scores(np.array([[2.0, 1.0, 9.0]]), known), [[0.6744898, -0.6744898, 0.0]]
-    )
+    np.testing.assert_allclose(learning.rank_scores(np.array([[2.0, 1.0, 9.0]]), known), [[0.6744898, -0.6744898, 0.0]])
