@@ -14,7 +14,7 @@ class _Part(BaseModel, extra="forbid", frozen=True):
     """Part of the description of a landscape."""
 
 
-class TerrainResponse(_Part):
+class TerrainResponse(_Part, frozen=True):
     """Response to a form of the land, linear between nodes and constant beyond them."""
 
     form: str
@@ -25,7 +25,7 @@ class TerrainResponse(_Part):
     """Added to the logarithm of the standard deviation of the residual. [1]"""
 
 
-class Beds(_Part):
+class Beds(_Part, frozen=True):
     """Response to the elevation in the sequence of beds, by slope."""
 
     elevation: _Numbers
@@ -33,7 +33,7 @@ class Beds(_Part):
     mean: tuple[_Numbers, ...]
 
 
-class Residual(_Part):
+class Residual(_Part, frozen=True):
     """Random field of the residual; one with a height follows contours."""
 
     spacing: Annotated[float, Field(gt=0)]
@@ -41,7 +41,7 @@ class Residual(_Part):
     height: Annotated[float, Field(ge=0)] = 0.0
 
 
-class Described(_Part):
+class Described(_Part, frozen=True):
     """_Numbers of a learned landscape."""
 
     source: str
