@@ -27,13 +27,13 @@ SOURCE = (
 NOISE = 0.004
 
 
-def learned(ndvi_file, dem_file, columns=slice(None)):
-    """Landscape of the map, or of some of its columns."""
+def learned(ndvi_file, dem_file):
+    """Landscape of the map."""
     crs, west, north, width, height, cell = GRID
     grid: GeoBox = fifesim.grid_at(crs, west, north, width, height, cell)
     ndvi = rioxarray.open_rasterio(ndvi_file, masked=True).squeeze("band", drop=True)
     # Bilinear interpolation would blur the map once more.
-    ndvi = ndvi.odc.reproject(grid, resampling="nearest", dst_nodata=np.nan).rename("ndvi").isel(x=columns)
+    ndvi = ndvi.odc.reproject(grid, resampling="nearest", dst_nodata=np.nan).rename("ndvi")
     geometry = fifesim.sun_position(TIME, 39.09, -96.57)
     dem = rioxarray.open_rasterio(dem_file, masked=True).squeeze("band", drop=True)
     return fifesim.learn_landscape(ndvi, dem, instrument="MSI", geometry=geometry, noise=NOISE, source=SOURCE)

@@ -127,7 +127,7 @@ def learn_landscape(
     source = source or in_a_line(str(image.name or quantity))
     edge = grid.affine.f, grid.affine.c
     made = learning.learn(lai, values, ground, cell, edge, blur, noise, source)
-    return Landscape(**dict(made))
+    return Landscape(**made.model_dump())
 
 
 def _quantity(image, quantity):

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, Field
+import numpy as np
+from pydantic import BaseModel, Field, model_validator
+
+from fifesim.ground.landscape.learned import GUST_LENGTHS
+from fifesim.ground.terrain.forms import FORMS
 
 _Numbers = tuple[float, ...]
 _Share = Annotated[float, Field(ge=0, le=10)]
@@ -12,6 +16,14 @@ _Share = Annotated[float, Field(ge=0, le=10)]
 
 class _Part(BaseModel, extra="forbid", frozen=True):
     """Part of the description of a landscape."""
+
+
+def _check_table(nodes, *columns):
+    """Raise an error unless the nodes ascend and each column has a value at each of them."""
+    if len(nodes) < 2 or not np.all(np.diff(nodes) > 0):
+        raise ValueError("nodes must be two or more ascending numbers")
+    if any(len(column) != len(nodes) for column in columns):
+        raise ValueError(f"each of the {len(nodes)} nodes needs a value")
 
 
 class TerrainResponse(_Part, frozen=True):
@@ -24,6 +36,13 @@ class TerrainResponse(_Part, frozen=True):
     spread: _Numbers
     """Added to the logarithm of the standard deviation of the residual. [1]"""
 
+    @model_validator(mode="after")
+    def _check(self):
+        if self.form not in FORMS:
+            raise ValueError(f"the form {self.form!r} is unknown, there are {', '.join(FORMS)}")
+        _check_table(self.nodes, self.mean, self.spread)
+        return self
+
 
 class Beds(_Part, frozen=True):
     """Response to the elevation in the sequence of beds, by slope."""
@@ -31,6 +50,12 @@ class Beds(_Part, frozen=True):
     elevation: _Numbers
     slope: _Numbers
     mean: tuple[_Numbers, ...]
+
+    @model_validator(mode="after")
+    def _check(self):
+        _check_table(self.elevation, self.mean)
+        _check_table(self.slope, *self.mean)
+        return self
 
 
 class Residual(_Part, frozen=True):
@@ -42,7 +67,7 @@ class Residual(_Part, frozen=True):
 
 
 class Described(_Part, frozen=True):
-    """_Numbers of a learned landscape."""
+    """Numbers of a learned landscape."""
 
     source: str
     cell: Annotated[float, Field(gt=0)]
@@ -56,3 +81,12 @@ class Described(_Part, frozen=True):
     explained: float = 0.0
     scores: _Numbers
     lai: _Numbers
+
+    @model_validator(mode="after")
+    def _check(self):
+        if not set(self.gusts) == set(self.level_gusts) == set(GUST_LENGTHS):
+            raise ValueError(f"gusts and level_gusts have the keys {', '.join(GUST_LENGTHS)}")
+        _check_table(self.scores, self.lai)
+        if not min(self.lai) >= 0:
+            raise ValueError(f"leaf area must be 0 or more, got {min(self.lai):g}")
+        return self

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -51,12 +52,12 @@ class Landscape(Described, frozen=True):
     beds : Beds or None
         Response to elevation and slope.
     residual, level : tuple of Residual
-        Random fields in addition to the terrain, and those of level ground, which vary as much as both.
+        Random fields in addition to the terrain, and random fields of level ground, with the variance of both.
     gusts, level_gusts : dict of str to float
         Standard deviations of the logarithm by which the residual is stronger or weaker in places.
     log_scale : float
-        Logarithm by which the response of the spread is reduced, so that the variance of the residual is that of its
-        fields. [1]
+        Logarithm by which the response of the spread is reduced, so that the residual has the variance of its fields.
+        [1]
     explained : float
         Share of the variance of scores that the terrain explains in squares that were left out. [1]
     scores, lai : tuple of float
@@ -101,67 +102,72 @@ class Landscape(Described, frozen=True):
         Returns
         -------
         land : xarray.Dataset
-            ``lai`` over (y, x), NaN where the elevation is. The attribute ``beyond_learned`` is the share of cells
-            whose elevation or slope is outside of the range that the landscape was learned from. [m2 m-2]
+            ``lai`` over (y, x), NaN where the elevation is. If the elevation is in memory, the attribute
+            ``beyond_learned`` is the share of cells whose elevation or slope is outside of the learned range.
+            [m2 m-2]
 
         Raises
         ------
         ValueError
-            If the grid or the seed is invalid, or the elevation is on another lattice or does not cover the grid.
+            If the grid or the seed is invalid, its cells are not square, or the elevation is on another lattice or does
+            not cover the grid.
 
         Warns
         -----
         UserWarning
-            If ``beyond_learned`` is above 0.1.
+            If ``beyond_learned`` is above 0.1, or cells are more than twice as large as those of the learned map.
 
         Notes
         -----
         Leaf area depends only on seed, position and the elevation within 1 km, so that a window equals a slice of the
-        whole, for any chunks. Cells smaller than half a cell of the map that it was learned from have no structure of
-        their own. Fields that are finer than the cells are averaged before the map from score to leaf area.
+        whole, for any chunks. Nothing varies within half a cell of the map from which the landscape was learned. Fields
+        that are finer than the cells are averaged before scores become leaf area.
         """
         grid, seed = grids.check_grid(grid), check_seed(seed)
-        cell = min(grids.cell_size(grid))
-        place = [grids.coordinates(grid)[axis].values for axis in ("y", "x")]
-        made = partial(_cells, self, seed, place, cell)
+        cell, across = grids.cell_size(grid)
+        if abs(cell - across) > 1e-6 * cell:
+            raise ValueError(f"the cells of the grid are {cell:g} x {across:g} m: give a grid of square cells")
+        if cell > 2 * self.cell:
+            warn(
+                f"cells of {cell:g} m are larger than twice the {self.cell:g} m of the learned map, so that forms of "
+                f"the land are lost: simulate cells of {self.cell:g} m and use .fifesim.aggregate({cell:g})"
+            )
+        northing, easting = (grids.coordinates(grid)[axis].values for axis in ("y", "x"))
+        cells = _Cells(self, seed, northing, easting, cell, grids.lattice_position(grid))
         attributes = {"rng_seed": str(seed), "learned_from": self.source, **made_on_site(grid)}
         history = f"landscape: learned from {in_a_line(self.source, 100)}, seed {seed}"
         if dem is None:
-            tile = partial(_level, made)
-            found = windows.tiles(tile, grid, chunks, tile=_BLOCK)
+            found = windows.tiles(partial(_level, cells), grid, chunks, tile=_BLOCK)
         else:
-            reads, nodes = _window_reads(dem, grid, max(1, round(self.cell / cell)), cell)
-            attributes["beyond_learned"] = share = round(self._beyond(dem, cell), 4)
-            if share > 0.1:
-                warn(
-                    f"{share:.0%} of the cells are higher, lower or steeper than the ground from which the landscape "
-                    "was learned: the response of its edge is used there"
-                )
-            kernel, shape = partial(_on_terrain, made, *nodes), tuple(grid.shape)
-            lazy = chunks is not None or dem.chunks is not None
-            sizes = windows.chunk_sizes(grid, "auto" if chunks is None else chunks, tile=_BLOCK) if lazy else None
-            data = (
-                chunking.windows(kernel, [reads], shape, sizes)
-                if lazy
-                else chunking.in_blocks(kernel, [reads], shape, _BLOCK)
-            )
+            if dem.chunks is None:
+                attributes["beyond_learned"] = self._share_beyond(dem, cell)
+            reads, kernel, shape = _window_reads(cells, dem, grid), partial(_on_terrain, cells), tuple(grid.shape)
+            if chunks is None and dem.chunks is None:
+                data = chunking.in_blocks(kernel, [reads], shape, _BLOCK)
+            else:
+                sizes = windows.chunk_sizes(grid, "auto" if chunks is None else chunks, tile=_BLOCK)
+                data = chunking.windows(kernel, [reads], shape, sizes)
             found = grids.place(xr.DataArray(data, dims=("y", "x")), grid)
         return xr.Dataset({"lai": cf.label(found, "lai", history=history, method="learned", **attributes)})
 
-    def _beyond(self, dem, cell):
+    def _share_beyond(self, dem, cell):
         """Share of a sample of cells outside of the learned range of elevation or slope."""
         ranges = {each.form: (each.nodes[0], each.nodes[-1]) for each in self.terrain}
-        # Slopes are those of the cell size at which forms are computed, and on a scale that its smoothing leaves.
+        # Slopes that were smoothed over 40 m are compared with differences over about as far.
         step = max(1, round(4 * self.cell / cell))
         ground = np.asarray(dem.transpose("y", "x").data[::step, ::step], float)
         known = np.isfinite(ground)
-        if not self.terrain or not known.any() or min(ground.shape) < 2:
+        if not ranges or not known.any() or min(ground.shape) < 2:
             return 0.0
-        slope = np.hypot(*np.gradient(ground, step * cell))
-        outside = (
-            (ground < ranges["elevation"][0]) | (ground > ranges["elevation"][1]) | (slope > ranges["slope_40"][1])
-        )
-        return float(np.mean(outside[known]))
+        (low, high), steepest = ranges["elevation"], ranges["slope_40"][1]
+        outside = (ground < low) | (ground > high) | (np.hypot(*np.gradient(ground, step * cell)) > steepest)
+        share = round(float(np.mean(outside[known])), 4)
+        if share > 0.1:
+            warn(
+                f"{share:.0%} of the cells are higher, lower or steeper than the ground from which the landscape was "
+                "learned: the response of its edge is used there"
+            )
+        return share
 
     def save(self, path: FilePath) -> None:
         """
@@ -232,18 +238,35 @@ class Landscape(Described, frozen=True):
         return "\n".join(lines)
 
 
-def _cells(landscape, seed, place, cell, rows, columns, **terrain):
-    """Leaf area of the cells in slices of the grid."""
-    found = scores(landscape, place[0][rows], place[1][columns], seed, cell=cell, **terrain)
-    return leaf_area(landscape, found)
+class _Cells(NamedTuple):
+    """Cells of a grid on which a landscape is simulated."""
+
+    landscape: Landscape
+    seed: int
+    northing: np.ndarray
+    easting: np.ndarray
+    cell: float
+    first: tuple[int, int]  # place of the first cell on the lattice
+
+    @property
+    def ratio(self):
+        """Cells along a node of the forms of the land."""
+        return max(1, round(self.landscape.cell / self.cell))
+
+    @property
+    def margin(self):
+        """Nodes around a node on which its forms depend."""
+        return int(np.ceil(REACH / (self.ratio * self.cell))) + 2
 
 
-def _level(made, row, column, shape):
-    return made(slice(row, row + shape[0]), slice(column, column + shape[1]))
+def _level(cells, row, column, shape):
+    """Leaf area of level ground."""
+    place = cells.northing[row : row + shape[0]], cells.easting[column : column + shape[1]]
+    return leaf_area(cells.landscape, scores(cells.landscape, *place, cells.seed, cell=cells.cell))
 
 
-def _window_reads(dem, grid, ratio, cell):
-    """Windows of whole nodes of an elevation around each cell, and the first node and the margin of each axis."""
+def _window_reads(cells, dem, grid):
+    """Windows of whole nodes of an elevation around each cell."""
     dem = grids.north_up(dem.transpose("y", "x"))
     own = grids.geobox(dem)
     offset = grids.lattice_offset(own, grid)
@@ -251,35 +274,39 @@ def _window_reads(dem, grid, ratio, cell):
         raise ValueError(
             f"dem spans {grids.extent(own)} and the grid {grids.extent(grid)}: give an elevation that covers the grid"
         )
-    margin = int(np.ceil(REACH / (ratio * cell))) + 2
-    windows_of, first = [], grids.lattice_position(grid)
-    for start, shift, size in zip(first, offset, grid.shape, strict=True):
-        node = (start + np.arange(size)) // ratio
-        begin = (node - margin) * ratio - start + shift
-        windows_of.append((begin, begin + (2 * margin + 1) * ratio))
-    return Reads(dem.data, *windows_of), (first, ratio, margin, cell)
+    bounds = []
+    for start, shift, size in zip(cells.first, offset, grid.shape, strict=True):
+        node = (start + np.arange(size)) // cells.ratio
+        begin = (node - cells.margin) * cells.ratio - start + shift
+        bounds.append((begin, begin + (2 * cells.margin + 1) * cells.ratio))
+    return Reads(dem.data, *bounds)
 
 
-def _on_terrain(made, first, ratio, margin, cell, rows, columns, ground):
+def _on_terrain(cells, rows, columns, ground):
     """Leaf area of cells from a window of elevation around them."""
-    landscape = made.args[0]
+    ratio, margin = cells.ratio, cells.margin
     blocks = ground.reshape(ground.shape[0] // ratio, ratio, ground.shape[1] // ratio, ratio)
     known = np.isfinite(blocks)
     count = known.sum(axis=(1, 3))
     total = np.where(known, blocks, 0.0).sum(axis=(1, 3))
     nodes = np.divide(total, count, out=np.full(count.shape, np.nan), where=count > 0)
-    fields = terrain_response(landscape, land_forms(nodes, ratio * cell))
+    # Cells lie between nodes that are at most one outside of the margin.
+    outside = margin - 1
+    near = slice(outside, -outside), slice(outside, -outside)
+    forms = {name: each[near] for name, each in land_forms(nodes, ratio * cells.cell).items()}
     inner, weights = [], []
-    for start, block in zip(first, (rows, columns), strict=True):
-        cells = start + np.arange(block.start, block.stop)
-        begin = (cells[0] // ratio - margin) * ratio
-        inner.append(slice(cells[0] - begin, cells[-1] - begin + 1))
-        at = (cells - begin + 0.5) / ratio - 0.5
-        low = np.floor(at).astype(int)
-        weights.append((low, at - low))
+    for start, block in zip(cells.first, (rows, columns), strict=True):
+        at = start + np.arange(block.start, block.stop)
+        begin = (at[0] // ratio - margin) * ratio
+        inner.append(slice(at[0] - begin, at[-1] - begin + 1))
+        place = (at - begin + 0.5) / ratio - 0.5 - outside
+        low = np.floor(place).astype(int)
+        weights.append((low, place - low))
     (i, u), (j, v) = weights
-    mean, spread = (_between(each, i, u[:, None], j, v) for each in fields)
-    return made(rows, columns, elevation=ground[tuple(inner)], mean=mean, spread=spread)
+    mean, spread = (_between(each, i, u[:, None], j, v) for each in terrain_response(cells.landscape, forms))
+    place = cells.northing[rows], cells.easting[columns]
+    found = scores(cells.landscape, *place, cells.seed, ground[tuple(inner)], mean, spread, cells.cell)
+    return leaf_area(cells.landscape, found)
 
 
 def _between(values, i, u, j, v):
@@ -312,7 +339,8 @@ def compare_landscapes(one: xr.DataArray, other: xr.DataArray, dem: xr.DataArray
     Raises
     ------
     ValueError
-        If the cells of the maps differ in size, or a map has fewer than 2,000 known cells.
+        If the cells of the maps differ in size, a map has fewer than 2,000 known cells, or the elevation is on other
+        cells.
 
     See Also
     --------
@@ -333,10 +361,10 @@ def compare_landscapes(one: xr.DataArray, other: xr.DataArray, dem: xr.DataArray
             f"the cells of the maps are {sizes[0][1]:g} and {sizes[1][1]:g} m: bring one map to the cells of the other "
             "with .fifesim.aggregate"
         )
-    maps = [np.asarray(each.transpose("y", "x").values, float) for each in (one, other)]
+    if dem is not None:
+        one, other, dem = chunking.aligned([grids.north_up(each) for each in (one, other, dem)])
+    maps = [np.asarray(grids.north_up(each.transpose("y", "x")).values, float) for each in (one, other)]
     ground = None if dem is None else np.asarray(dem.transpose("y", "x").values, float)
-    if ground is not None and {each.shape for each in maps} != {ground.shape}:
-        raise ValueError("dem lies on other cells than the maps: give one on the cells of both maps")
     columns, curves = [], []
     for name, values in zip(("one", "other"), maps, strict=True):
         known = np.isfinite(values)

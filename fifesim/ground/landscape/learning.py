@@ -42,7 +42,7 @@ _NODES, _BED_HEIGHT = 8, 1.5  # number; m
 _PROBABILITIES = np.r_[0.0, 0.002, 0.005, np.linspace(0.01, 0.99, 99), 0.995, 0.998, 1.0]
 _STEPS = 6
 
-# Largest factor by which the statistics that are fitted may differ from those of the residual.
+# Largest factor between the statistics that are fitted and the statistics of the residual.
 _CHANGE = 3.0
 
 LEAST_CELLS = 2000
@@ -91,23 +91,21 @@ def learn(lai, values, elevation, cell, origin, blur, noise, source):
     known = np.isfinite(lai) if elevation is None else np.isfinite(lai) & np.isfinite(elevation)
     check_enough(known)
     image = _Image(cell, origin, blur, known, elevation, noise / values[known].std())
-    made: dict[str, Any] = {"source": source, "cell": cell, "gusts": dict.fromkeys(GUST_LENGTHS, 0.0)}
-    made |= {"scores": (-9.0, 9.0), "lai": (0.0, 1.0)}
-    forms = None
-    made |= {"level_gusts": made["gusts"]}
+    still, forms = dict.fromkeys(GUST_LENGTHS, 0.0), None
+    found = Described(source=source, cell=cell, gusts=still, level_gusts=still, scores=(-9.0, 9.0), lai=(0.0, 1.0))
     isotropic = [(float(spacing * cell), 0.0) for spacing in _SPACINGS]
-    flat, none = image._replace(elevation=None), np.zeros(lai.shape)
-    made |= dict(
-        zip(("level", "level_gusts"), _residual(Described(**made), flat, values, none, isotropic, None), strict=True)
-    )
+    level, gusts = _residual(found, image._replace(elevation=None), values, 0.0, isotropic, None)
+    found = found.model_copy(update={"level": level, "level_gusts": gusts})
     if elevation is not None:
         forms = land_forms(np.where(known, elevation, np.nan), cell)
-        made |= _terrain(forms, rank_scores(values, known), known) | {"explained": explained(values, elevation, cell)}
-        found = Described(**made)
+        terrain, beds, scale = _terrain(forms, rank_scores(values, known), known)
+        share = explained(values, elevation, cell)
+        found = found.model_copy(update={"terrain": terrain, "beds": beds, "log_scale": scale, "explained": share})
         mean = terrain_response(found, forms)[0]
-        fitted = _residual(found, image, values, mean, [*isotropic, *_BENCHES], forms)
-        made |= dict(zip(("residual", "gusts"), fitted, strict=True))
-    return Described(**made | _marginal(Described(**made), image, lai, forms))
+        residual, gusts = _residual(found, image, values, mean, [*isotropic, *_BENCHES], forms)
+        found = found.model_copy(update={"residual": residual, "gusts": gusts})
+    nodes, leaves = _marginal(found, image, lai, forms)
+    return found.model_copy(update={"scores": nodes, "lai": leaves})
 
 
 def rank_scores(values, known):
@@ -242,7 +240,7 @@ def explained(values, elevation, cell):
 
 
 def _terrain(forms, score, known):
-    """Responses of mean and spread to the forms of the land."""
+    """Responses of mean and spread to the forms of the land and to beds, and the scale of the spread."""
     nodes, beds, additive, both = _columns(forms, known)
     columns = np.hstack([additive, both])
     mean = _ridge(columns, score[known] - score[known].mean(), _RIDGE)
@@ -260,7 +258,7 @@ def _terrain(forms, score, known):
     table, slopes = mean[ends[-1] :].reshape(beds.size, -1), nodes["slope_40"][_STEEPNESS]
     scale = np.log(np.mean(np.exp(2 * additive @ spread))) / 2
     made = Beds(elevation=_rounded(beds), slope=_rounded(slopes), mean=[_rounded(row) for row in table])
-    return {"terrain": terrain, "beds": made, "log_scale": float(f"{scale:.5g}")}
+    return tuple(terrain), made, float(f"{scale:.5g}")
 
 
 def _rounded(values):
@@ -301,7 +299,7 @@ def kurtosis(values, known):
 
 def _statistics_of(kinds, landscape, image, forms):
     """Statistics of the map of each kind of field with variance 1, shape (statistics, kinds)."""
-    plain = Described(**dict(landscape) | {"terrain": (), "beds": None, "log_scale": 0.0})
+    plain = landscape.model_copy(update={"terrain": (), "beds": None, "log_scale": 0.0})
     table = []
     for spacing, height in kinds:
         one = (Residual(spacing=spacing, variance=1.0, height=height),)
@@ -352,8 +350,8 @@ def _residual(landscape, image, values, mean, kinds, forms):
         # Structure that no field has, such as white noise of the map, must not take over.
         change = np.clip(target * wanted / np.mean(got, axis=0) / first, 1 / _CHANGE, _CHANGE)
         target = first * change
-        # The variance of a log-energy is four times that of the logarithm s of the standard deviation, and the kurtosis
-        # of normal deviates with log-normal standard deviation is 3 (exp(4 var s) - 1).
+        # With s the logarithm of the standard deviation, the logarithm of the variance has the variance 4 var s, and
+        # normal deviates have the excess kurtosis 3 (exp(4 var s) - 1).
         more = max(wide + (energy - np.mean(energies)) / 4, 0.0) - wide
         tail = (np.log1p(max(tails, 0.0) / 3) - np.log1p(max(np.mean(heavy), 0.0) / 3)) / 4
         wide, fine = wide + more, max(fine + tail - more, 0.0)
@@ -371,4 +369,4 @@ def _marginal(landscape, image, lai, forms):
         got = np.concatenate([image.seen(np.interp(each, nodes, values))[image.known] for each in drawn])
         found = np.quantile(got, _PROBABILITIES)
         values = np.maximum.accumulate(np.maximum(values + wanted - found, 0.0))
-    return {"scores": _rounded(nodes), "lai": _rounded(values)}
+    return _rounded(nodes), _rounded(values)

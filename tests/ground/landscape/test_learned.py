@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from lazy import no_compute
 from scipy.interpolate import BSpline
 
 import fifesim
@@ -124,7 +125,8 @@ def test_level_konza_has_the_variogram_of_the_real_map(large):
     found = [fifesim.ground.compare_landscapes(each, each)["one"] for each in large]
     for lag, real in REAL_VARIOGRAM.items():
         got = np.mean([each[f"variogram_{lag}_m"] for each in found])
-        assert got == pytest.approx(real, rel=0.15), lag
+        # Three standard deviations of the mean of three realisations; one has up to 0.04.
+        assert got == pytest.approx(real, abs=0.07), lag
 
 
 def test_learning_recovers_a_landscape(large):
@@ -132,14 +134,17 @@ def test_learning_recovers_a_landscape(large):
     grid = grids.geobox(large[0])
     again = [learned.simulate(grid, seed=seed)["lai"] for seed in (11, 12)]
     rows = [fifesim.ground.compare_landscapes(large[0], each) for each in again]
-    assert np.mean([row.loc["variogram", "other"] for row in rows]) < 0.15
+    # Realisations of one landscape differ by up to 0.06 and 0.16. The spectrum of the learned one is wrong by 0.2,
+    # because the smallest fields are fitted on cells as large as they are.
+    assert np.mean([row.loc["variogram", "other"] for row in rows]) < 0.1
     assert np.mean([row.loc["spectrum", "other"] for row in rows]) < 0.25
     # Three standard deviations of the difference of one realisation and the mean of two: 0.035, 0.048, 0.101 in each.
     for name, spread in (("quantile_0.05", 0.035), ("quantile_0.5", 0.048), ("quantile_0.95", 0.101)):
         difference = np.mean([row.loc[name, "difference"] for row in rows])
         assert difference == pytest.approx(0.0, abs=3 * np.sqrt(1.5) * spread), name
+    # Without gusts it is 1.0. The search for the gusts ends 17 % too high, at 7.9 instead of 6.7.
     kurtosis = np.mean([row.loc["kurtosis_of_differences", "other"] for row in rows])
-    assert kurtosis == pytest.approx(rows[0].loc["kurtosis_of_differences", "one"], rel=0.35)
+    assert kurtosis == pytest.approx(rows[0].loc["kurtosis_of_differences", "one"], rel=0.25)
 
 
 def test_learning_finds_the_response_to_the_terrain(hills):
@@ -163,6 +168,18 @@ def test_files(tmp_path):
     path.write_text(path.read_text().replace('"cell": 10.0', '"cell": -10.0'))
     with pytest.raises(ValueError, match=r"land\.json is not a landscape: cell"):
         fifesim.ground.Landscape.read(path)
+    for old, new, words in (
+        ('"form": "elevation"', '"form": "height"', "the form 'height' is unknown"),
+        ('"fine"', '"finest"', "gusts and level_gusts have the keys"),
+        (f"{KONZA.scores[1]}", "-99.0", "ascending numbers"),
+        (f'"scores": [\n  {KONZA.scores[0]},', '"scores": [', "needs a value"),
+    ):
+        KONZA.save(path)
+        text = path.read_text()
+        assert old in text, old
+        path.write_text(text.replace(old, new))
+        with pytest.raises(ValueError, match=words):
+            fifesim.ground.Landscape.read(path)
     path.write_text("{")
     with pytest.raises(ValueError, match="is not a landscape"):
         fifesim.ground.Landscape.read(path)
@@ -215,6 +232,25 @@ def test_terrain_beyond_the_learned_range_warns(hills):
     with pytest.warns(UserWarning, match="of the cells are higher, lower or steeper"):
         land = KONZA.simulate(GRID, hills + 500.0)
     assert land["lai"].attrs["beyond_learned"] == 1.0
+
+
+def test_lazy_elevation_is_not_computed(hills):
+    with no_compute():
+        land = KONZA.simulate(GRID, hills.chunk({"y": 100, "x": 100}))
+    assert "beyond_learned" not in land["lai"].attrs
+
+
+def test_cells_that_lose_the_forms_of_the_land():
+    with pytest.warns(UserWarning, match="larger than twice the 10 m of the learned map"):
+        KONZA.simulate(fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 900.0, 900.0, 30.0))
+    with pytest.raises(ValueError, match="give a grid of square cells"):
+        KONZA.simulate(fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 900.0, 900.0, (10.0, 15.0)))
+
+
+def test_maps_are_compared_on_the_cells_of_the_elevation():
+    here = _map(_FIELD)
+    with pytest.raises(ValueError, match="different grids"):
+        fifesim.ground.compare_landscapes(here, here, here.assign_coords(x=here["x"] + 5000.0))
 
 
 def test_normal_scores_are_zero_where_unknown():
