@@ -32,9 +32,7 @@ app = typer.Typer(
 # threads spend more time waiting than working. A number set by the user stays.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-_Paper = Annotated[
-    bool, typer.Option("--paper", help="Use the paper's uniform stand instead of the default landscape.")
-]
+_Paper = Annotated[bool, typer.Option("--paper", help="Use the paper's stand instead of the default landscape.")]
 _Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")]
 _Resume = Annotated[bool, typer.Option("--resume", help="Resume an interrupted run.")]
 _Scheduler = Annotated[
@@ -105,13 +103,10 @@ def simulate_command(
         from fifesim.output.progress import since_start
         from fifesim.output.run_folder import estimate, estimate_in_words, names_of, simulate_to_folder
         from fifesim.output.workers import cluster
-        from fifesim.scenario.scenario import read_scenario
 
     check_folder(output, overwrite, resume, names_of(scene))
-    if paper and scenario:
-        raise ValueError("--paper cannot be combined with a scenario file: give one of them")
     found = scenario_to_resume(output) if resume and scenario is None and not paper else None
-    found = found or (_default(paper) if scenario is None else read_scenario(scenario))
+    found = found or _scenario(scenario, paper)
     if dry_run:
         cost = estimate(found, output, threads=workers or threads, scene=scene, start=since_start())
         print_lines(estimate_in_words(cost, as_json))
@@ -239,9 +234,7 @@ def reproduce_command(
 
 @app.command("budget")
 def budget_command(
-    scenario: Annotated[
-        Path | None, typer.Argument(help="Scenario file (TOML); by default the case of the paper.")
-    ] = None,
+    scenario: Annotated[Path | None, typer.Argument(help="Scenario file (TOML); by default as simulate.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("budget"),
     realisations: Annotated[int, typer.Option(help="Number of scenes.")] = 20,
     cells: Annotated[
@@ -251,6 +244,7 @@ def budget_command(
     sensor: Annotated[
         str | None, typer.Option(help="Instrument over level ground, instead of a scenario file.")
     ] = None,
+    paper: _Paper = False,
     overwrite: _Overwrite = False,
     allow_remote: _AllowRemote = False,
     quiet: Quiet = False,
@@ -259,17 +253,14 @@ def budget_command(
     """Attribute the scatter of LAI and FPAR to stages. Writes budget.csv, budget.png, report.html, scenario.toml."""
     start = time.monotonic()
     _check_spelling(scenario)
-    if sensor and scenario:
-        raise ValueError("--sensor cannot be combined with a scenario file: give one of them")
+    if sensor and (scenario or paper):
+        raise ValueError("--sensor cannot be combined with a scenario file or --paper: give one of them")
 
     with importing():
         from fifesim.experiments.scatter.report import budget_to_folder
         from fifesim.experiments.scatter.shares import instrument_scenario, window_cells
-        from fifesim.scenario.scenario import read_scenario
 
-    found = None if scenario is None else read_scenario(scenario)
-    if sensor:
-        found = instrument_scenario(sensor)
+    found = instrument_scenario(sensor) if sensor else _scenario(scenario, paper)
     if cells is None:
         cells = window_cells(found) if sensor else 333
     files = budget_to_folder(found, output, realisations=realisations, cells=cells, seed=seed, overwrite=overwrite)
@@ -278,7 +269,7 @@ def budget_command(
 
 @app.command("endtoend")
 def endtoend_command(
-    scenario: Annotated[Path | None, typer.Argument(help="Scenario file (TOML); by default the default one.")] = None,
+    scenario: Annotated[Path | None, typer.Argument(help="Scenario file (TOML); by default as simulate.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("endtoend"),
     quantity: Annotated[
         str, typer.Option(help="gpp, evapotranspiration, or one of their models such as photosynthesis or pt-jpl.")
@@ -289,6 +280,7 @@ def endtoend_command(
     realisations: Annotated[int, typer.Option(help="Number of scenes.")] = 20,
     cells: Annotated[int, typer.Option(help="Cells along the edge of a scene.")] = 333,
     seed: Annotated[int | None, typer.Option(help="Seed of the first scene; by default from the scenario.")] = None,
+    paper: _Paper = False,
     overwrite: _Overwrite = False,
     allow_remote: _AllowRemote = False,
     quiet: Quiet = False,
@@ -301,10 +293,9 @@ def endtoend_command(
     with importing():
         from fifesim.experiments.scatter.endtoend import endtoend_to_folder
         from fifesim.retrieval.description import read_retrieval
-        from fifesim.scenario.scenario import read_scenario
 
     files = endtoend_to_folder(
-        None if scenario is None else read_scenario(scenario), output, quantity=quantity,
+        _scenario(scenario, paper), output, quantity=quantity,
         retrieval="line" if retrieval is None else read_retrieval(retrieval), realisations=realisations, cells=cells,
         seed=seed, overwrite=overwrite,
     )  # fmt: skip
@@ -313,10 +304,9 @@ def endtoend_command(
 
 @app.command("explore")
 def explore_command(
-    scenario: Annotated[
-        Path | None, typer.Argument(help="Scenario file (TOML); by default the case of the paper.")
-    ] = None,
+    scenario: Annotated[Path | None, typer.Argument(help="Scenario file (TOML); by default as simulate.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="HTML file to write.")] = Path("explore.html"),
+    paper: _Paper = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing page.")] = False,
     allow_remote: _AllowRemote = False,
     quiet: Quiet = False,
@@ -328,10 +318,8 @@ def explore_command(
 
     with importing():
         from fifesim.experiments.explorer import explore
-        from fifesim.scenario.scenario import read_scenario
 
-    found = None if scenario is None else read_scenario(scenario)
-    page = explore(found, output, overwrite=overwrite)
+    page = explore(_scenario(scenario, paper), output, overwrite=overwrite)
     report([page], time.monotonic() - start, f"{page} in a browser")
 
 
@@ -340,7 +328,7 @@ def scenario_command(paper: _Paper = False):
     """Print the default scenario as TOML. Every key has its unit and meaning; save it to a file and edit."""
     from fifesim.scenario.toml import write_scenario
 
-    print_lines(write_scenario(_default(paper).complete()).rstrip())
+    print_lines(write_scenario(_scenario(None, paper).complete()).rstrip())
 
 
 @app.command("sensors")
@@ -377,11 +365,16 @@ def verify_command():
         raise typer.Exit(Exit.FAILURE)
 
 
-def _default(paper):
-    """Scenario used if none is given."""
-    from fifesim.scenario.scenario import Scenario, default_scenario
+def _scenario(path, paper):
+    """Scenario of a file, of the paper, or the default one."""
+    if path is not None and paper:
+        raise ValueError('--paper cannot be combined with a scenario file: write base = "paper" at its top instead')
 
-    return Scenario(sensor={"response": "paper"}) if paper else default_scenario()
+    from fifesim.scenario.scenario import Scenario, default_scenario, read_scenario
+
+    if path is not None:
+        return read_scenario(path)
+    return Scenario(base="paper") if paper else default_scenario()
 
 
 def _check_spelling(scenario):

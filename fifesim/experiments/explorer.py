@@ -119,7 +119,7 @@ def _slider(key, name, hint, values, own, mark_and_text):
 
 def _patches(arp, cell):
     if arp is None:
-        return "map", "as in the map"
+        return "map", "as in the map, or learned from one"
     length = correlation_length(arp, cell)
     return f"{length:.0f} m", f"leaf area is correlated up to {length:.0f} m, arp {arp:g}"
 

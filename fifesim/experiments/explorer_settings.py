@@ -17,7 +17,7 @@ from fifesim.experiments.scatter.shares import unexplained
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, displaced_pixels, working_stages
 from fifesim.grids import grid as grids
 from fifesim.scenario.ground import elevation, ground_scene, truth_of
-from fifesim.scenario.scenario import Scenario, grid_keys, parse_scenario
+from fifesim.scenario.scenario import Scenario, default_scenario, grid_keys, parse_scenario
 from fifesim.scenario.simulation import setup_of
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response import calibration
@@ -45,7 +45,7 @@ _MOST_CELLS = 400
 
 @dataclass(frozen=True)
 class Setting:
-    """Values of all sliders except registration; arp is None for a map, haze without aerosol."""
+    """Values of all sliders except registration; arp is None for a map or a learned landscape, haze without aerosol."""
 
     arp: float | None
     haze: float | None
@@ -94,10 +94,10 @@ class Sweep:
 
 
 def sweep_of(scenario=None):
-    """Sliders of a scenario, with its values and others around them; by default of the paper's largest patches."""
+    """Sliders of a scenario, by default the default one, with its values and others around them."""
     # Where more than eight stages share the scatter, as in a landscape of classes, haze, sun and instrument have two
     # values.
-    scenario = scenario or Scenario(ground={"arp": 0.24}, terrain={"dem": "flat"})
+    scenario = scenario or default_scenario()
     scenario.complete()
     scenario = scenario.model_copy(update={"grid": _window(scenario)})
     scenario = parse_scenario(scenario.model_dump(exclude_unset=True))
@@ -107,7 +107,7 @@ def sweep_of(scenario=None):
     sweep = Sweep(
         scenario=scenario,
         haze=haze,
-        arps=(None,) if land.lai_file else _with_own("arp", land.arp),
+        arps=(None,) if scenario.learned or land.lai_file else _with_own("arp", land.arp),
         hazes=(None,) if fixed_air else _with_own(haze, getattr(air, haze)),
         szas=_with_own("sza", scenario.sun_and_view().sza),
         instruments=(own.instrument,),

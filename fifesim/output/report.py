@@ -93,7 +93,7 @@ def published(scenario, fits):
 def _paper_r2(scenario):
     """Published R2 of LAI for the ground of a scenario, None if there is none."""
     ground = scenario.ground
-    if ground.lai_file or not scenario.landscape.is_one():
+    if ground.lai_file or not scenario.is_one():
         return None
     table = files.table("friedl1995_table2.csv").set_index(["variable", "distribution", "arp"])["r2"]
     return table.get(("lai", ground.distribution, ground.arp))
@@ -324,6 +324,8 @@ def engine_rows(scenario):
 def ground_in_words(scenario):
     """Classes and leaf area of the ground of a scenario."""
     ground = scenario.ground
+    if scenario.learned:
+        return f"landscape learned from {Path(scenario.learned).name}"
     if scenario.landscape.cover != "none":
         return f"{', '.join(scenario.class_table())} in {Path(scenario.landscape.cover).name}"
     return Path(ground.lai_file).name if ground.lai_file else f"{ground.distribution}, arp {ground.arp:g}"

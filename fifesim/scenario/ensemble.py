@@ -83,7 +83,7 @@ def uniform_reflectance(scenario, ground):
     setup = setup_of(scenario)
     if parts := varying_parts(setup):
         raise ValueError(f"uniform ground does not support {', '.join(parts)}: use pixels='chain'")
-    if scenario.landscape.is_one():
+    if scenario.is_one():
         driver = _driver(scenario, setup)
         return driver.toa(driver.reflectance(ground["lai"]))
     pixels = grids.aligned_grid(as_carried(scenario.geobox()), scenario.sensor.size)

@@ -16,9 +16,10 @@ from fifesim.ground.landscape.cover import PATTERNS, Patches
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.labels import landscape
 from fifesim.ground.landscape.lai_labels import lai_scene, lai_window
+from fifesim.ground.landscape.learned_labels import Landscape
 from fifesim.ground.terrain import labels as terrain_labels
 from fifesim.ground.terrain import sky_labels
-from fifesim.ground.terrain.elevation_labels import fine_dem, flint_hills, source_dem
+from fifesim.ground.terrain.elevation_labels import fine_dem, flint_hills, known_dem, source_dem
 from fifesim.ground.terrain.sky_labels import horizon_places
 from fifesim.ground.terrain.source_labels import beside_altitude, elevation_grid
 from fifesim.scenario.keys import COVARIATES
@@ -133,8 +134,10 @@ def _padded(grid, margin):
 
 def ground_scene(scenario, grid, chunks=None, dem=None):
     """Ground of a scenario: a Dataset with ``lai`` [m2 m-2], ``cover`` and varying properties."""
-    land, own = scenario.ground, scenario.landscape
-    if not own.is_one():
+    land = scenario.ground
+    if scenario.learned:
+        scene = _learned(scenario, grid, chunks)
+    elif not scenario.is_one():
         scene = _landscape(scenario, grid, chunks, dem)
     elif land.lai_file:
         scene = lai_window(land.lai_file, grid, chunks=chunks).to_dataset(name="lai")
@@ -143,6 +146,20 @@ def ground_scene(scenario, grid, chunks=None, dem=None):
         scene = lai.to_dataset(name="lai")
     scene["lai"].attrs |= scenario._made_on
     return scene
+
+
+def _learned(scenario, grid, chunks):
+    """Learned landscape of a scenario, with the elevation within reach of the grid."""
+    terrain, land = scenario.terrain, Landscape.read(scenario.learned)
+    wide = land.around(grid)
+    if terrain.dem == "flat":
+        dem = None
+    elif terrain.dem == "flint-hills":
+        dem = flint_hills(wide, terrain.seed, chunks=chunks)
+    else:
+        fill, units = terrain.fill, terrain.vertical_units
+        dem = known_dem(terrain.dem, wide, chunks, fill, units)
+    return land.simulate(grid, dem, seed=scenario.ground.seed, chunks=chunks)
 
 
 def _landscape(scenario, grid, chunks, dem):

@@ -109,10 +109,12 @@ class Section(BaseModel):
     def _openable(cls, value, info):
         """Check a path, or a name in its place. Missing files are reported by their reader."""
         key = info.field_name
-        names = ((cls.model_fields[key].json_schema_extra or {}).get("file") or {}).get("names")
-        is_file = cls.names_a_file(key, value)
-        if names and value not in names and not is_file:
-            raise ValueError(f"{nearest(value, names)}use {', '.join(names)}, or a raster file such as {key}.tif")
+        kind = (cls.model_fields[key].json_schema_extra or {}).get("file") or {}
+        names, is_file = kind.get("names"), cls.names_a_file(key, value)
+        if names and value is not None and value not in names and not is_file:
+            suffix = kind["suffix"]
+            example = f"a raster file such as {key}.tif" if suffix == "*" else f"a file such as mine{suffix}"
+            raise ValueError(f"{nearest(value, names)}use {', '.join(names)}, or {example}")
         if is_file:
             if not value:
                 raise ValueError("name a file, or remove the key")
@@ -159,6 +161,13 @@ VARYING = tuple(DRAWN)
 KEYS = {name: known for name, known in PROPERTIES.items() if known.default is not None}
 """Canopy properties that are single keys of a scenario."""
 COVARIATES = ("elevation", "wetness", "illumination")
+BASES = {
+    "landscape": {},
+    "paper": {"ground": {"distribution": "burned-grazed"}, "sensor": {"response": "paper"}},
+}
+"""Keys that differ from the defaults, by the name of the base of a scenario."""
+STAND = ("distribution", "arp", "method", "lai_file")
+"""Keys of [ground] for leaf area that is not of a learned landscape."""
 FIELD_LIMITS = {"deviations": (0, 1), "arps": (0, STREAMING_ARP.highest), "covary": (-1, 1)}
 """Smallest and largest number in the tables of a landscape. [1]"""
 
@@ -236,8 +245,15 @@ class ClassKeys(StandKeys):
 
 
 class LandscapeKeys(Section):
-    """Land cover classes, and ground properties that vary. Without them, one stand covers the scene."""
+    """A landscape learned from a map, or land cover classes, and ground properties that vary."""
 
+    learned: str | None = file(
+        None,
+        "landscape learned from a map: konza; a .json file of Landscape.save; or none. By default konza, unless "
+        "distribution, arp, method or lai_file of [ground], cover or covary is given",
+        names=("konza", "none"),
+        suffix=".json",
+    )
     cover: str = file(
         "none",
         "layout of the classes: none; pastures, voronoi or levels, which are drawn; or a raster file of class codes",
@@ -253,10 +269,6 @@ class LandscapeKeys(Section):
         "ground cells per lattice cell of these fields along each side; arps refers to lattice cells",
     )
     covary: ByName = text({}, f"correlations [1] of LAI with {', '.join(COVARIATES + VARYING)}")
-
-    def is_one(self):
-        """Whether one stand covers the scene and only its LAI varies."""
-        return self.cover == "none" and not any((*self.deviations.values(), *self.covary.values()))
 
     @field_validator("deviations", "arps", "covary")
     @classmethod
@@ -512,6 +524,21 @@ class Keys(Section):
         for name, value in self:
             found |= {(name, key): section for key, section in value.items()} if name == "classes" else {(name,): value}
         return found
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_base(cls, values):
+        """Replace the key base by its keys, unless they are given."""
+        if not isinstance(values, dict) or "base" not in values:
+            return values
+        values = dict(values)
+        if (base := values.pop("base")) not in BASES:
+            raise ValueError(f"base = {shown(base)}: must be {' or '.join(BASES)}")
+        for section, keys in BASES[base].items():
+            own = values.get(section, {})
+            if isinstance(own, dict) and "instrument" not in own:
+                values[section] = keys | own
+        return values
 
     @model_validator(mode="before")
     @classmethod

@@ -11,7 +11,7 @@ from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from fifesim.atmosphere.engines import check_zenith
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.base import files, geometry
+from fifesim.base import geometry
 from fifesim.base.arguments import FilePath
 from fifesim.base.files import in_a_line, shown
 from fifesim.base.messages import nearest
@@ -22,8 +22,9 @@ from fifesim.grids.opening import covering_grid
 from fifesim.grids.sites import on_fife_site
 from fifesim.ground.landscape.classes import SHARES, CoverClass, fife_classes
 from fifesim.ground.landscape.distribution import treatments
+from fifesim.ground.landscape.learned_labels import Landscape
 from fifesim.scenario.ground import check_leaf_area, drawn_properties
-from fifesim.scenario.keys import COVARIATES, EXTENT, OFFSET_PARTS, ByName, GridKeys, Keys
+from fifesim.scenario.keys import COVARIATES, EXTENT, OFFSET_PARTS, STAND, ByName, GridKeys, Keys
 from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
 from fifesim.scenario.toml import full_path, load_values, mistakes
 from fifesim.sensor.description.fields import false_colour_bands
@@ -80,6 +81,8 @@ def statement(scenario):
         clauses.append(f"{_listed(given)} {_are(given)} from {'files' if len(given) > 1 else 'a file'}")
     if scenario.terrain.dem == "flat":
         clauses.append("the ground is level")
+    if scenario.learned:
+        clauses.append(f"leaf area varies as learned from {_learned_from(scenario)}")
     of_fife = () if given else _of_fife(scenario)
     if of_fife:
         clauses.append(f"only {_listed(of_fife)} {_are(of_fife)} FIFE's")
@@ -97,7 +100,9 @@ def _parts(scenario):
     """Names of the synthetic parts of the landscape, and of the parts from files."""
     ground, cover, dem = scenario.ground, scenario.landscape.cover, scenario.terrain.dem
     synthetic, given = [], ["leaf area"] if ground.lai_file else []
-    if cover in _PATTERNS:
+    if scenario.learned:
+        synthetic.append("leaf area")
+    elif cover in _PATTERNS:
         synthetic.append(_PATTERNS[cover])
     else:
         synthetic += [] if ground.lai_file else ["leaf area"]
@@ -117,10 +122,16 @@ def _landscape(synthetic, given):
     return "partly synthetic landscape" if given else "synthetic landscape"
 
 
+def _learned_from(scenario):
+    """Source of the learned landscape that belongs to fifesim, or the name of its file."""
+    name = scenario.learned
+    return Landscape.read(name).source if name == "konza" else Path(name).name
+
+
 def _of_fife(scenario):
     """Parts of a landscape without files that come from FIFE."""
-    types = _distributions(scenario)
-    found = [f"the {_COUNTS[len(types)]}"] if types <= set(treatments()) else []
+    types = set() if scenario.learned else _distributions(scenario)
+    found = [f"the {_COUNTS[len(types)]}"] if types and types <= set(treatments()) else []
     return found + ["the location"] * is_on_site(scenario)
 
 
@@ -180,14 +191,17 @@ _WHOLE = 1e-6
 
 class Scenario(Keys):
     """
-    Parameters of a simulation. The defaults are one stand of the paper on the FIFE site, and TM.
+    Parameters of a simulation. The defaults are a learned landscape on synthetic hills of the FIFE site, and TM.
 
-    The response of TM is the one measured in flight; ``sensor={"response": "paper"}`` selects Table 1 of the paper.
+    ``Scenario(base="paper")`` has the case of the paper: one stand, and the response of TM of its Table 1. Leaf area
+    given in another way, such as ``ground={"arp": 0.24}``, replaces the learned landscape.
 
     Parameters
     ----------
     grid, ground, landscape, classes, terrain, geometry, atmosphere, sensor : mapping
         Keys of each section. ``fifesim scenario`` prints all keys with unit, meaning and default.
+    base : {"landscape", "paper"}, optional
+        Defaults of the keys that are not given.
 
     Raises
     ------
@@ -222,7 +236,12 @@ class Scenario(Keys):
     def _classes_of_a_cover(self):
         if self.landscape.cover == "none" and self.classes:
             raise ValueError('classes are given, but landscape.cover is none: choose a layout, such as "pastures"')
-        if not self.landscape.is_one() and self.ground.method == "periodic":
+        if self.learned and (given := self._of_a_stand()):
+            raise ValueError(
+                f"landscape.learned = {shown(self.learned)} and {', '.join(given)} are given: a learned landscape has "
+                "its own leaf area: remove one of them"
+            )
+        if not self.is_one() and self.ground.method == "periodic":
             raise ValueError(
                 'ground.method = "periodic" needs a single stand: use method = "streaming" or cover = "none"'
             )
@@ -241,6 +260,26 @@ class Scenario(Keys):
         if any(shares) and abs(sum(shares) - 1) > _WHOLE:
             raise ValueError(f"classes: shares sum to {sum(shares):g}: they must sum to 1")
         return self
+
+    def _of_a_stand(self):
+        """Names of the given keys that describe leaf area in another way than a learned landscape."""
+        ground, own = self.ground, self.landscape
+        found = [f"ground.{key}" for key in STAND if key in ground.model_fields_set and getattr(ground, key)]
+        return found + ["landscape.cover"] * (own.cover != "none") + ["landscape.covary"] * any(own.covary.values())
+
+    @property
+    def learned(self) -> str | None:
+        """Name or file of the learned landscape; None for a stand or classes."""
+        name = self.landscape.learned
+        if name is None:
+            return None if self._of_a_stand() else "konza"
+        return None if name == "none" else name
+
+    def is_one(self) -> bool:
+        """Whether one stand covers the scene and only its LAI varies."""
+        own = self.landscape
+        varies = own.deviations.values(), own.covary.values()
+        return not self.learned and own.cover == "none" and not any(map(any, varies))
 
     def class_table(self) -> dict[str, CoverClass]:
         """Classes of cover by name, a dict of `CoverClass`; by default the classes of FIFE."""
@@ -341,7 +380,8 @@ class Scenario(Keys):
         ground = self.ground.model_copy(update=self.ground.complete_optics(bands))
         sensor = own.model_copy(update={"pixel": own.size, "bands": [band.name for band in bands]})
         own_time = self.geometry.model_copy(update={"time": self.overpass_time()})
-        update = {"grid": grid_keys(box), "ground": ground, "geometry": own_time, "sensor": sensor}
+        land = self.landscape.model_copy(update={"learned": self.learned or "none"})
+        update = {"grid": grid_keys(box), "ground": ground, "geometry": own_time, "sensor": sensor, "landscape": land}
         return self.model_copy(update=update).with_paths(full_path)
 
     def replace(self, /, **changes: Any) -> Self:
@@ -447,6 +487,11 @@ class Scenario(Keys):
         return statement(self)
 
     @property
+    def unused(self) -> dict[tuple[str, ...], tuple[str, ...]]:
+        """Keys that have no effect, by section."""
+        return {("ground",): STAND} if self.learned else {}
+
+    @property
     def files(self) -> dict[tuple[str, ...], str]:
         """Paths of the files that the scenario reads: a dict from (table, key) to str."""
         return {(*place, key): path for place, table in self.sections().items() for key, path in table.files.items()}
@@ -454,7 +499,7 @@ class Scenario(Keys):
 
 def default_scenario() -> Scenario:
     """
-    Default landscape of the FIFE site, from ``data/fife.toml``.
+    Scenario of ``fifesim simulate``: a learned landscape on synthetic hills, in green, red and near infrared.
 
     Returns
     -------
@@ -463,10 +508,10 @@ def default_scenario() -> Scenario:
     Examples
     --------
     >>> import fifesim
-    >>> sorted(fifesim.scenario.default_scenario().classes)
-    ['burned-grazed', 'burned-ungrazed', 'unburned-ungrazed']
+    >>> fifesim.scenario.default_scenario().learned
+    'konza'
     """
-    return read_scenario(files.path("fife.toml"))
+    return parse_scenario(with_false_colour({}))
 
 
 def grid_keys(box):

@@ -105,7 +105,8 @@ def check_spelling(path):
 def write_scenario(scenario):
     """TOML text of a scenario, with the unit and meaning of every key; reading it gives the same scenario."""
     heading = [scenario.provenance(), "Scenario of a fifesim run. Run it with: fifesim simulate THIS_FILE -o FOLDER"]
-    return _document(heading, {place: _described(section) for place, section in scenario.sections().items()})
+    unused, sections = scenario.unused, scenario.sections()
+    return _document(heading, {place: _described(own, unused.get(place, ())) for place, own in sections.items()})
 
 
 def write_tables(heading, tables):
@@ -128,11 +129,13 @@ def _document(heading, tables):
     return document.as_string()
 
 
-def _described(section):
-    """Table of a section, with the meaning of each key in a comment."""
+def _described(section, unused):
+    """Table of a section without unused keys, with the meaning of each key in a comment."""
     table = tomlkit.table().comment(inspect.getdoc(type(section)).splitlines()[0])
     # A key after a nested table would become part of that table.
     for key, known in sorted(section.written.items(), key=lambda item: isinstance(getattr(section, item[0]), dict)):
+        if key in unused:
+            continue
         value, unit = getattr(section, key), section.unit(key)
         meaning = f"{unit}; {known.description}" if unit else known.description
         if value is None:

@@ -14,6 +14,7 @@ from fifesim.output import report
 from fifesim.output.folders import check_folder, results
 from fifesim.output.report import fixed, plus_minus, title
 from fifesim.output.workers import check_memory_of_cells
+from fifesim.scenario.scenario import default_scenario
 from fifesim.scenario.toml import write_scenario
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.listing import blur_in_words, noise_in_words
@@ -142,7 +143,7 @@ def budget_to_folder(scenario, folder, *, realisations=20, cells=333, seed=None,
     """Write the scatter budget of a scenario: budget.csv, budget.png, report.html and scenario.toml."""
     folder = Path(folder)
     check_folder(folder, overwrite)
-    complete = (scatter.budget_scenario() if scenario is None else scenario).complete()
+    complete = (default_scenario() if scenario is None else scenario).complete()
     check_memory_of_cells(min(cells, *complete.geobox().shape))
     options = {"realisations": realisations, "cells": cells, "seed": seed}
     with results(folder, BUDGET_FILES, overwrite=overwrite) as partial:

@@ -30,7 +30,7 @@ from fifesim.models.weather import Weather
 from fifesim.output.progress import steps
 from fifesim.retrieval.description import Retrieval
 from fifesim.scenario.ground import ground_scene
-from fifesim.scenario.scenario import Scenario, grid_keys
+from fifesim.scenario.scenario import Scenario, default_scenario, grid_keys
 from fifesim.scenario.simulation import warn_of_scenario_pixels
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.provenance import DASH, origin_text
@@ -79,7 +79,7 @@ def budget(
     Parameters
     ----------
     scenario : fifesim.scenario.scenario.Scenario, optional
-        By default the case of the paper, with pixels at the interval of Table 1.
+        By default the scenario of ``fifesim simulate``.
     quantity : str or callable, optional
         "gpp", "evapotranspiration", one of their models such as "photosynthesis" or "pt-jpl", "lai", "fpar", or a
         function of arrays of LAI, or of LAI and FPAR. FPAR is the light that green leaves absorb. Production and
@@ -140,7 +140,7 @@ def budget(
     >>> bool(errors["bias"].sel(stage="scaling") > 0.9 * errors["total_bias"])
     True
     """
-    scenario = budget_scenario() if scenario is None else scenario
+    scenario = default_scenario() if scenario is None else scenario
     _check_map(scenario)
     warn_of_scenario_pixels(scenario)
     if quantity is not None:
@@ -220,11 +220,6 @@ def _check_map(scenario):
             "are interpolated between them: nothing varies within its pixels, so that non-linearity and NDVI scaling "
             "would be 0. Use fifesim.ground.downscale to make a map with variation"
         )
-
-
-def budget_scenario():
-    """Scenario of the paper, with pixels at the interval of Table 1."""
-    return Scenario(sensor={"interval": "native", "response": "paper"})
 
 
 def budget_cases(scenario, *, realisations, cells, seed=None):

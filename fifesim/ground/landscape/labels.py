@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.arguments import ANYTHING, UNCHECKED, Chunks, FilePath, WholeNumber, described, is_path
+from fifesim.base.arguments import ANYTHING, UNCHECKED, Chunks, FilePath, Kind, WholeNumber, described, is_path
 from fifesim.base.lattice import check_seed
 from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking
@@ -19,7 +19,7 @@ from fifesim.grids import grid as grids
 from fifesim.grids.classes import NO_CLASS, check_codes, numbers_of
 from fifesim.grids.directions import Directions
 from fifesim.grids.inputs import FileOrRaster
-from fifesim.grids.sites import is_fife, made_on_site
+from fifesim.grids.sites import is_fife, made_on_site, on_fife_site
 from fifesim.grids.source import open_source
 from fifesim.grids.warp import onto_grid
 from fifesim.ground.canopy.leaf_area import check_share
@@ -30,6 +30,8 @@ from fifesim.ground.landscape.classes import CoverClass, Field, class_table, fif
 from fifesim.ground.landscape.cover import Patches, patch_classes
 from fifesim.ground.landscape.field_labels import drawn_fields
 from fifesim.ground.landscape.lai_labels import lai_window
+from fifesim.ground.landscape.learned_labels import Landscape
+from fifesim.ground.terrain.elevation_labels import flint_hills
 
 # Chunk size for "auto" is a multiple of this. [cell]
 _TILE = 1008
@@ -88,6 +90,9 @@ def _labelled(cover, table, history, **provenance):
 
 # Type errors of these are raised with more detail by the functions that use them.
 GroundProperty: TypeAlias = Annotated[FilePath | xr.DataArray | Field | float, ANYTHING]
+LearnedLandscape: TypeAlias = Annotated[
+    FilePath | Landscape, Kind("a fifesim.ground.Landscape, its .json file, or 'konza'")
+]
 Cover: TypeAlias = Annotated[Patches | FilePath | xr.DataArray, UNCHECKED]
 Classes: TypeAlias = Annotated[CoverClass | Sequence[CoverClass] | Mapping[str, CoverClass], UNCHECKED]
 
@@ -100,10 +105,11 @@ _REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
 def landscape(
     grid: GeoBox,
     *,
+    learned: LearnedLandscape | None = None,
     cover: Cover | None = None,
     classes: Classes | None = None,
     lai: FileOrRaster | None = None,
-    arp: float = 0.15,
+    arp: float | None = None,
     brown: GroundProperty | None = None,
     crown_cover: GroundProperty | None = None,
     soil: GroundProperty | None = None,
@@ -119,21 +125,26 @@ def landscape(
     """
     Create a landscape: leaf area, land cover classes and other ground properties on one grid.
 
+    By default, leaf area is that of a landscape learned from Konza Prairie; ``cover``, ``classes``, ``lai``, ``arp`` or
+    ``covary`` replace it.
+
     Parameters
     ----------
     grid : odc.geo.geobox.GeoBox
         Grid of the ground cells, in a projected CRS.
-    cover : Patches, str, path or xarray.DataArray, optional
+    learned : Landscape, str or path, optional
+        Learned landscape, its file, or "konza".
+    cover : Patches, "pastures", str, path or xarray.DataArray, optional
         Layout of the classes: random patches, or a map of integer codes in any CRS, as a raster file or an array. Cells
-        no larger than the map cells take the nearest class, larger cells the most frequent one. By default a single
-        class covers the grid, and the three treatments of FIFE are laid out as pastures.
+        no larger than the map cells take the nearest class, larger cells the most frequent one. "pastures" are the
+        three treatments of FIFE between fences. By default a single class covers the grid.
     classes : CoverClass, sequence of CoverClass, or mapping of str to CoverClass, optional
         Properties of the classes; by default from the attributes of a cover raster, or `fife_classes` for random
         patches.
     lai : xarray.DataArray, str or path, optional
         Leaf area map as in `open_lai`, instead of the distributions of the classes. [m2 m-2]
     arp : float, optional
-        Autoregressive parameter of classes without one, in [0, 0.2498]. [1]
+        Autoregressive parameter of classes without one, in [0, 0.2498]; by default 0.15. [1]
     brown, crown_cover, soil, moisture : float, Field, xarray.DataArray, str or path, optional
         Dead fraction of the leaf area, crown cover, soil brightness and soil moisture, as in `surface_reflectance`: a
         number, a `Field` for a random field, or a map. They replace the values of the classes. [1]
@@ -141,7 +152,9 @@ def landscape(
         Correlations of leaf area with ``elevation``, ``wetness``, ``illumination``, ``slope`` and random fields, such
         as ``{"wetness": 0.5, "soil": -0.4}``. They refer to standard normal scores of the same cell. [1]
     dem : xarray.DataArray, dims (y, x), optional
-        Elevation on the grid, required if ``covary`` names a terrain property. [m]
+        Elevation on the grid, required if ``covary`` names a terrain property. A learned landscape follows it, and
+        that of `Landscape.around` if it extends so far; without it, by default the landscape follows `flint_hills` of
+        the same seed on the FIFE site, and lies on level ground elsewhere. [m]
     reference : dict of str to xarray.DataArray, optional
         Terrain properties of a larger area that contains the grid, as in `correlated_fields`.
     geometry : Geometry, optional
@@ -194,8 +207,13 @@ def landscape(
     ('band', 'y', 'x')
     """
     grid = grids.check_grid(grid)
-    check_arp(arp)
     seed = check_seed(seed)
+    others = {"cover": cover, "classes": classes, "lai": lai, "arp": arp, "covary": covary}
+    others = [name for name, each in others.items() if each is not None]
+    if learned is not None and others:
+        raise ValueError(
+            f"learned and {', '.join(others)} are given: a learned landscape has its own leaf area: remove one of them"
+        )
     given = {"brown": brown, "crown_cover": crown_cover, "soil": soil, "moisture": moisture}
     given = {name: each.mean if isinstance(each, Field) and not each.sd else each for name, each in given.items()}
     drawn = {name: each for name, each in given.items() if isinstance(each, Field)}
@@ -206,14 +224,20 @@ def landscape(
         for name, each in given.items()
         if each is not None and name not in drawn
     }
-    if classes is not None or cover is not None or lai is None:
+    arp = 0.15 if arp is None else arp
+    check_arp(arp)
+    table = ()
+    if classes is not None or cover is not None or (others and lai is None):
         table = class_table(_default_classes(cover) if classes is None else classes)
         variables["cover"] = _cover(grid, cover, table, seed, chunks, allow_remote)
-    arps = [arp if lai is not None or each.arp is None else each.arp for each in (table if lai is None else [None])]
+    by_class = bool(others) and lai is None
+    arps = [arp if each is None or each.arp is None else each.arp for each in (table if by_class else [None])]
     scores, made = drawn_fields(
         grid, drawn, covary, arps, dem=dem, geometry=geometry, seed=seed, reference=reference, chunks=chunks
     )
-    if lai is None:
+    if not others:
+        variables = _learned(grid, learned, dem, seed, chunks) | variables
+    elif by_class:
         variables["lai"] = _lai(grid, variables["cover"], table, arp, seed, scores)
     else:
         variables["lai"] = lai_window(lai, grid, chunks, allow_remote=allow_remote)
@@ -222,15 +246,23 @@ def landscape(
     variables |= made
     order = [name for name in ("lai", "cover", *given) if name in variables]
     # Functions that get the leaf area alone warn of the properties that they do not see.
-    if others := [name for name in order[1:] if name != "cover" or any(each.canopy.given for each in table)]:
-        variables["lai"].attrs["landscape"] = ", ".join(others)
+    if beside := [name for name in order[1:] if name != "cover" or any(each.canopy.given for each in table)]:
+        variables["lai"].attrs["landscape"] = ", ".join(beside)
     site = {key: variables["lai"].attrs[key] for key in ("site",) if key in variables["lai"].attrs}
     return xr.Dataset({name: variables[name] for name in order}, attrs=site)
 
 
+def _learned(grid, learned, dem, seed, chunks):
+    """Variables of a learned landscape, on synthetic hills if it is on the FIFE site and its elevation is unknown."""
+    land = learned if isinstance(learned, Landscape) else Landscape.read("konza" if learned is None else learned)
+    if dem is None and on_fife_site(grid):
+        dem = flint_hills(land.around(grid), seed, chunks=chunks)
+    return dict(land.simulate(grid, dem, seed=seed, chunks=chunks).data_vars)
+
+
 def _default_classes(cover):
     """Default classes of a cover: from its attributes, or the classes of FIFE for patches."""
-    if cover is None or isinstance(cover, Patches):
+    if cover is None or isinstance(cover, Patches) or (isinstance(cover, str) and cover == "pastures"):
         return fife_classes()
     if isinstance(cover, xr.DataArray) and "classes" in cover.attrs:
         return classes_of(cover)
@@ -245,6 +277,8 @@ def _cover(grid, cover, table, seed, chunks, allow_remote):
                 f"the layout of the {len(table)} classes is unknown: give cover= a map of their codes, or for instance "
                 'fifesim.ground.Patches("voronoi", size=300)'
             )
+        cover = FIFE_PASTURES
+    if isinstance(cover, str) and cover == "pastures":
         cover = FIFE_PASTURES
     if isinstance(cover, Patches):
         return drawn_cover(grid, cover, table, seed, chunks)

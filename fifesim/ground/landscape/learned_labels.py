@@ -150,6 +150,30 @@ class Landscape(Described, frozen=True):
             found = grids.place(xr.DataArray(data, dims=("y", "x")), grid)
         return xr.Dataset({"lai": cf.label(found, "lai", history=history, method="learned", **attributes)})
 
+    def around(self, grid: GeoBox) -> GeoBox:
+        """
+        Grid of the elevation on which the landscape of a grid depends: the cells within about 1 km.
+
+        Parameters
+        ----------
+        grid : odc.geo.geobox.GeoBox
+            Grid of square ground cells, in a projected CRS.
+
+        Returns
+        -------
+        wider : odc.geo.geobox.GeoBox
+
+        Examples
+        --------
+        >>> import fifesim
+        >>> konza = fifesim.ground.Landscape.read("konza")
+        >>> grid = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 600.0, 600.0, 10.0)
+        >>> dem = fifesim.flint_hills(konza.around(grid), seed=1)
+        >>> land = konza.simulate(grid, dem, seed=1)
+        """
+        # Nodes around the grid, and the rest of a node.
+        return grids.check_grid(grid).pad(int(np.ceil((REACH + 4 * self.cell) / grids.cell_size(grid)[0])))
+
     def _share_beyond(self, dem, cell):
         """Share of a sample of cells outside of the learned range of elevation or slope."""
         ranges = {each.form: (each.nodes[0], each.nodes[-1]) for each in self.terrain}

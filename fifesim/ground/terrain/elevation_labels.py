@@ -164,6 +164,12 @@ def fine_dem(
     return cf.label(out, "dem", history=history, source_resolution=model.resolution)
 
 
+def known_dem(path_or_raster, grid, chunks=None, fill=None, vertical_units=None):
+    """Elevation on a grid as from `fine_dem`, NaN where the model has none."""
+    model = replace(model_under(grid, path_or_raster, fill, vertical_units), covers=False)
+    return cf.label(model.raster(chunks), "dem", history=f"fine_dem: {model.source.name}")
+
+
 def source_dem(
     path_or_raster: FileOrRaster,
     grid: GeoBox,
