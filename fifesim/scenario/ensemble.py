@@ -35,6 +35,7 @@ _STAND += " background background_spectra"
 _KNOWN = {
     "grid": "crs west north width height cell",
     "ground": f"{_STAND} seed method fpar_inf",
+    "landscape": "learned",
     "terrain": "dem seed fill vertical_units horizon_reach upwelling",
     "geometry": "time latitude longitude sza saa vza vaa",
     "atmosphere": "profile aerosol visibility aot altitude h2o o3 engine",
@@ -94,6 +95,8 @@ def uniform_reflectance(scenario, ground):
 
 def unsupported_parts(scenario, setup):
     """Names of the parts of a setup, or of the keys of its scenario, that plain arrays do not support."""
+    if scenario.learned:
+        return ["landscape.learned"]
     return varying_parts(setup) or [
         ".".join((*place, key))
         for place, section in scenario.sections().items()

@@ -17,8 +17,10 @@ FLAT = {"dem": "flat"}
 NOISE = {"noise": ["thermal"], "seed": 3}
 
 # Each case changes settings that the others leave at their defaults.
+NOT_LEARNED = {"learned": "none"}
 CASES = {
     "flat": {},
+    "learned": {"landscape": {"learned": "konza"}},
     "periodic": {"ground": {"method": "periodic", "arp": 0.24}},
     "native": {"sensor": {"interval": "native"}},
     "metres": {"sensor": {"interval": 25.0, "offset": [0.3, -0.2]}},
@@ -46,7 +48,7 @@ CASES = {
 
 
 def scenario(**tables):
-    return Scenario(**{"grid": SMALL, "terrain": FLAT} | tables)
+    return Scenario(**merged({"grid": SMALL, "landscape": NOT_LEARNED}, {"terrain": FLAT} | tables))
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -124,6 +126,7 @@ CHANGES |= {
     "ground.method": ("periodic", {}),
     "ground.lai_file": ("lai.tif", {}),
     "ground.fpar_inf": (0.9, {}),
+    "landscape.learned": ("konza", {}),
     "landscape.cover": ("pastures", {}),
     "landscape.size": (60.0, PATCHES),
     "landscape.deviations": ({"soil": 0.1}, {}),
@@ -220,7 +223,7 @@ def results(tables, complete):
 def test_each_key_changes_the_result_equally_in_simulate_and_in_chips(files, monkeypatch, name):
     monkeypatch.chdir(files)
     value, others, *along = CHANGES[name]
-    base = merged({"grid": SMALL | {"width": 240.0, "cell": 10.0}, "terrain": FLAT}, others)
+    base = merged({"grid": SMALL | {"width": 240.0, "cell": 10.0}, "terrain": FLAT, "landscape": NOT_LEARNED}, others)
     changed = {name.split(".")[-1]: value}
     for part in name.split(".")[-2::-1]:
         changed = {part: changed}
@@ -255,7 +258,7 @@ def drawn_scenarios():
         rest = sorted(set(names) - used) if len(found) >= DRAWN else names
         # The last draws take keys that no scenario has yet.
         chosen = [*draw.choice(rest, 1), *draw.choice(names, 3 if len(found) < DRAWN else 0)]
-        tables = {"grid": SMALL | {"width": 240.0, "cell": 10.0}, "terrain": FLAT}
+        tables = {"grid": SMALL | {"width": 240.0, "cell": 10.0}, "terrain": FLAT, "landscape": NOT_LEARNED}
         for name in map(str, chosen):
             value, others, *along = CHANGES[name]
             changed = {name.split(".")[-1]: value}

@@ -26,6 +26,7 @@ from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import setup_of
 
 SMALL = {"grid": {"width": 300.0, "height": 240.0}, "terrain": {"dem": "flat"}}
+STAND = {"distribution": "burned-grazed"}
 BACKGROUND = {"TM3": 0.1, "TM4": 0.2}
 OWN = {
     "ground": {
@@ -88,7 +89,7 @@ def explicit_fields(canopy):
 
 
 def make_scene(**sections):
-    case = parse_scenario(SMALL | sections)
+    case = parse_scenario(SMALL | sections | {"ground": STAND | sections.get("ground", {})})
     return ground_scene(case, case.geobox())
 
 
@@ -231,13 +232,13 @@ LEVEL_LAND = [
 
 @pytest.fixture(scope="module")
 def uniform_run():
-    return fifesim.simulate(parse_scenario(SMALL)).compute()
+    return fifesim.simulate(parse_scenario(SMALL | {"ground": STAND})).compute()
 
 
 @pytest.mark.parametrize("sections", LEVEL_LAND, ids=str)
 def test_zero_variation_gives_the_uniform_ground(uniform_run, sections):
     """Results are identical to the bit."""
-    found = fifesim.simulate(parse_scenario(SMALL | sections))
+    found = fifesim.simulate(parse_scenario(SMALL | sections | {"ground": STAND | sections.get("ground", {})}))
     for node, name in (("scene", "lai"), ("scene", "surface_reflectance"), ("image", "dn"), ("truth", "fpar")):
         np.testing.assert_array_equal(found[node][name], uniform_run[node][name], err_msg=name)
 

@@ -102,6 +102,7 @@ def test_numbers_come_with_their_unit_and_limits_are_allowed():
 @pytest.mark.parametrize(
     ("values", "is_one"),
     [
+        ({"learned": "konza"}, False),
         ({"cover": "none", "size": 50.0}, True),
         ({"deviations": {"soil": 0.0, "brown": 0}, "arps": {"soil": 0.24}}, True),
         ({"deviations": {"soil": 0.0}, "covary": {"elevation": 0.0, "soil": 0}}, True),
@@ -112,6 +113,6 @@ def test_numbers_come_with_their_unit_and_limits_are_allowed():
     ],
 )
 def test_landscape_is_one_stand_if_only_leaf_area_varies(values, is_one):
-    assert LandscapeKeys(**values).is_one() is is_one
+    assert Scenario(landscape={"learned": "none"} | values).is_one() is is_one
     is_file = values.get("cover", "none").endswith(".tif")
     assert LandscapeKeys(**values).files == ({"cover": "cover.tif"} if is_file else {})

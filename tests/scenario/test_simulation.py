@@ -22,7 +22,9 @@ EXACT = {"ground.model": "discrete-ordinates"}
 
 
 def scenario(**terrain):
-    return parse_scenario({"grid": GRID, "ground": {"seed": 7}, "terrain": {"horizon_reach": 900} | terrain})
+    return parse_scenario(
+        {"grid": GRID, "ground": {"seed": 7, "arp": 0.15}, "terrain": {"horizon_reach": 900} | terrain}
+    )
 
 
 @pytest.fixture
@@ -108,7 +110,7 @@ def test_scene_with_terrain_is_lazy_and_on_its_grid(hill):
 
 def test_sensor_keys_equal_the_arguments_of_sense():
     keys = {"instrument": "L4TM", "interval": 31.0, "offset": [0.25, -0.5], "noise": ["thermal"], "seed": 3}
-    case = parse_scenario({"grid": GRID, "terrain": {"dem": "flat"}, "sensor": keys})
+    case = parse_scenario({"grid": GRID, "ground": {"arp": 0.15}, "terrain": {"dem": "flat"}, "sensor": keys})
     lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
     toa = fifesim.to_toa(fifesim.surface_reflectance(lai, "L4TM", bands=["TM3", "TM4"]), instrument="L4TM")
     image = fifesim.sense(toa, "L4TM", interval=31.0, offset=(0.25, -0.5), noise="all", seed=3)
@@ -118,7 +120,7 @@ def test_sensor_keys_equal_the_arguments_of_sense():
 # The cells of the fixture "site", on level ground.
 LEVEL = {
     "grid": {"west": 704970.0 + 600, "north": 4334220.0 - 300, "width": 180.0, "height": 150.0},
-    "ground": {"seed": 7},
+    "ground": {"seed": 7, "arp": 0.15},
     "terrain": {"dem": "flat"},
 }
 

@@ -67,7 +67,7 @@ def test_text_and_numbers_are_written_as_toml(text, number):
 
 def test_unset_keys_are_comments_that_can_be_filled_in(tmp_path):
     """The comment stands in its section, above the tables inside the section."""
-    text = write_scenario(Scenario()).replace("# lai_file = ", "lai_file = 'lai.tif'")
+    text = write_scenario(Scenario(base="paper")).replace("# lai_file = ", "lai_file = 'lai.tif'")
     assert load_values(write_toml(tmp_path, text))["ground"]["lai_file"] == str(tmp_path.resolve() / "lai.tif")
 
 
