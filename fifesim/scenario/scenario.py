@@ -81,13 +81,12 @@ def statement(scenario):
         clauses.append(f"{_listed(given)} {_are(given)} from {'files' if len(given) > 1 else 'a file'}")
     if scenario.terrain.dem == "flat":
         clauses.append("the ground is level")
-    if scenario.learned:
-        clauses.append(f"leaf area varies as learned from {_learned_from(scenario)}")
     of_fife = () if given else _of_fife(scenario)
     if of_fife:
         clauses.append(f"only {_listed(of_fife)} {_are(of_fife)} FIFE's")
     text = ": ".join(filter(None, [_landscape(synthetic, given), "; ".join(clauses)]))
-    return f"{text[0].upper()}{text[1:]}. {_overpass(scenario)}".rstrip()
+    learned = f" Leaf area was learned from {_learned_from(scenario)}." if scenario.learned else ""
+    return f"{text[0].upper()}{text[1:]}.{learned} {_overpass(scenario)}".rstrip()
 
 
 def summary(scenario):

@@ -210,7 +210,7 @@ def test_ground_leaf_and_spectra_are_passed_unless_every_class_sets_them(key):
     ids=str,
 )
 def test_green_fpar_is_output_only_where_some_leaves_are_dead(sections, dead):
-    case = parse_scenario(SMALL | sections)
+    case = parse_scenario(SMALL | sections | {"ground": STAND | sections.get("ground", {})})
     land = ground_scene(case, case.geobox(), 50)
     land = land if isinstance(land, xr.Dataset) else land.to_dataset(name="lai")
     truth = truth_of(case, setup_of(case), land)

@@ -323,9 +323,20 @@ def test_landscape_has_labels_and_georeferencing(site, patched):
     assert [each.name for each in classes_of(patched.cover)] == list(THREE_CLASSES)
 
 
-def test_default_landscape_has_three_treatments_in_pastures():
+def test_default_landscape_is_learned_and_follows_the_hills(site):
+    found, konza = fifesim.landscape(site, seed=7), fifesim.ground.Landscape.read("konza")
+    hills = fifesim.flint_hills(konza.around(site), seed=7)
+    np.testing.assert_array_equal(found.lai, konza.simulate(site, hills, seed=7).lai)
+    assert found.attrs["site"] == "FIFE"
+    level = fifesim.landscape(site, learned=konza, dem=hills * 0 + 400.0, seed=7)
+    assert float(abs(level.lai - found.lai).mean()) > 0.1
+    with pytest.raises(ValueError, match="learned and arp are given"):
+        fifesim.landscape(site, learned="konza", arp=0.2)
+
+
+def test_pastures_hold_three_treatments():
     grid = fifesim.fife_site(30)
-    patched = fifesim.landscape(grid, seed=1)
+    patched = fifesim.landscape(grid, cover="pastures", seed=1)
     assert patched.attrs["site"] == patched.lai.attrs["site"] == "FIFE"
     assert np.unique(patched.cover).tolist() == [1, 2, 3]
     means = [float(patched.lai.where(patched.cover == code).mean()) for code in (1, 2, 3)]
