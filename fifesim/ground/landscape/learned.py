@@ -15,19 +15,44 @@ FINE = 40.0
 
 _TAPS = 4  # of a cubic spline
 
+_BINS = 2048  # of a table, for the search of nodes
+
 
 def terrain_response(landscape, forms):
     """Mean score and logarithm of the standard deviation of the residual by the forms of the land, 0 where unknown."""
-    mean, spread = (np.zeros(forms["elevation"].shape) for _ in range(2))
+    both = np.zeros((2, *forms["elevation"].shape))
     for each in landscape.terrain:
-        form = forms[each.form]
-        mean += np.interp(form, each.nodes, each.mean)
-        spread += np.interp(form, each.nodes, each.spread)
+        _add_table(forms[each.form], each.nodes, (each.mean, each.spread), both)
+    mean, spread = both
     beds = landscape.beds
     if beds is not None:
         mean += _between(forms["elevation"], beds.elevation, forms["slope_40"], beds.slope, np.array(beds.mean))
-    known = np.isfinite(forms["elevation"])
-    return np.where(known, mean, 0.0), np.where(known, spread, 0.0)
+    both[:, ~np.isfinite(forms["elevation"])] = 0.0
+    return mean, spread
+
+
+def _add_table(x, nodes, columns, out):
+    """Add columns of a table that is linear between nodes and constant beyond them, shape (columns, ...)."""
+    nodes, columns = np.array(nodes), np.array(columns)
+    scale = _BINS / (nodes[-1] - nodes[0])
+    # The last node at or below the lower edge of each bin, from which the search begins.
+    first = np.searchsorted(nodes, nodes[0] + np.arange(_BINS + 1) / scale * (1 - 1e-12), side="right") - 1
+    first = np.clip(first, 0, nodes.size - 2)
+    _look_up(np.ravel(x), nodes, 1 / np.diff(nodes), scale, first, columns, out.reshape(len(columns), -1))
+
+
+@compiled
+def _look_up(x, nodes, inverse, scale, first, columns, out):
+    """Add values between nodes; NaN stays."""
+    low, high, last = nodes[0], nodes[-1], nodes.size - 2
+    for n in range(x.size):
+        value = min(max(x[n], low), high)
+        k = first[int((value - low) * scale)] if value == value else 0
+        while k < last and value >= nodes[k + 1]:
+            k += 1
+        t = min((value - nodes[k]) * inverse[k], 1.0)
+        for m in range(columns.shape[0]):
+            out[m, n] += (1 - t) * columns[m, k] + t * columns[m, k + 1]
 
 
 def _between(one, rows, other, columns, table):
@@ -66,38 +91,43 @@ def scores(landscape, northing, easting, seed, elevation=None, mean=0.0, spread=
         NaN where elevation is. [1]
     """
     gusts = landscape.level_gusts if elevation is None else landscape.gusts
-    drawn = {
-        name: deviation * spline_noise(field_seed(seed, f"gust {name}"), GUST_LENGTHS[name], northing, easting)
-        for name, deviation in gusts.items()
-        if deviation
-    }
-    broad = spread + sum(drawn.get(name, 0.0) for name in ("broad", "medium"))
+    shape = northing.size, easting.size
+    broad, fine, coarse = np.full(shape, spread), np.zeros(shape), np.zeros(shape)
+    benches = None
+
+    def blow(name):
+        if gusts[name]:
+            spline_noise(field_seed(seed, f"gust {name}"), GUST_LENGTHS[name], northing, easting, gusts[name], broad)
+
+    for k, field in enumerate(landscape.level if elevation is None else landscape.residual):
+        stream = field_seed(seed, f"residual {k}")
+        deviation = np.sqrt(field.variance * variance_kept(field.spacing, cell))
+        if field.height:
+            benches = np.zeros(shape) if benches is None else benches
+            bench_noise(stream, field.spacing, field.height, northing, easting, elevation, deviation, benches)
+        else:
+            spline_noise(stream, field.spacing, northing, easting, deviation, fine if field.spacing <= FINE else coarse)
+    blow("broad")
+    blow("medium")
     # The mean of exp(2 g) for a normal g of variance s**2 is exp(2 s**2): the variance of the residual stays the same.
     scale = (0.0 if elevation is None else landscape.log_scale) + gusts["broad"] ** 2 + gusts["medium"] ** 2
-    fine, coarse, benches = (0.0 for _ in range(3))
-    for k, field in enumerate(landscape.level if elevation is None else landscape.residual):
-        name, deviation = (
-            field_seed(seed, f"residual {k}"),
-            np.sqrt(field.variance * variance_kept(field.spacing, cell)),
-        )
-        if field.height:
-            benches = benches + deviation * bench_noise(name, field.spacing, field.height, northing, easting, elevation)
-        elif field.spacing <= FINE:
-            fine = fine + deviation * spline_noise(name, field.spacing, northing, easting)
-        else:
-            coarse = coarse + deviation * spline_noise(name, field.spacing, northing, easting)
-    total = mean + coarse * np.exp(broad - scale)
-    broad = broad + drawn.get("fine", 0.0)
+    coarse *= np.exp(broad - scale)
+    blow("fine")
     scale += gusts["fine"] ** 2
-    total = total + fine * np.exp(broad - scale)
-    if np.ndim(benches):
-        total = total + benches * np.exp(broad + drawn.get("benches", 0.0) - scale - gusts["benches"] ** 2)
-    return np.where(np.isnan(elevation), np.nan, total) if elevation is not None else total
+    fine *= np.exp(broad - scale)
+    total = coarse + fine + mean
+    if benches is not None:
+        blow("benches")
+        benches *= np.exp(broad - (scale + gusts["benches"] ** 2))
+        total += benches
+    return total if elevation is None else np.where(np.isnan(elevation), np.nan, total)
 
 
 def leaf_area(landscape, scores):
     """Leaf area of scores, constant beyond the nodes; NaN stays. [m2 m-2]"""
-    return np.interp(scores, landscape.scores, landscape.lai)
+    out = np.zeros(np.shape(scores))
+    _add_table(scores, landscape.scores, (landscape.lai,), out)
+    return out
 
 
 def variance_kept(spacing, cell):
@@ -111,40 +141,56 @@ def variance_kept(spacing, cell):
     return along**2
 
 
-def spline_noise(seed, spacing, northing, easting):
-    """Standard normal field by place: a uniform cubic B-spline with random coefficients on a lattice."""
+def spline_noise(seed, spacing, northing, easting, deviation=1.0, out=None):
+    """Normal field by place, added to ``out``: a uniform cubic B-spline with random coefficients on a lattice."""
     (i, down), (j, across) = (_weights(place, spacing) for place in (-northing, easting))
     lattice = white_noise(seed, i[0], j[0], (i[-1] - i[0] + _TAPS, j[-1] - j[0] + _TAPS))
-    out = np.empty((i.size, j.size))
-    _expand(lattice, i - i[0], down, j - j[0], across, np.empty(lattice.shape[1]), out)
+    out = np.zeros((i.size, j.size)) if out is None else out
+    _expand(lattice, i - i[0], deviation * down, j - j[0], across, np.empty(lattice.shape[1]), out)
     return out
 
 
-def bench_noise(seed, spacing, height, northing, easting, elevation):
-    """Standard normal field by place and elevation, so that it follows contours; NaN where elevation is."""
+def bench_noise(seed, spacing, height, northing, easting, elevation, deviation=1.0, out=None):
+    """Normal field by place and elevation, added to ``out``, so that it follows contours; NaN where elevation is."""
     (i, down), (j, across) = (_weights(place, spacing) for place in (-northing, easting))
+    out = np.zeros((i.size, j.size)) if out is None else out
+    out[np.isnan(elevation)] = np.nan
     lowest, highest = np.nanmin(elevation, initial=np.inf), np.nanmax(elevation, initial=-np.inf)
-    out = np.full((i.size, j.size), np.nan)
     if not lowest <= highest:
         return out
     first, last = int(np.floor(lowest / height)), int(np.floor(highest / height))
     shape = (i[-1] - i[0] + _TAPS, j[-1] - j[0] + _TAPS)
-    beds = np.stack([white_noise((seed + bed) % 2**63, i[0], j[0], shape) for bed in range(first, last + _TAPS)])
-    _expand_beds(beds, first, height, elevation, i - i[0], down, j - j[0], across, np.empty(beds.shape[::2]), out)
+    noise = [white_noise((seed + bed) % 2**63, i[0], j[0], shape) for bed in range(first, last + _TAPS)]
+    beds = np.stack(noise, axis=-1)
+    lines = np.empty(beds.shape[1:])
+    _expand_beds(beds, first, height, elevation, i - i[0], deviation * down, j - j[0], across, lines, out)
     return out
 
 
 def _weights(place, spacing):
     """First lattice row of each place and weights of the four, scaled to variance 1; places ascend."""
-    first = np.floor(place / spacing)
-    t = place / spacing - first
-    weights = np.stack([_cubic(t, tap) for tap in range(_TAPS)], axis=1)
-    return first.astype(np.int64), weights / np.sqrt(np.sum(weights**2, axis=1, keepdims=True))
+    first, weights = np.empty(place.size, np.int64), np.empty((place.size, _TAPS))
+    _fill_weights(place, spacing, first, weights)
+    return first, weights
+
+
+@compiled
+def _fill_weights(place, spacing, first, weights):
+    """Fill in the first lattice rows and the weights."""
+    for n in range(place.size):
+        lattice = np.floor(place[n] / spacing)
+        first[n] = int(lattice)
+        square = 0.0
+        for tap in range(_TAPS):
+            weights[n, tap] = _cubic(place[n] / spacing - lattice, tap)
+            square += weights[n, tap] ** 2
+        for tap in range(_TAPS):
+            weights[n, tap] /= np.sqrt(square)
 
 
 @compiled
 def _expand(lattice, rows, down, columns, across, line, out):
-    """Interpolate a lattice to cells; ``line`` is memory."""
+    """Add the interpolation of a lattice to cells; ``line`` is memory."""
     for a in range(rows.size):
         for k in range(line.size):
             line[k] = 0.0
@@ -152,7 +198,7 @@ def _expand(lattice, rows, down, columns, across, line, out):
                 line[k] += down[a, p] * lattice[rows[a] + p, k]
         for b in range(columns.size):
             c = columns[b]
-            out[a, b] = (
+            out[a, b] += (
                 across[b, 0] * line[c]
                 + across[b, 1] * line[c + 1]
                 + across[b, 2] * line[c + 2]
@@ -174,25 +220,39 @@ def _cubic(t, tap):
 
 @compiled
 def _expand_beds(beds, first, height, elevation, rows, down, columns, across, lines, out):
-    """Interpolate lattices of successive beds to cells by place and elevation; ``lines`` is memory."""
+    """Add the interpolation of lattices of successive beds by place and elevation; ``lines`` is memory."""
     for a in range(rows.size):
-        for bed in range(beds.shape[0]):
-            for k in range(beds.shape[2]):
-                lines[bed, k] = 0.0
-                for p in range(_TAPS):
-                    lines[bed, k] += down[a, p] * beds[bed, rows[a] + p, k]
+        lowest, highest = np.inf, -np.inf
+        for b in range(columns.size):
+            if not np.isnan(elevation[a, b]):
+                lowest, highest = min(lowest, elevation[a, b]), max(highest, elevation[a, b])
+        if not lowest <= highest:
+            continue
+        start, stop = int(np.floor(lowest / height)) - first, int(np.floor(highest / height)) - first + _TAPS
+        near, into = beds[rows[a] : rows[a] + _TAPS, :, start:stop], lines[:, start:stop]
+        for k in range(into.shape[0]):
+            for bed in range(into.shape[1]):
+                into[k, bed] = (
+                    down[a, 0] * near[0, k, bed]
+                    + down[a, 1] * near[1, k, bed]
+                    + down[a, 2] * near[2, k, bed]
+                    + down[a, 3] * near[3, k, bed]
+                )
         for b in range(columns.size):
             if np.isnan(elevation[a, b]):
                 continue
             place = elevation[a, b] / height
-            bed = int(np.floor(place))
-            t = place - bed
+            bed = int(np.floor(place)) - first
+            t = place - np.floor(place)
+            around = lines[columns[b] : columns[b] + _TAPS, bed : bed + _TAPS]
             total, square = 0.0, 0.0
             for q in range(_TAPS):
                 weight = _cubic(t, q)
-                along = 0.0
-                for p in range(_TAPS):
-                    along += across[b, p] * lines[bed - first + q, columns[b] + p]
-                total += weight * along
+                total += weight * (
+                    across[b, 0] * around[0, q]
+                    + across[b, 1] * around[1, q]
+                    + across[b, 2] * around[2, q]
+                    + across[b, 3] * around[3, q]
+                )
                 square += weight**2
-            out[a, b] = total / np.sqrt(square)
+            out[a, b] += total / np.sqrt(square)

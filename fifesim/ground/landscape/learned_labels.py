@@ -26,13 +26,16 @@ from fifesim.grids.sites import made_on_site
 from fifesim.ground.landscape import learning
 from fifesim.ground.landscape.description import Described
 from fifesim.ground.landscape.learned import leaf_area, scores, terrain_response
-from fifesim.ground.terrain.forms import REACH, land_forms
+from fifesim.ground.terrain.forms import COARSE, between_squares, land_forms, reach, square_sums
 
 # Maximum size of a file. [byte]
 _LARGEST = 2**20
 
 # Edge of the blocks of a landscape in memory. [cell]
-_BLOCK = 1008
+_BLOCK = 2016
+
+# Rows of cells that are made at once, so that their fields stay in the cache of a processor.
+_STRIP = 63
 
 
 class Landscape(Described, frozen=True):
@@ -280,7 +283,11 @@ class _Cells(NamedTuple):
     @property
     def margin(self):
         """Nodes around a node on which its forms depend."""
-        return int(np.ceil(REACH / (self.ratio * self.cell))) + 2
+        return reach(self.ratio * self.cell)
+
+    def begin(self, at):
+        """First cell on the lattice of the window that a cell reads, which begins with a whole square of the forms."""
+        return (at // self.ratio // COARSE * COARSE - self.margin) * self.ratio
 
 
 def _level(cells, row, column, shape):
@@ -300,43 +307,35 @@ def _window_reads(cells, dem, grid):
         )
     bounds = []
     for start, shift, size in zip(cells.first, offset, grid.shape, strict=True):
-        node = (start + np.arange(size)) // cells.ratio
-        begin = (node - cells.margin) * cells.ratio - start + shift
-        bounds.append((begin, begin + (2 * cells.margin + 1) * cells.ratio))
+        at = start + np.arange(size)
+        end = (at // cells.ratio + 1 + cells.margin) * cells.ratio
+        bounds.append((cells.begin(at) - start + shift, end - start + shift))
     return Reads(dem.data, *bounds)
 
 
 def _on_terrain(cells, rows, columns, ground):
     """Leaf area of cells from a window of elevation around them."""
-    ratio, margin = cells.ratio, cells.margin
-    blocks = ground.reshape(ground.shape[0] // ratio, ratio, ground.shape[1] // ratio, ratio)
-    known = np.isfinite(blocks)
-    count = known.sum(axis=(1, 3))
-    total = np.where(known, blocks, 0.0).sum(axis=(1, 3))
+    ratio, size = cells.ratio, cells.ratio * cells.cell
+    total, count = square_sums(np.ascontiguousarray(ground, float), ratio)
     nodes = np.divide(total, count, out=np.full(count.shape, np.nan), where=count > 0)
     # Cells lie between nodes that are at most one outside of the margin.
-    outside = margin - 1
-    near = slice(outside, -outside), slice(outside, -outside)
-    forms = {name: each[near] for name, each in land_forms(nodes, ratio * cells.cell).items()}
-    inner, weights = [], []
-    for start, block in zip(cells.first, (rows, columns), strict=True):
-        at = start + np.arange(block.start, block.stop)
-        begin = (at[0] // ratio - margin) * ratio
-        inner.append(slice(at[0] - begin, at[-1] - begin + 1))
-        place = (at - begin + 0.5) / ratio - 0.5 - outside
-        low = np.floor(place).astype(int)
-        weights.append((low, place - low))
-    (i, u), (j, v) = weights
-    mean, spread = (_between(each, i, u[:, None], j, v) for each in terrain_response(cells.landscape, forms))
-    place = cells.northing[rows], cells.easting[columns]
-    found = scores(cells.landscape, *place, cells.seed, ground[tuple(inner)], mean, spread, cells.cell)
-    return leaf_area(cells.landscape, found)
-
-
-def _between(values, i, u, j, v):
-    """Bilinear interpolation between nodes."""
-    lines = (1 - u) * values[i] + u * values[i + 1]
-    return (1 - v) * lines[:, j] + v * lines[:, j + 1]
+    outside = cells.margin - 1
+    terrain = terrain_response(cells.landscape, land_forms(nodes, size, outside))
+    # Numbers of the cells from the first cell of the window.
+    down, across = (
+        start + np.arange(block.start, block.stop) - cells.begin(start + block.start)
+        for start, block in zip(cells.first, (rows, columns), strict=True)
+    )
+    out = np.empty((down.size, across.size))
+    for first in range(0, down.size, _STRIP):
+        strip = slice(first, first + _STRIP)
+        at = down[strip] - outside * ratio, across - outside * ratio
+        mean, spread = (between_squares(each, ratio, *at) for each in terrain)
+        place = cells.northing[rows][strip], cells.easting[columns]
+        own = ground[down[strip][0] : down[strip][-1] + 1, across[0] : across[-1] + 1]
+        found = scores(cells.landscape, *place, cells.seed, own, mean, spread, cells.cell)
+        out[strip] = leaf_area(cells.landscape, found)
+    return out
 
 
 def compare_landscapes(one: xr.DataArray, other: xr.DataArray, dem: xr.DataArray | None = None) -> pd.DataFrame:
