@@ -35,7 +35,7 @@ _LARGEST = 2**20
 _BLOCK = 2016
 
 # Rows of cells that are made at once, so that their fields stay in the cache of a processor.
-_STRIP = 63
+_STRIP = 252
 
 
 class Landscape(Described, frozen=True):

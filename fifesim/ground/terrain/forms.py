@@ -66,6 +66,12 @@ def land_forms(elevation, cell, margin=0):
     in the whole.
     """
     elevation = np.ascontiguousarray(elevation, float)
+    sums = square_sums(elevation, COARSE)
+    places = [np.arange(margin, size - margin) for size in elevation.shape]
+    # Beyond, only the larger scales matter.
+    beyond = max(margin - int(np.ceil((RADII[-1] + _TRUNCATE * _FINE_SCALES[-1]) / cell)), 0)
+    elevation = elevation[tuple(slice(beyond, size - beyond) for size in elevation.shape)]
+    margin -= beyond
     known = np.isfinite(elevation)
     height, share = np.where(known, elevation, 0.0), known.astype(float)
     # Slopes and convergence are differences of neighbours.
@@ -73,10 +79,8 @@ def land_forms(elevation, cell, margin=0):
     around = tuple(slice(margin - beside, size - margin + beside) for size in known.shape)
     inner = tuple(slice(margin, size - margin) for size in known.shape)
     smooth = {scale: _smoothed(height, share, scale / cell) for scale in _FINE_SCALES}
-    sums = square_sums(elevation, COARSE)
     # Variances of a square of cells, and of the triangle of the interpolation.
     blur = (COARSE**2 - 1) / (12 * COARSE**2) + 1 / 6
-    places = [np.arange(part.start, part.stop) for part in inner]
     elevation = elevation[inner]
     forms = {"elevation": elevation}
     for scale in SCALES[1:]:
