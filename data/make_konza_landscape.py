@@ -25,6 +25,12 @@ SOURCE = (
     "and elevation of USGS 3DEP"
 )
 NOISE = 0.004
+NOTE = "Plausible, not measured: moments of the default landscape in fife.toml; forms and spacings are assumed."
+PROPERTIES = {
+    "soil": {"mean": 0.0, "sd": 0.03, "leaf_area": -0.3, "forms": {"slope_40": 0.3}, "spacings": [30.0], "note": NOTE},
+    "brown": {"mean": 0.15, "sd": 0.06, "forms": {"above_400": 0.2}, "spacings": [30.0], "note": NOTE},
+    "moisture": {"mean": 0.25, "sd": 0.08, "forms": {"above_400": -0.5}, "spacings": [120.0], "note": NOTE},
+}
 
 
 def learned(ndvi_file, dem_file):
@@ -36,7 +42,9 @@ def learned(ndvi_file, dem_file):
     ndvi = ndvi.odc.reproject(grid, resampling="nearest", dst_nodata=np.nan).rename("ndvi")
     geometry = fifesim.sun_position(TIME, 39.09, -96.57)
     dem = rioxarray.open_rasterio(dem_file, masked=True).squeeze("band", drop=True)
-    return fifesim.learn_landscape(ndvi, dem, instrument="MSI", geometry=geometry, noise=NOISE, source=SOURCE)
+    return fifesim.learn_landscape(
+        ndvi, dem, instrument="MSI", geometry=geometry, noise=NOISE, source=SOURCE, properties=PROPERTIES
+    )
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Literal
 
@@ -42,6 +43,7 @@ def learn_landscape(
     canopy: Canopy | None = None,
     noise: float = 0.0,
     source: str | None = None,
+    properties: Mapping[str, Mapping] | None = None,
 ) -> Landscape:
     """
     Learn a landscape from a map of leaf area or NDVI, and an elevation model.
@@ -66,6 +68,11 @@ def learn_landscape(
         Standard deviation of the noise of the map, in its unit.
     source : str, optional
         Source of the map and the elevation, for the description.
+    properties : dict of str to dict, optional
+        Soil brightness, dead fraction and moisture, which a map of leaf area does not teach, such as
+        ``{"moisture": {"mean": 0.25, "sd": 0.08, "leaf_area": 0.2, "forms": {"above_400": -0.5}, "spacings": [120],
+        "note": "assumed"}}``: correlation with the residual of leaf area, weights on normal scores of forms of the land
+        (`fifesim.ground.terrain.forms.FORMS`), and spacings [m] of own random fields.
 
     Returns
     -------
@@ -127,7 +134,7 @@ def learn_landscape(
     source = source or in_a_line(str(image.name or quantity))
     edge = grid.affine.f, grid.affine.c
     made = learning.learn(lai, values, ground, cell, edge, blur, noise, source)
-    return Landscape(**made.model_dump())
+    return Landscape(**made.model_dump() | {"properties": properties or {}})
 
 
 def _quantity(image, quantity):

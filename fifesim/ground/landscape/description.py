@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
-from fifesim.ground.landscape.learned import GUST_LENGTHS
+from fifesim.ground.landscape import classes
+from fifesim.ground.landscape.learned import GUST_LENGTHS, PROBABILITIES
 from fifesim.ground.terrain.forms import FORMS
 
 _Numbers = tuple[float, ...]
@@ -66,6 +67,36 @@ class Residual(_Part, frozen=True):
     height: Annotated[float, Field(ge=0)] = 0.0
 
 
+class Property(_Part, frozen=True):
+    """Property of the ground that varies with leaf area, forms of the land and fields of its own."""
+
+    mean: float
+    sd: float
+    leaf_area: Annotated[float, Field(ge=-1, le=1)] = 0.0
+    """Correlation of its score with the residual of leaf area. [1]"""
+    forms: dict[str, float] = {}
+    """Weights of normal scores of forms of the land, which count as independent. [1]"""
+    spacings: tuple[Annotated[float, Field(gt=0)], ...]
+    """Spacings of fields with equal variance, which have the rest of the variance. [m]"""
+    note: str
+    """Source of the numbers."""
+
+    @property
+    def field(self):
+        """Distribution of the property."""
+        return classes.Field(mean=self.mean, sd=self.sd)
+
+    def own(self, forms):
+        """Variance of the score that is left for the own fields."""
+        return 1 - self.leaf_area**2 - sum(weight**2 for weight in self.forms.values() if forms)
+
+    @model_validator(mode="after")
+    def _check(self):
+        if not (self.spacings and self.own(True) >= 0):
+            raise ValueError("a property needs spacings, and the squares of leaf_area and of forms sum to 1 at most")
+        return self
+
+
 class Described(_Part, frozen=True):
     """Numbers of a learned landscape."""
 
@@ -81,11 +112,18 @@ class Described(_Part, frozen=True):
     explained: float = 0.0
     scores: _Numbers
     lai: _Numbers
+    properties: dict[Literal["soil", "brown", "moisture"], Property] = {}
 
     @model_validator(mode="after")
     def _check(self):
         if not set(self.gusts) == set(self.level_gusts) == set(GUST_LENGTHS):
             raise ValueError(f"gusts and level_gusts have the keys {', '.join(GUST_LENGTHS)}")
+        known = {each.form for each in self.terrain if len(each.nodes) == len(PROBABILITIES)}
+        for name, each in self.properties.items():
+            if name in classes.SHARES:
+                each.field.distribution(name)
+            if unknown := set(each.forms) - known:
+                raise ValueError(f"{name} follows {', '.join(sorted(unknown))}, which the terrain lacks")
         _check_table(self.scores, self.lai)
         if not min(self.lai) >= 0:
             raise ValueError(f"leaf area must be 0 or more, got {min(self.lai):g}")

@@ -329,7 +329,7 @@ def drawn_fields(grid, drawn, covary, arps, *, dem=None, geometry=None, seed=0, 
         chunks=chunks,
         dem=dem,
         geometry=geometry,
-        values={name: _values(name, each) for name, each in drawn.items()},
+        values={name: values_of(name, each) for name, each in drawn.items()},
     )
     others = {name: each.arp for name, each in drawn.items()}
     if not covary:
@@ -341,10 +341,10 @@ def drawn_fields(grid, drawn, covary, arps, *, dem=None, geometry=None, seed=0, 
             for number, arp in enumerate(dict.fromkeys(arps))
         ]
     leaf_area = {arp: fields["lai"] for arp, fields in zip(dict.fromkeys(arps), made, strict=False) if covary}
-    return leaf_area, {name: _labelled(name, each, made[0][name]) for name, each in drawn.items()}
+    return leaf_area, {name: labelled(name, each, made[0][name]) for name, each in drawn.items()}
 
 
-def _values(name, given):
+def values_of(name, given):
     """Function that maps standard normal scores to a property in place."""
     if name in SHARES:
         return partial(_share, quantile_table(given.distribution(name)))
@@ -362,6 +362,7 @@ def _normal(mean, deviation, scores):
     return scores
 
 
-def _labelled(name, given, values):
+def labelled(name, given, values):
+    """Raster of a property that varies as a random field."""
     spread = "by quantiles" if name in SHARES else f"standard deviation {given.sd:g}"
     return cf.label(values, name, source=values, history=f"{name}: {spread}")

@@ -1,11 +1,15 @@
 """Leaf area of a learned landscape: its response to the terrain, and residual fields by place."""
 
 import numpy as np
+from scipy import special
 from scipy.interpolate import BSpline
 
 from fifesim.base.arrays import compiled, jitable
 from fifesim.ground.landscape.autoregression import white_noise
 from fifesim.ground.landscape.covariance import field_seed
+
+PROBABILITIES = (0.005, *np.linspace(0.03, 0.97, 8).tolist(), 0.995)
+"""Probabilities of the quantiles of a form of the land that are the nodes of its response."""
 
 GUST_LENGTHS = {"broad": 300.0, "medium": 100.0, "fine": 25.0, "benches": 200.0}
 """Spacing of the random fields that change the standard deviation of the residual from place to place. [m]"""
@@ -127,6 +131,30 @@ def leaf_area(landscape, scores):
     """Leaf area of scores, constant beyond the nodes; NaN stays. [m2 m-2]"""
     out = np.zeros(np.shape(scores))
     _add_table(scores, landscape.scores, (landscape.lai,), out)
+    return out
+
+
+def property_response(landscape, name, forms):
+    """Part of the score of a property that follows forms of the land."""
+    out = np.zeros((1, *forms["elevation"].shape))
+    for each in landscape.terrain:
+        if weight := landscape.properties[name].forms.get(each.form):
+            # The nodes are quantiles.
+            normal = weight * special.ndtri(PROBABILITIES)
+            _add_table(forms[each.form], each.nodes, (normal,), out)
+    return np.nan_to_num(out[0])
+
+
+def property_scores(landscape, name, northing, easting, seed, residual, response=None, cell=0.0):
+    """Scores of a property, standard normal for small cells, from the residual of leaf area; level without response."""
+    given = landscape.properties[name]
+    fields = landscape.level if response is None else landscape.residual
+    out = given.leaf_area / np.sqrt(sum(each.variance for each in fields)) * residual
+    out += 0.0 if response is None else response
+    for k, spacing in enumerate(given.spacings):
+        variance = given.own(response is not None) / len(given.spacings) * variance_kept(spacing, cell)
+        stream = field_seed(seed, f"property {name} {k}")
+        spline_noise(stream, spacing, northing, easting, np.sqrt(variance), out)
     return out
 
 

@@ -25,7 +25,8 @@ from fifesim.grids.chunks import Reads
 from fifesim.grids.sites import made_on_site
 from fifesim.ground.landscape import learning
 from fifesim.ground.landscape.description import Described
-from fifesim.ground.landscape.learned import leaf_area, scores, terrain_response
+from fifesim.ground.landscape.field_labels import labelled, values_of
+from fifesim.ground.landscape.learned import leaf_area, property_response, property_scores, scores, terrain_response
 from fifesim.ground.terrain.forms import COARSE, between_squares, land_forms, reach, square_sums
 
 # Maximum size of a file. [byte]
@@ -65,6 +66,9 @@ class Landscape(Described, frozen=True):
         Share of the variance of scores that the terrain explains in squares that were left out. [1]
     scores, lai : tuple of float
         Nodes of the function from scores to leaf area. [1], [m2 m-2]
+    properties : dict of str to Property
+        Soil brightness, dead fraction and moisture by the names of `fifesim.landscape`: a map of leaf area does not
+        teach them, so that they are declared.
 
     See Also
     --------
@@ -105,15 +109,15 @@ class Landscape(Described, frozen=True):
         Returns
         -------
         land : xarray.Dataset
-            ``lai`` over (y, x), NaN where the elevation is. If the elevation is in memory, the attribute
-            ``beyond_learned`` is the share of cells whose elevation or slope is outside of the learned range.
-            [m2 m-2]
+            ``lai`` [m2 m-2] and the properties of the description, such as ``soil`` and ``moisture`` [1], over (y, x),
+            NaN where the elevation is. If the elevation is in memory, the attribute ``beyond_learned`` of ``lai`` is
+            the share of cells whose elevation or slope is outside of the learned range.
 
         Raises
         ------
         ValueError
-            If the grid or the seed is invalid, its cells are not square, or the elevation is on another lattice or does
-            not cover the grid.
+            If the grid or the seed is invalid, its cells are not square, or the elevation is on another lattice, does
+            not cover the grid, or was missing when the landscape was learned.
 
         Warns
         -----
@@ -122,14 +126,17 @@ class Landscape(Described, frozen=True):
 
         Notes
         -----
-        Leaf area depends only on seed, position and the elevation within 1 km, so that a window equals a slice of the
-        whole, for any chunks. Nothing varies within half a cell of the map from which the landscape was learned. Fields
+        All variables depend only on seed, position and the elevation within 1 km, so that a window equals a slice of
+        the whole, for any chunks. Properties have a normal score that is a sum of the residual of leaf area, forms of
+        the land and own random fields; fractions have a beta distribution and the brightness of the soil a normal one. Nothing varies within half a cell of the map from which the landscape was learned. Fields
         that are finer than the cells are averaged before scores become leaf area.
         """
         grid, seed = grids.check_grid(grid), check_seed(seed)
         cell, across = grids.cell_size(grid)
         if abs(cell - across) > 1e-6 * cell:
             raise ValueError(f"the cells of the grid are {cell:g} x {across:g} m: give a grid of square cells")
+        if dem is not None and not self.residual:
+            raise ValueError("the landscape was learned without an elevation: simulate level ground, without dem=")
         if cell > 2 * self.cell:
             warn(
                 f"cells of {cell:g} m are larger than twice the {self.cell:g} m of the learned map, so that forms of "
@@ -138,20 +145,31 @@ class Landscape(Described, frozen=True):
         northing, easting = (grids.coordinates(grid)[axis].values for axis in ("y", "x"))
         cells = _Cells(self, seed, northing, easting, cell, grids.lattice_position(grid))
         attributes = {"rng_seed": str(seed), "learned_from": self.source, **made_on_site(grid)}
+        names = ["lai", *self.properties]
         history = f"landscape: learned from {in_a_line(self.source, 100)}, seed {seed}"
         if dem is None:
-            found = windows.tiles(partial(_level, cells), grid, chunks, tile=_BLOCK)
+            found = [windows.tiles(partial(_level, cells, name), grid, chunks, tile=_BLOCK) for name in names]
         else:
             if dem.chunks is None:
                 attributes["beyond_learned"] = self._share_beyond(dem, cell)
-            reads, kernel, shape = _window_reads(cells, dem, grid), partial(_on_terrain, cells), tuple(grid.shape)
+            reads, kernel, shape = (
+                _window_reads(cells, dem, grid),
+                partial(_on_terrain, cells),
+                (len(names), *grid.shape),
+            )
             if chunks is None and dem.chunks is None:
                 data = chunking.in_blocks(kernel, [reads], shape, _BLOCK)
             else:
                 sizes = windows.chunk_sizes(grid, "auto" if chunks is None else chunks, tile=_BLOCK)
                 data = chunking.windows(kernel, [reads], shape, sizes)
-            found = grids.place(xr.DataArray(data, dims=("y", "x")), grid)
-        return xr.Dataset({"lai": cf.label(found, "lai", history=history, method="learned", **attributes)})
+            layers = chunking.along_first(data)
+            found = [grids.place(xr.DataArray(each, dims=("y", "x")), grid) for each in layers]
+        if self.properties:
+            attributes["landscape"] = ", ".join(self.properties)
+        land = {"lai": cf.label(found[0], "lai", history=history, method="learned", **attributes)}
+        for (name, each), values in zip(self.properties.items(), found[1:], strict=True):
+            land[name] = labelled(name, each.field, values).assign_attrs(rng_seed=str(seed), comment=each.note)
+        return xr.Dataset(land, attrs=made_on_site(grid))
 
     def around(self, grid: GeoBox) -> GeoBox:
         """
@@ -290,10 +308,19 @@ class _Cells(NamedTuple):
         return (at // self.ratio // COARSE * COARSE - self.margin) * self.ratio
 
 
-def _level(cells, row, column, shape):
-    """Leaf area of level ground."""
+def _level(cells, name, row, column, shape):
+    """Leaf area or a property of level ground."""
     place = cells.northing[row : row + shape[0]], cells.easting[column : column + shape[1]]
-    return leaf_area(cells.landscape, scores(cells.landscape, *place, cells.seed, cell=cells.cell))
+    found = scores(cells.landscape, *place, cells.seed, cell=cells.cell)
+    if name == "lai":
+        return leaf_area(cells.landscape, found)
+    return _property(cells, name, place, found)
+
+
+def _property(cells, name, place, residual, response=None):
+    """Values of a property."""
+    found = property_scores(cells.landscape, name, *place, cells.seed, residual, response, cells.cell)
+    return values_of(name, cells.landscape.properties[name].field)(found)
 
 
 def _window_reads(cells, dem, grid):
@@ -314,19 +341,21 @@ def _window_reads(cells, dem, grid):
 
 
 def _on_terrain(cells, rows, columns, ground):
-    """Leaf area of cells from a window of elevation around them."""
+    """Leaf area and properties of cells from a window of elevation around them."""
     ratio, size = cells.ratio, cells.ratio * cells.cell
     total, count = square_sums(np.ascontiguousarray(ground, float), ratio)
     nodes = np.divide(total, count, out=np.full(count.shape, np.nan), where=count > 0)
     # Cells lie between nodes that are at most one outside of the margin.
     outside = cells.margin - 1
-    terrain = terrain_response(cells.landscape, land_forms(nodes, size, outside))
+    forms, names = land_forms(nodes, size, outside), list(cells.landscape.properties)
+    terrain = terrain_response(cells.landscape, forms)
+    responses = [property_response(cells.landscape, name, forms) for name in names]
     # Numbers of the cells from the first cell of the window.
     down, across = (
         start + np.arange(block.start, block.stop) - cells.begin(start + block.start)
         for start, block in zip(cells.first, (rows, columns), strict=True)
     )
-    out = np.empty((down.size, across.size))
+    out = np.empty((1 + len(names), down.size, across.size))
     for first in range(0, down.size, _STRIP):
         strip = slice(first, first + _STRIP)
         at = down[strip] - outside * ratio, across - outside * ratio
@@ -334,7 +363,9 @@ def _on_terrain(cells, rows, columns, ground):
         place = cells.northing[rows][strip], cells.easting[columns]
         own = ground[down[strip][0] : down[strip][-1] + 1, across[0] : across[-1] + 1]
         found = scores(cells.landscape, *place, cells.seed, own, mean, spread, cells.cell)
-        out[strip] = leaf_area(cells.landscape, found)
+        out[0, strip] = leaf_area(cells.landscape, found)
+        for k, (name, each) in enumerate(zip(names, responses, strict=True), start=1):
+            out[k, strip] = _property(cells, name, place, found - mean, between_squares(each, ratio, *at))
     return out
 
 

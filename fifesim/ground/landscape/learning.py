@@ -6,7 +6,7 @@ import numpy as np
 from scipy import fft, ndimage, optimize, special, stats
 
 from fifesim.ground.landscape.description import Beds, Described, Residual, TerrainResponse
-from fifesim.ground.landscape.learned import GUST_LENGTHS, scores, terrain_response
+from fifesim.ground.landscape.learned import GUST_LENGTHS, PROBABILITIES, scores, terrain_response
 from fifesim.ground.terrain.forms import FORMS, land_forms
 
 # Spacings of the isotropic fields. [cell of the map]
@@ -38,7 +38,7 @@ _FINER = 3
 # Penalties of the responses of the mean and of the logarithm of the variance, in cells of one node.
 _RIDGE, _SPREAD_RIDGE = 100.0, 300.0
 
-_NODES, _BED_HEIGHT = 8, 1.5  # number; m
+_BED_HEIGHT = 1.5  # m
 _PROBABILITIES = np.r_[0.0, 0.002, 0.005, np.linspace(0.01, 0.99, 99), 0.995, 0.998, 1.0]
 _STEPS = 6
 
@@ -211,7 +211,7 @@ def _columns(forms, known):
     nodes, parts = {}, []
     for name in FORMS:
         values = forms[name][known]
-        nodes[name] = np.unique(np.quantile(values, np.r_[0.005, np.linspace(0.03, 0.97, _NODES), 0.995]))
+        nodes[name] = np.unique(np.quantile(values, PROBABILITIES))
         nodes[name] = nodes[name] if nodes[name].size > 1 else nodes[name][0] + np.array([0.0, 1.0])
         parts.append(_hats(values, nodes[name]))
     height, slope = forms["elevation"][known], forms["slope_40"][known]

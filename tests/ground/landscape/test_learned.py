@@ -29,19 +29,23 @@ def hills():
 @pytest.mark.parametrize("level", [True, False])
 def test_windows_and_chunks_have_the_bits_of_the_whole(hills, level):
     dem = None if level else hills
-    whole = KONZA.simulate(GRID, dem, seed=7)["lai"]
-    part = KONZA.simulate(GRID[13:44, 21:80], dem, seed=7)["lai"]
-    np.testing.assert_array_equal(part.values, whole.values[13:44, 21:80])
-    lazy = KONZA.simulate(GRID, dem, seed=7, chunks={"y": 17, "x": 31})["lai"]
-    assert lazy.chunks
-    np.testing.assert_array_equal(lazy.values, whole.values)
-    assert not np.array_equal(whole.values, KONZA.simulate(GRID, dem, seed=8)["lai"].values)
+    whole = KONZA.simulate(GRID, dem, seed=7)
+    assert list(whole) == ["lai", "soil", "brown", "moisture"]
+    part = KONZA.simulate(GRID[13:44, 21:80], dem, seed=7)
+    lazy = KONZA.simulate(GRID, dem, seed=7, chunks={"y": 17, "x": 31})
+    other = KONZA.simulate(GRID, dem, seed=8)
+    for name, values in whole.items():
+        np.testing.assert_array_equal(part[name].values, values.values[13:44, 21:80])
+        assert lazy[name].chunks
+        np.testing.assert_array_equal(lazy[name].values, values.values)
+        assert not np.array_equal(values.values, other[name].values)
 
 
-def test_finer_cells_read_the_same_forms(hills):
-    # At 5 m, two cells lie between the nodes of the forms, which the blocks must not shift.
-    fine = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 300.0, 300.0, 5.0)
-    dem = fifesim.flint_hills(fifesim.grid_at("EPSG:32614", 706500.0, 4333000.0, 2600.0, 2600.0, 5.0), seed=3)
+@pytest.mark.parametrize("cell", [5.0, 3.0])
+def test_finer_cells_read_the_same_forms(cell):
+    # At 5 and 3 m, two and three cells lie between the nodes of the forms, which the blocks must not shift.
+    wide = fifesim.grid_at("EPSG:32614", 706500.0, 4333000.0, 520 * cell, 520 * cell, cell)
+    fine, dem = wide[220:280, 220:280], fifesim.flint_hills(wide, seed=3)
     whole = KONZA.simulate(fine, dem, seed=7)["lai"].values
     np.testing.assert_array_equal(KONZA.simulate(fine[7:33, 5:41], dem, seed=7)["lai"].values, whole[7:33, 5:41])
 
@@ -117,23 +121,48 @@ def test_forms_depend_on_elevation_within_reach_only():
 @pytest.fixture(scope="module")
 def large():
     grid = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 3000.0, 3000.0, 10.0)
-    return [KONZA.simulate(grid, seed=seed)["lai"] for seed in range(3)]
+    return [KONZA.simulate(grid, seed=seed) for seed in range(3)]
 
 
 def test_level_konza_has_the_variogram_of_the_real_map(large):
     # The blur of the map, which the landscape does not have, no longer matters at 60 m.
-    found = [fifesim.ground.compare_landscapes(each, each)["one"] for each in large]
+    found = [fifesim.ground.compare_landscapes(each["lai"], each["lai"])["one"] for each in large]
     for lag, real in REAL_VARIOGRAM.items():
         got = np.mean([each[f"variogram_{lag}_m"] for each in found])
         # Three standard deviations of the mean of three realisations; one has up to 0.04.
         assert got == pytest.approx(real, abs=0.07), lag
 
 
+def test_properties_have_their_moments_and_correlations(large, hills):
+    level = {name: [each[name].values for each in large] for name in large[0]}
+    for name, given in KONZA.properties.items():
+        # Three standard errors of the slowest field: 120 m have 156 independent squares in each of three realisations.
+        assert np.mean(level[name]) == pytest.approx(given.mean, abs=0.14 * given.sd), name
+        assert np.std(level[name]) == pytest.approx(given.sd, rel=0.1), name
+        known = np.full(level["lai"][0].shape, True)
+        scores = [learning.rank_scores(each, known) for each in level["lai"]]
+        found = np.corrcoef(np.ravel(scores), np.ravel(level[name]))[0, 1]
+        # 0.04 is the largest difference of one realisation.
+        assert found == pytest.approx(given.leaf_area, abs=0.05), name
+    land, forms = KONZA.simulate(grids.geobox(hills), hills, seed=1), land_forms(hills.values, 10.0)
+    for name, form in (("soil", "slope_40"), ("brown", "above_400"), ("moisture", "above_400")):
+        low, high = (forms[form] < np.quantile(forms[form], 0.2), forms[form] > np.quantile(forms[form], 0.8))
+        # The fifths of a normal score differ by 2.8 standard deviations. The hills are not the learned ground, and have
+        # a few dozen valleys.
+        wanted = 2.8 * KONZA.properties[name].forms[form] * KONZA.properties[name].sd
+        values = land[name].values
+        assert values[high].mean() - values[low].mean() == pytest.approx(wanted, rel=0.4), name
+    assert land["moisture"].attrs["units"] == "1"
+    assert "not measured" in land["moisture"].attrs["comment"]
+
+
 def test_learning_recovers_a_landscape(large):
-    learned = fifesim.learn_landscape(large[0])
-    grid = grids.geobox(large[0])
+    lai = large[0]["lai"]
+    learned = fifesim.learn_landscape(lai)
+    assert not learned.properties
+    grid = grids.geobox(lai)
     again = [learned.simulate(grid, seed=seed)["lai"] for seed in (11, 12)]
-    rows = [fifesim.ground.compare_landscapes(large[0], each) for each in again]
+    rows = [fifesim.ground.compare_landscapes(lai, each) for each in again]
     # Realisations of one landscape differ by up to 0.06 and 0.16. The spectrum of the learned one is wrong by 0.2,
     # because the smallest fields are fitted on cells as large as they are.
     assert np.mean([row.loc["variogram", "other"] for row in rows]) < 0.1
@@ -172,6 +201,9 @@ def test_files(tmp_path):
         ('"form": "elevation"', '"form": "height"', "the form 'height' is unknown"),
         ('"fine"', '"finest"', "gusts and level_gusts have the keys"),
         (f"{KONZA.scores[1]}", "-99.0", "ascending numbers"),
+        ('"above_400": 0.2', '"above_500": 0.2', "brown follows above_500, which the terrain lacks"),
+        ('"above_400": -0.5', '"above_400": -1.5', "sum to 1 at most"),
+        ('"sd": 0.08', '"sd": 0.8', "its sd must be above 0 and below"),
         (f'"scores": [\n  {KONZA.scores[0]},', '"scores": [', "needs a value"),
     ):
         KONZA.save(path)
@@ -232,6 +264,12 @@ def test_terrain_beyond_the_learned_range_warns(hills):
     with pytest.warns(UserWarning, match="of the cells are higher, lower or steeper"):
         land = KONZA.simulate(GRID, hills + 500.0)
     assert land["lai"].attrs["beyond_learned"] == 1.0
+
+
+def test_elevation_of_a_landscape_that_was_learned_without_one(hills):
+    flat = KONZA.model_copy(update={"terrain": (), "beds": None, "residual": (), "properties": {}})
+    with pytest.raises(ValueError, match="learned without an elevation"):
+        flat.simulate(GRID, hills)
 
 
 def test_lazy_elevation_is_not_computed(hills):
