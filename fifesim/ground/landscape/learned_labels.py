@@ -32,8 +32,8 @@ from fifesim.ground.terrain.forms import COARSE, between_squares, land_forms, re
 # Maximum size of a file. [byte]
 _LARGEST = 2**20
 
-# Edge of the blocks of a landscape in memory. [cell]
-_BLOCK = 2016
+# Edges of the blocks of a landscape in memory, and of the chunks of a lazy one. [cell]
+_BLOCK, _CHUNK = 2016, 1008
 
 # Rows of cells that are made at once, so that their fields stay in the cache of a processor.
 _STRIP = 252
@@ -128,8 +128,9 @@ class Landscape(Described, frozen=True):
         -----
         All variables depend only on seed, position and the elevation within 1 km, so that a window equals a slice of
         the whole, for any chunks. Properties have a normal score that is a sum of the residual of leaf area, forms of
-        the land and own random fields; fractions have a beta distribution and the brightness of the soil a normal one. Nothing varies within half a cell of the map from which the landscape was learned. Fields
-        that are finer than the cells are averaged before scores become leaf area.
+        the land and own random fields; fractions have a beta distribution and the brightness of the soil a normal one.
+        Nothing varies within half a cell of the map from which the landscape was learned. Fields that are finer than
+        the cells are averaged before scores become leaf area.
         """
         grid, seed = grids.check_grid(grid), check_seed(seed)
         cell, across = grids.cell_size(grid)
@@ -148,7 +149,7 @@ class Landscape(Described, frozen=True):
         names = ["lai", *self.properties]
         history = f"landscape: learned from {in_a_line(self.source, 100)}, seed {seed}"
         if dem is None:
-            found = [windows.tiles(partial(_level, cells, name), grid, chunks, tile=_BLOCK) for name in names]
+            found = [windows.tiles(partial(_level, cells, name), grid, chunks, tile=_CHUNK) for name in names]
         else:
             if dem.chunks is None:
                 attributes["beyond_learned"] = self._share_beyond(dem, cell)
@@ -160,7 +161,7 @@ class Landscape(Described, frozen=True):
             if chunks is None and dem.chunks is None:
                 data = chunking.in_blocks(kernel, [reads], shape, _BLOCK)
             else:
-                sizes = windows.chunk_sizes(grid, "auto" if chunks is None else chunks, tile=_BLOCK)
+                sizes = windows.chunk_sizes(grid, "auto" if chunks is None else chunks, tile=_CHUNK)
                 data = chunking.windows(kernel, [reads], shape, sizes)
             layers = chunking.along_first(data)
             found = [grids.place(xr.DataArray(each, dims=("y", "x")), grid) for each in layers]
