@@ -55,6 +55,24 @@ def whole_chains(title, calls, cells):
         print(f"| {said} | {spent / found['flat']:.2f} | {spent / cells * 1e9:.0f} |", flush=True)
 
 
+def learned(grid, seeds):
+    """Print the time of the landscape "konza" relative to one of four correlated fields on the same hills."""
+    dem, konza = fifesim.flint_hills(grid, seed=7), fifesim.ground.Landscape.read("konza")
+    bare = konza.model_copy(update={"properties": {}})
+    fields = {name: fifesim.ground.Field(each.mean, each.sd, 0.05) for name, each in konza.properties.items()}
+    four = "leaf area and three properties as random fields"
+    calls = {
+        four: lambda: fifesim.landscape(grid, seed=next(seeds), covary=COVARY, dem=dem, **fields),
+        "konza": lambda: konza.simulate(grid, dem, seed=next(seeds)),
+        "konza, leaf area alone": lambda: bare.simulate(grid, dem, seed=next(seeds)),
+        "konza, level ground": lambda: konza.simulate(grid, seed=next(seeds)),
+    }
+    found = in_turn(calls)
+    print("\n| landscape alone, on hills | landscapes of four fields | ns a cell |\n|---|---|---|")
+    for said, spent in found.items():
+        print(f"| {said} | {spent / found[four]:.2f} | {spent / np.prod(grid.shape) * 1e9:.0f} |", flush=True)
+
+
 def main():
     """Print a table of processor time a cell, and of ratios to the flat chain."""
     grid, seeds = grid_of(CELLS), count(50)
@@ -92,6 +110,7 @@ def main():
         spent = seconds(partial(fifesim.surface_reflectance, lai, "TM", bands=BANDS, canopy=canopy))
         print(f"| {name} | {spent / lai.size * 1e9:.0f} | {spent / whole:.2f} |", flush=True)
     whole_chains("whole chain, level ground", in_memory, lai.size)
+    learned(grid, seeds)
     grid = grid_of(LAZY_CELLS)
     with dask.config.set(scheduler="synchronous"):
         whole_chains("20 million cells, in chunks", chains(grid, seeds, [list(FIELDS)], lazy=True), LAZY_CELLS**2)
