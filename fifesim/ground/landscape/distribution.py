@@ -247,11 +247,16 @@ _RUN = 1024
 _FEW = 2**18
 
 
+def quantile_deviates():
+    """Standard normal deviates of the nodes of a `quantile_table`."""
+    return np.linspace(-_REACH, _REACH, QUANTILE_NODES)
+
+
 # Building a table takes some hundredths of a second. Distributions of treatments and fractions are cached objects.
 @cached(64, "quantile tables of distributions")
 def quantile_table(distribution):
     """Quantiles of a distribution at standard normal deviates from -8.5 to 8.5, shape (16385,), cached."""
-    deviates = np.linspace(-_REACH, _REACH, QUANTILE_NODES)
+    deviates = quantile_deviates()
     lower = distribution.ppf(stats.norm.cdf(deviates[deviates <= 0]))
     # The upper half goes by survival functions, which keep their digits in the tail.
     upper = distribution.isf(stats.norm.sf(deviates[deviates > 0]))

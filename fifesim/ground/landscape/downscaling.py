@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import fft, ndimage
+from scipy.interpolate import BSpline
 
 from fifesim.base.caches import cached
 from fifesim.ground.landscape.autoregression import field_variance, pair_correlations, periodic_field, response
@@ -28,6 +29,25 @@ from fifesim.ground.landscape.distribution import quantile_map, quantile_table
 
 # Offset of the squared frequency, so that the spectral density of the trend is finite at zero. [radian2 per pixel2]
 _SLOWEST = 1e-5
+
+
+class SplineFields(NamedTuple):
+    """Fields of the cells of a learned landscape: sums of cubic splines with random coefficients on lattices."""
+
+    spacings: tuple[float, ...]  # [cell]
+    shares: tuple[float, ...]  # of the variance [1]
+
+    def density(self, u, v):
+        """Spectral density at angular frequencies of rows and columns, shape (u, v), for a variance of one. [1]"""
+        # The autocorrelation of cubic splines is the spline of degree seven.
+        spline = BSpline.basis_element(np.arange(9.0) - 4, extrapolate=False)
+        total = np.zeros((u.size, v.size))
+        for spacing, share in zip(self.spacings, self.shares, strict=True):
+            lags = np.arange(1, int(np.ceil(4 * spacing)))
+            weights = 2.0 * spline(lags / spacing) / float(spline(0.0))
+            down, across = (1.0 + np.cos(each[:, None] * lags) @ weights for each in (u, v))
+            total += share * down[:, None] * across
+        return total
 
 
 def kriging_block_means(cells, ratio):
@@ -58,8 +78,8 @@ def kriging_filter(arp, trend, ratio, shape):
 
     Parameters
     ----------
-    arp : float
-        Autoregressive parameter of the cells. [1]
+    arp : float or SplineFields
+        Autoregressive parameter of the cells [1], or the fields that they have instead.
     trend : float
         Root of the trend's density at one radian a pixel, over the deviation of the process, :math:`\tau`: from
         `fifesim.ground.landscape.downscaling.map_trend`. Infinite where the trend alone is interpolated. [1]
@@ -96,7 +116,10 @@ def _densities(arp, ratio, u, v):
     """Spectral densities and response of `spectral_densities` at angular frequencies of rows and columns."""
     squared = 2.0 * (1.0 - np.cos(u[:, None])) * ratio[0] ** 2 + 2.0 * (1.0 - np.cos(v)) * ratio[1] ** 2
     trend = ratio[0] * ratio[1] / (squared + _SLOWEST) ** 2
-    process = response(arp, u[:, None], v) ** 2 / field_variance(arp)
+    if isinstance(arp, SplineFields):
+        process = arp.density(u, v)
+    else:
+        process = response(arp, u[:, None], v) ** 2 / field_variance(arp)
     return process, trend, _mean_response(u, ratio[0])[:, None] * _mean_response(v, ratio[1])
 
 
@@ -172,7 +195,7 @@ def map_trend(levels, known, deviation, arp, ratio):
         Where they are.
     deviation : float or array, shape (rows, columns)
         Standard deviation of the process, in units of levels.
-    arp : float
+    arp : float or SplineFields
         [1]
     ratio : (int, int)
         Cells in a pixel, down and across.
@@ -401,11 +424,17 @@ class Marginal:
     means: np.ndarray
     steep: np.ndarray
     bent: np.ndarray
+    cure: str
 
     @classmethod
     def of(cls, distribution, kept):
         """Marginal of a distribution, with the share of variance that means over pixels keep."""
-        table = quantile_table(distribution)
+        cure = "give a distribution= that reaches beyond all of the map, or cv= instead"
+        return cls.of_table(quantile_table(distribution), kept, cure)
+
+    @classmethod
+    def of_table(cls, table, kept, cure):
+        """Marginal of quantiles as from `quantile_table`, and the remedy for means outside of them."""
         levels = np.linspace(-_FURTHEST, _FURTHEST, 1025)
         nodes, weights = np.polynomial.hermite_e.hermegauss(48)
         weights = weights / np.sqrt(2.0 * np.pi)
@@ -414,7 +443,7 @@ class Marginal:
         lacking = np.sqrt(0.75 * (1.0 - kept))
         near = quantile_map(levels[:, None] + lacking * nodes, table)
         steep, bent = near @ (weights * nodes) / lacking, near @ (weights * (nodes**2 - 1.0)) / lacking**2
-        return cls(table, levels, np.maximum.accumulate(around @ weights), steep, bent)
+        return cls(table, levels, np.maximum.accumulate(around @ weights), steep, bent, cure)
 
     def cells(self, field):
         """Leaf area of a field. [m2 m-2]"""
@@ -435,8 +464,7 @@ class Marginal:
         if wrong.size:
             raise ValueError(
                 f"the map has a pixel of mean LAI {wrong[0]:.4g}, which cells of a distribution from "
-                f"{round(lowest, 9):.4g} to {highest:.4g} cannot have: give a distribution= that reaches beyond all of "
-                "the map, or cv= instead"
+                f"{round(lowest, 9):.4g} to {highest:.4g} cannot have: {self.cure}"
             )
 
 
@@ -491,6 +519,28 @@ def _met(field, wanted, means, vegetated, transform):
             part += (wanted[off] - transform.level(transform.cells(part).mean(axis=1)))[:, None].astype(np.float32)
         lai.reshape(apart)[off[0], :, off[1]] = transform.cells(part).reshape(-1, *ratio)
     return lai
+
+
+def filled_field(pixels, field):
+    """Pixels, NaN where no cell of the field is known, and the field, the mean of its pixel where it is unknown."""
+    ratio = tuple(cells // size for cells, size in zip(field.shape, pixels.shape, strict=True))
+    known = np.isfinite(field)
+    share = kriging_block_means(known, ratio)
+    if not share.any():
+        return np.full_like(pixels, np.nan), np.zeros_like(field)
+    means = kriging_block_means(np.where(known, field, 0.0), ratio) / np.where(share > 0, share, 1.0)
+    return np.where(share > 0, pixels, np.nan), np.where(known, field, by_pixel(means[_nearest(share > 0)], ratio))
+
+
+def without_cells(cells, pixels, unknown):
+    """Cells that keep the means of their pixels without the unknown ones, which become NaN."""
+    if not unknown.any():
+        return cells
+    ratio = tuple(size // count for size, count in zip(cells.shape, pixels.shape, strict=True))
+    means = kriging_block_means(np.where(unknown, 0.0, cells), ratio)
+    wanted = pixels * kriging_block_means(~unknown, ratio)
+    factor = np.divide(wanted, means, out=np.ones_like(means), where=means > 0)
+    return np.where(unknown, np.nan, cells * by_pixel(factor, ratio))
 
 
 def _nearest(known):

@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple, TypeAlias
 import dask.array as da
 import numpy as np
 import xarray as xr
+from affine import Affine
 from odc.geo.geobox import GeoBox
 
 from fifesim.base.arguments import Chunks, Kind, LaiDistribution, WholeNumber
@@ -79,6 +80,35 @@ class PixelReads(NamedTuple):
         """Slices of the pixels that some cells of the grid read."""
         lattice = self.lattice
         return tuple(lattice.window(lattice.tiles(each, axis), axis) for axis, each in enumerate((rows, columns)))
+
+
+class FieldReads(NamedTuple):
+    """Cells of a field on the grid of `field_grid` that each chunk of cells reads."""
+
+    array: np.ndarray | da.Array  # shape (y, x)
+    lattice: PixelLattice
+    first: tuple[int, int]  # row and column of its first tile
+
+    def window(self, rows, columns):
+        """Slices of the field that some cells of the grid read."""
+        tile, found = self.lattice.tile, []
+        for axis, cells in enumerate((rows, columns)):
+            tiles = self.lattice.tiles(cells, axis)
+            start, stop = ((each - self.first[axis]) * tile for each in (tiles.start, tiles.stop))
+            found.append(slice(start, stop + 2 * PIXEL_MARGIN * self.lattice.ratio[axis]))
+        return tuple(found)
+
+
+def field_grid(lattice, grid):
+    """Grid of all tiles that a grid touches and the pixels around them, and the row and column of its first tile."""
+    spans = [lattice.tiles(slice(0, size), axis) for axis, size in enumerate(grid.shape)]
+    margins = [PIXEL_MARGIN * number for number in lattice.ratio]
+    top, left = (
+        span.start * lattice.tile - margin - cell
+        for span, margin, cell in zip(spans, margins, lattice.cell, strict=True)
+    )
+    shape = tuple(len(span) * lattice.tile + 2 * margin for span, margin in zip(spans, margins, strict=True))
+    return GeoBox(shape, grid.affine * Affine.translation(left, top), grid.crs), tuple(span.start for span in spans)
 
 
 def pixel_lattice(pixels, grid):
@@ -232,14 +262,12 @@ def downscale(
     """
     grid, seed = grids.check_grid(grid), check_seed(seed)
     check_streaming_arp(arp)
-    pixels = one_layer(north_up(lai), "lai")
-    cf.check_quantity(pixels, "lai")
-    lattice = pixel_lattice(pixels, grid)
+    pixels, reads = pixel_reads(lai, grid)
+    lattice = reads.lattice
     model = _model(float(arp), distribution, cv, lattice.ratio)
-    reads = PixelReads(chunking.pointwise(check_map, pixels).transpose("y", "x").data, lattice)
 
     def kernel(rows, columns, known):
-        made = _cells(model, seed, lattice, rows, columns, known)
+        made = cells_within(model, seed, lattice, rows, columns, known)
         _realised_variation(made, lattice, (rows.start, columns.start), cv)
         return made
 
@@ -253,6 +281,14 @@ def downscale(
     if not lazy:
         words["cv_within_pixels"] = _realised_variation(made, lattice, (0, 0))
     return cf.label(grids.place(cells, grid), "lai", history=history, source=lai, **words, references=_REFERENCES)
+
+
+def pixel_reads(lai, grid):
+    """Layer of a map of leaf area, and its pixels as cells of a grid read them."""
+    pixels = one_layer(north_up(lai), "lai")
+    cf.check_quantity(pixels, "lai")
+    lattice = pixel_lattice(pixels, grid)
+    return pixels, PixelReads(chunking.pointwise(check_map, pixels).transpose("y", "x").data, lattice)
 
 
 def _realised_variation(cells, lattice, first, wanted=None):
@@ -293,10 +329,10 @@ def _warn_of_variation(wanted, found, error):
 
 
 @dataclass(frozen=True, eq=False)
-class _Model:
+class CellModel:
     """Model of the variation of cells within pixels."""
 
-    arp: float
+    arp: float | downscaling.SplineFields
     transform: downscaling.LogNormal | downscaling.Marginal
     variation: object  # a function of the means of pixels, or None where deviations are the same in all
     table: tuple | None  # from `_table`
@@ -319,15 +355,15 @@ def _model(arp, distribution, cv, ratio):
     if distribution is not None:
         transform = downscaling.Marginal.of(lai_distribution(distribution), downscaling.kept_variance(arp, ratio))
         same = 1.0, float(downscaling.level_deviations(transform, [1.0], arp, ratio)[0])
-        return _Model(arp, transform, None, None, same, distribution_name(distribution))
+        return CellModel(arp, transform, None, None, same, distribution_name(distribution))
     table = _table(arp, ratio)
     variation = downscaling.fife_variation if cv is None else cv
     if callable(variation):
         _of_variation(np.asarray(variation(np.ones((1, 1))), float), table)
         words = "log-normal, cv of FIFE's grass" if cv is None else "log-normal, cv by the mean"
-        return _Model(arp, downscaling.LogNormal(), variation, table, None, words)
+        return CellModel(arp, downscaling.LogNormal(), variation, table, None, words)
     same = tuple(map(float, _of_variation(np.asarray(cv, float), table)))
-    return _Model(arp, downscaling.LogNormal(), None, None, same, f"log-normal, cv {cv:g}")
+    return CellModel(arp, downscaling.LogNormal(), None, None, same, f"log-normal, cv {cv:g}")
 
 
 @cached(4, "deviations of downscaled cells")
@@ -349,35 +385,46 @@ def _of_variation(values, table):
     return tuple(np.interp(values, table[0], deviations) for deviations in table[1:])
 
 
-def _cells(model, seed, lattice, rows, columns, known):
-    """Cells of a window, from the pixels that its tiles read."""
+def cells_within(model, seed, lattice, rows, columns, known, field=None):
+    """Cells of a window, from the pixels and the field that its tiles read; by default the autoregressive field."""
     spans = [lattice.tiles(each, axis) for axis, each in enumerate((rows, columns))]
     down, across = lattice.pixels
 
     def make_tile(row, column):
         top, left = (row - spans[0].start) * down, (column - spans[1].start) * across
         part = known[top : top + down + 2 * PIXEL_MARGIN, left : left + across + 2 * PIXEL_MARGIN]
-        return _tile(model, seed, lattice, row, column, part.astype(float).tobytes())
+        own = None
+        if field is not None:
+            starts = [(at - span.start) * lattice.tile for at, span in zip((row, column), spans, strict=True)]
+            cut = tuple(slice(at, at + size * n) for at, size, n in zip(starts, part.shape, lattice.ratio, strict=True))
+            own = field[cut].tobytes()
+        return _tile(model, seed, lattice, row, column, part.astype(float).tobytes(), own)
 
     shape = rows.stop - rows.start, columns.stop - columns.start
     return assemble(make_tile, lattice.tile, lattice.cell[0] + rows.start, lattice.cell[1] + columns.start, shape)
 
 
-# Chunks that do not match the tiles need some tiles more than once. Eight tiles of 504 cells take 16 MB.
+# Chunks that do not match the tiles need some tiles more than once. Eight tiles of 504 cells take 16 MB, and as keys,
+# fields of learned landscapes 21 MB and more.
 @cached(8, "tiles of downscaled cells")
-def _tile(model, seed, lattice, row, column, pixels):
-    """One tile of cells, from the bytes of its pixels and the surrounding pixels."""
+def _tile(model, seed, lattice, row, column, pixels, field):
+    """One tile of cells, from the bytes of its pixels, the surrounding pixels and the field of all of them."""
     shape = tuple(size + 2 * PIXEL_MARGIN for size in lattice.pixels)
-    pixels = np.frombuffer(pixels).reshape(shape)
+    size = tuple(count * number for count, number in zip(shape, lattice.ratio, strict=True))
+    pixels, outside = np.frombuffer(pixels).reshape(shape), np.False_
     inside = tuple(slice(PIXEL_MARGIN, PIXEL_MARGIN + size) for size in lattice.pixels)
+    if field is not None:
+        field = np.frombuffer(field).reshape(size)
+        outside = np.isnan(field)
+        pixels, field = downscaling.filled_field(pixels, field)
     if not (pixels[inside] > 0).any():
         return downscaling.by_pixel(np.where(pixels[inside] == 0, 0.0, np.nan), lattice.ratio)
-    first = [
-        place * lattice.tile - PIXEL_MARGIN * number + shift
-        for place, number, shift in zip((row, column), lattice.ratio, lattice.shift, strict=True)
-    ]
-    size = tuple(count * number for count, number in zip(shape, lattice.ratio, strict=True))
-    field = window_field(seed, model.arp, *first, size)
+    if field is None:
+        first = [
+            place * lattice.tile - PIXEL_MARGIN * number + shift
+            for place, number, shift in zip((row, column), lattice.ratio, lattice.shift, strict=True)
+        ]
+        field = window_field(seed, model.arp, *first, size)
     known, (deviations, of_levels) = pixels > 0, model.deviations(pixels)
     # Pixels without leaves have no level; use the level of the largest mean.
     levels = model.transform.level(np.where(known, pixels, pixels[known].max()))
@@ -386,7 +433,7 @@ def _tile(model, seed, lattice, row, column, pixels):
         pixels, field, _kriging(model.arp, trend, lattice.ratio, shape), model.transform, deviations
     )
     cut = tuple(slice(PIXEL_MARGIN * number, -PIXEL_MARGIN * number) for number in lattice.ratio)
-    tile = cells[cut].copy()
+    tile = downscaling.without_cells(cells, pixels, outside)[cut].copy()
     tile.flags.writeable = False
     return tile
 
