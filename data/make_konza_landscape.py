@@ -25,11 +25,13 @@ SOURCE = (
     "and elevation of USGS 3DEP"
 )
 NOISE = 0.004
-NOTE = "Plausible, not measured: moments of the default landscape in fife.toml; forms and spacings are assumed."
+# Small deviations, because the leaf area was learned as if leaves were green and soil uniform, so that it already holds
+# the variance of NDVI by dead leaves and soil.
+NOTE = "Plausible, not measured; small, because the leaf area was learned as if leaves were green and soil was uniform."
 PROPERTIES = {
-    "soil": {"mean": 0.0, "sd": 0.03, "leaf_area": -0.3, "forms": {"slope_40": 0.3}, "spacings": [30.0], "note": NOTE},
-    "brown": {"mean": 0.15, "sd": 0.06, "forms": {"above_400": 0.2}, "spacings": [30.0], "note": NOTE},
-    "moisture": {"mean": 0.25, "sd": 0.08, "forms": {"above_400": -0.5}, "spacings": [120.0], "note": NOTE},
+    "soil": {"mean": 0.0, "sd": 0.015, "leaf_area": -0.3, "forms": {"slope_40": 0.3}, "spacings": [30.0], "note": NOTE},
+    "brown": {"mean": 0.05, "sd": 0.02, "forms": {"above_400": 0.2}, "spacings": [30.0], "note": NOTE},
+    "moisture": {"mean": 0.1, "sd": 0.05, "forms": {"above_400": -0.5}, "spacings": [120.0], "note": NOTE},
 }
 
 

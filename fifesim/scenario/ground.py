@@ -1,11 +1,13 @@
 """Ground of a scenario: leaf area or a landscape, its canopies, elevation and horizon."""
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
 import dask
 import numpy as np
 
+from fifesim.base.caches import cached
 from fifesim.chain.absorbed_light import fpar
 from fifesim.chain.landscapes import warn_of_tallgrass
 from fifesim.grids import grid as grids
@@ -150,8 +152,11 @@ def ground_scene(scenario, grid, chunks=None, dem=None):
 
 def _learned(scenario, grid, chunks):
     """Learned landscape of a scenario, with the elevation within reach of the grid."""
-    terrain, land = scenario.terrain, Landscape.read(scenario.learned)
-    wide = land.around(grid)
+    terrain, seed, drawn = scenario.terrain, scenario.ground.seed, drawn_properties(scenario)
+    land = learned_landscape(scenario.learned)
+    wide, others = land.around(grid), {name: each for name, each in drawn.items() if name not in land.properties}
+    given = {name: {"mean": each.mean, "sd": each.sd} for name, each in drawn.items()}
+    properties = {name: each.model_copy(update=given[name]) for name, each in land.properties.items() if name in given}
     if terrain.dem == "flat":
         dem = None
     elif terrain.dem == "flint-hills":
@@ -159,7 +164,10 @@ def _learned(scenario, grid, chunks):
     else:
         fill, units = terrain.fill, terrain.vertical_units
         dem = known_dem(terrain.dem, wide, chunks, fill, units)
-    return land.simulate(grid, dem, seed=scenario.ground.seed, chunks=chunks)
+    scene = land.model_copy(update={"properties": properties}).simulate(grid, dem, seed=seed, chunks=chunks)
+    if others:
+        scene |= landscape(grid, lai=scene["lai"], seed=seed, chunks=chunks, **others)[list(others)]
+    return scene
 
 
 def _landscape(scenario, grid, chunks, dem):
@@ -200,11 +208,30 @@ def warn_of_canopy(scenario):
 def drawn_properties(scenario):
     """Ground properties of a scenario that vary as fields, by name."""
     land, own = scenario.ground, scenario.landscape
+    described = learned_landscape(scenario.learned).properties if scenario.learned else {}
+    # A property of a learned landscape is uniform if [ground] has its value and no deviation is given.
+    deviations = {name: each.sd for name, each in described.items() if name not in land.model_fields_set}
+    means = {name: each.mean for name, each in described.items() if name not in land.model_fields_set}
     return {
-        name: Field(mean=getattr(land, name), sd=deviation, arp=own.arps.get(name, land.arp), coarser=own.coarser)
-        for name, deviation in own.deviations.items()
+        name: Field(
+            mean=means.get(name, getattr(land, name)),
+            sd=deviation,
+            arp=own.arps.get(name, land.arp),
+            coarser=own.coarser,
+        )
+        for name, deviation in (deviations | own.deviations).items()
         if deviation
     }
+
+
+def learned_landscape(name):
+    """Learned landscape by name or file, read once."""
+    return _read_once(name, os.stat(name).st_mtime_ns if os.path.exists(name) else None)
+
+
+@cached(8, "learned landscapes")
+def _read_once(name, changed):
+    return Landscape.read(name)
 
 
 def check_leaf_area(scenario):

@@ -100,13 +100,13 @@ def _parts(scenario):
     ground, cover, dem = scenario.ground, scenario.landscape.cover, scenario.terrain.dem
     synthetic, given = [], ["leaf area"] if ground.lai_file else []
     if scenario.learned:
-        synthetic.append("leaf area")
+        synthetic.append("ground")
     elif cover in _PATTERNS:
         synthetic.append(_PATTERNS[cover])
     else:
         synthetic += [] if ground.lai_file else ["leaf area"]
         given += [] if cover == "none" else ["land cover"]
-        varying = [name for name, deviation in scenario.landscape.deviations.items() if deviation]
+        varying = list(drawn_properties(scenario))
         synthetic += [_VARYING.get(name, name.replace("_", " ")) for name in varying]
     if dem == "flint-hills":
         synthetic.append("hills")
@@ -376,10 +376,13 @@ class Scenario(Keys):
         check_zenith("sza", self.sun_and_view().sza)
         self._check_fields()
         check_leaf_area(self)
-        ground = self.ground.model_copy(update=self.ground.complete_optics(bands))
+        drawn = drawn_properties(self)
+        means = {name: each.mean for name, each in drawn.items()}
+        ground = self.ground.model_copy(update=means | self.ground.complete_optics(bands))
         sensor = own.model_copy(update={"pixel": own.size, "bands": [band.name for band in bands]})
         own_time = self.geometry.model_copy(update={"time": self.overpass_time()})
-        land = self.landscape.model_copy(update={"learned": self.learned or "none"})
+        deviations = self.landscape.deviations | {name: each.sd for name, each in drawn.items()}
+        land = self.landscape.model_copy(update={"learned": self.learned or "none", "deviations": deviations})
         update = {"grid": grid_keys(box), "ground": ground, "geometry": own_time, "sensor": sensor, "landscape": land}
         return self.model_copy(update=update).with_paths(full_path)
 

@@ -181,7 +181,8 @@ def test_every_key_of_a_scenario_reaches_its_stage():
 
 def test_coupling_slopes_and_model_keys_reach_the_chain():
     keys = {"coupling": "directional", "visibility": 10}
-    case = parse_scenario({"grid": GRID, "terrain": {"horizon_reach": 300}, "atmosphere": keys})
+    ground = {"arp": 0.15}
+    case = parse_scenario({"grid": GRID, "ground": ground, "terrain": {"horizon_reach": 300}, "atmosphere": keys})
     dem, horizon, _ = elevation(case, case.geobox())
     run, plain, upright, exact = (
         fifesim.simulate(case.replace(**changes))

@@ -250,11 +250,8 @@ class Landscape(Described, frozen=True):
             return [windows.tiles(partial(_level, cells, k), grid, chunks, tile=_CHUNK) for k in range(1 + len(names))]
         dem = grids.north_up(dem.transpose("y", "x"))
         _check_covers(dem, asked)
-        reads, kernel, shape = (
-            _window_reads(cells, dem, grid),
-            partial(_on_terrain, cells),
-            (1 + len(names), *grid.shape),
-        )
+        reads, kernel = _window_reads(cells, dem, grid), partial(_on_terrain, cells)
+        shape = 1 + len(names), *grid.shape
         if chunks is None and dem.chunks is None:
             data = chunking.in_blocks(kernel, [reads], shape, _BLOCK)
         else:
@@ -264,14 +261,14 @@ class Landscape(Described, frozen=True):
 
     def _labelled(self, made, grid, dem, history, seed, method, source=None):
         """Dataset of leaf area, and of properties if there are more rasters."""
-        properties = dict(zip(self.properties.items(), made[1:], strict=False))
+        described = list(self.properties.items())[: len(made) - 1]
         attributes = {"rng_seed": str(seed), "learned_from": self.source, **made_on_site(grid)}
         if dem is not None and dem.chunks is None:
             attributes["beyond_learned"] = self._share_beyond(dem, grids.cell_size(grid)[0])
-        if properties:
-            attributes["landscape"] = ", ".join(name for name, _ in properties)
+        if described:
+            attributes["landscape"] = ", ".join(name for name, _ in described)
         land = {"lai": cf.label(made[0], "lai", history=history, source=source, method=method, **attributes)}
-        for (name, each), values in properties.items():
+        for (name, each), values in zip(described, made[1:], strict=True):
             land[name] = labelled(name, each.field, values).assign_attrs(rng_seed=str(seed), comment=each.note)
         return xr.Dataset(land, attrs=made_on_site(grid))
 

@@ -152,7 +152,7 @@ def test_map_of_leaf_area_excludes_covary(make, land):
 def test_field_without_deviation_is_its_mean(site):
     land = fifesim.landscape(site, brown=fifesim.ground.Field(mean=0.2), soil=fifesim.ground.Field())
     assert (float(land["brown"]), float(land["soil"])) == (0.2, 0.0)
-    plain = fifesim.landscape(site, brown=0.2)
+    plain = fifesim.landscape(site, brown=0.2, soil=0.0)
     found, expected = (each.fifesim.surface_reflectance("TM", bands=["TM3"]) for each in (land, plain))
     np.testing.assert_array_equal(found, expected)
 

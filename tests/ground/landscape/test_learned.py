@@ -285,7 +285,7 @@ def test_files(tmp_path):
         (f"{KONZA.scores[1]}", "-99.0", "ascending numbers"),
         ('"above_400": 0.2', '"above_500": 0.2', "brown follows above_500, which the terrain lacks"),
         ('"above_400": -0.5', '"above_400": -1.5', "sum to 1 at most"),
-        ('"sd": 0.08', '"sd": 0.8', "its sd must be above 0 and below"),
+        ('"sd": 0.02', '"sd": 0.8', "its sd must be above 0 and below"),
         (f'"scores": [\n  {KONZA.scores[0]},', '"scores": [', "needs a value"),
     ):
         KONZA.save(path)
