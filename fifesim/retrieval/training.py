@@ -32,6 +32,10 @@ StudyOrDataset = Annotated[
     Kind("the path of a study, a fifesim.Study, or a dataset of chips as fifesim.dataset gives it", dimensions=0),
 ]
 
+LandscapeFile = Annotated[
+    FilePath, Kind("konza, or the path of a learned landscape that Landscape.save wrote, such as 'mine.json'")
+]
+
 _LEVELS = (0.5, 0.8, 0.95)
 # Number of landscapes in a part below which `train` warns.
 _FEW_LANDSCAPES = 10
@@ -41,6 +45,7 @@ def train(
     source: StudyOrDataset,
     method: Literal["line", "lookup", "quantiles", "optimal-estimation"] = "quantiles",
     *,
+    landscape: LandscapeFile | None = None,
     bands: Names | None = None,
     quantities: Names = ("lai", "fpar"),
     level: Literal["toa", "surface"] = "toa",
@@ -68,6 +73,9 @@ def train(
         brightness, soil moisture, share of dead leaves, chlorophyll and logarithm of the aerosol optical depth that the
         study draws, from a table of uniform ground of a single stand. It needs the study, or a dataset from
         `fifesim.dataset`.
+    landscape : str or path, optional
+        Learned landscape of which the chips of the study are made, instead of the leaf area of its scenario: "konza",
+        or a file of `fifesim.ground.Landscape.save`. Its leaf area is the prior.
     bands : str or sequence of str, optional
         Bands, by default all of the chips.
     quantities : str or sequence of str, optional
@@ -127,11 +135,9 @@ def train(
     if path is not None:
         # Before the training, which would be lost.
         check_target(path)
-    dataset = (
-        source
-        if isinstance(source, xr.Dataset)
-        else made(source if isinstance(source, Study) else read_study(source), chips)
-    )
+    dataset = source if isinstance(source, xr.Dataset) else made(_study(source, landscape), chips)
+    if landscape is not None and dataset is source:
+        raise ValueError("landscape is given for chips that are already made: give their study instead of the dataset")
     levels = tuple(sorted(float(each) for each in levels))
     variable = f"{level}_reflectance"
     _check_dataset(dataset, names)
@@ -164,7 +170,7 @@ def train(
         wavelengths=wavelengths,
         quantities=names,
         levels=levels,
-        prior=_prior(learned, names),
+        prior=_prior(learned, names) + (f", learned from {landscape}" if landscape is not None else ""),
         seed=seed,
         tables=tables,
         version=FORMAT,
@@ -173,6 +179,14 @@ def train(
     if path is not None:
         retrieval.to_netcdf(path)
     return retrieval
+
+
+def _study(source, landscape):
+    """Study of a retrieval, of a learned landscape if one is given."""
+    study = source if isinstance(source, Study) else read_study(source)
+    if landscape is None:
+        return study
+    return replace(study, scenario=study.scenario.replace(**{"landscape.learned": str(landscape)}))
 
 
 def _check(names, levels):

@@ -371,6 +371,7 @@ SEVERAL, BARE = {"study": PASTURES.to_toml()}, {"instrument": "MSI"}
         (BARE, {"method": "optimal-estimation"}, "needs the study of the chips"),
         (BARE, {"level": "surface"}, "needs the study of the chips"),
         (BARE, {"pixels": "uniform"}, "needs the study of the chips"),
+        (None, {"landscape": "konza"}, "give their study instead of the dataset"),
         (SEVERAL, {"method": "optimal-estimation"}, "single stand|of one stand"),
         (SEVERAL, {"pixels": "uniform"}, "single stand|of one stand"),
     ],
@@ -379,6 +380,20 @@ def test_invalid_training_is_rejected(chips, attrs, options, message):
     given = chips if attrs is None else chips.drop_attrs(deep=False).assign_attrs(attrs)
     with pytest.raises(ValueError, match=message):
         fifesim.train(given, **options)
+
+
+def test_learned_landscape_is_the_prior(tmp_path):
+    konza = fifesim.ground.Landscape.read("konza")
+    dense = konza.model_copy(update={"lai": tuple(2 * each for each in konza.lai)})
+    dense.save(path := tmp_path / "dense.json")
+    retrieval = fifesim.train(STUDY, "line", landscape=path, chips=48, quantities="lai")
+    grid = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 3000.0, 3000.0, 10.0)
+    mean = float(retrieval.prior.removeprefix("lai mean ").split(",")[0])
+    # The standard error of the mean of 12 landscapes of 150 m is 6 %.
+    assert mean == pytest.approx(float(dense.simulate(grid, seed=1)["lai"].mean()), rel=0.18)
+    assert retrieval.prior.endswith(f"learned from {path}")
+    with pytest.raises(TypeError, match=r"path of a learned landscape that Landscape\.save wrote"):
+        fifesim.train(STUDY, "line", landscape=dense)
 
 
 def test_few_landscapes_in_a_part_give_a_warning(chips):
