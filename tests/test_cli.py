@@ -121,9 +121,11 @@ def test_printed_scenario_is_the_default_one(invoke, tmp_path):
     printed = invoke("scenario").stdout
     (tmp_path / "default.toml").write_text(printed)
     assert write_scenario(read_scenario(tmp_path / "default.toml")) == printed
-    assert 'cover = "pastures"' in printed and printed.count("[classes.") == 6
+    assert 'learned = "konza"' in printed and "distribution =" not in printed
     paper = invoke("scenario", "--paper").stdout
-    assert 'cover = "none"' in paper and "[classes." not in paper and 'bands = ["TM3", "TM4"]' in paper
+    assert (
+        'learned = "none"' in paper and 'distribution = "burned-grazed"' in paper and 'bands = ["TM3", "TM4"]' in paper
+    )
 
 
 def test_sensors_lists_instruments_or_bands(invoke):

@@ -20,7 +20,7 @@ def picture(monkeypatch):
 def test_budget_of_the_picture_equals_the_scatter_of_its_run(picture, monkeypatch):
     sections = picture.scenario(cells=108).model_dump(exclude_unset=True)
     # Hills take most of the time.
-    sections["terrain"], sections["landscape"]["covary"] = {"dem": "flat"}, {"soil": -0.3}
+    sections["terrain"] = {"dem": "flat"}
     found = picture.run(picture.Scenario(**sections))
     assert found.total == pytest.approx(1 - found.fit.r2, abs=1e-9)
     assert float(found.shares.sum()) == pytest.approx(found.total, abs=1e-9)

@@ -119,7 +119,8 @@ def test_scenario_of_a_landscape_is_written_completely(sweep, outcomes, tmp_path
         "grid": window,
         "terrain": {"dem": "flat"},
     }
-    values["landscape"] = values["landscape"] | {"covary": {"soil": -0.3}}
+    values["landscape"] = {"cover": "pastures", "deviations": {"soil": 0.02}}
+    values["classes"] = {"one": {"share": 0.4, "brown": 0.1}, "other": {"share": 0.6}}
     own = replace(sweep, scenario=parse_scenario(values))
     page = tmp_path / "land.html"
     page.write_text(explorer_page(own, outcomes), encoding="utf-8")
@@ -250,7 +251,7 @@ def test_sliders_start_at_the_scenario_and_show_its_values(sweep):
 def test_slider_texts_follow_the_varied_quantity(sweep, small):
     assert set(explorer.STAGE_WORDS) == {CURVATURE, *STAGES}
     arp, haze, *_ = explorer.slider_words(replace(sweep, arps=(None,), hazes=(None,)))
-    assert arp["texts"] == ["as in the map"] and haze["texts"] == ["without haze"]
+    assert arp["texts"] == ["as in the map, or learned from one"] and haze["texts"] == ["without haze"]
     values = small.model_dump(exclude_unset=True) | {"atmosphere": {"aot": 0.15}}
     haze = explorer.slider_words(sweep_of(parse_scenario(values)))[1]
     assert haze["name"] == "Haze" and haze["texts"][haze["start"]] == "aerosol optical thickness 0.15"

@@ -14,11 +14,9 @@ FLAT = {"terrain": {"dem": "flat"}}
 SITE = {"west": 704970.0, "north": 4334220.0, "width": 3000.0, "height": 3000.0}
 
 
-def test_default_is_the_paper_with_arp_0_24_on_flat_ground():
+def test_default_is_the_default_scenario():
     sweep = sweep_of()
-    assert sweep.shape == (3, 3, 3, 4, 4)
-    assert sweep.instruments == ("MSI", "HRV", "TM", "MSS") and sweep.scenario.terrain.dem == "flat"
-    assert sweep.arps[1] == sweep.scenario.ground.arp == 0.24
+    assert sweep.arps == (None,) and sweep.scenario.learned == "konza" and sweep.scenario.terrain.dem == "flint-hills"
     box, whole = sweep.scenario.geobox(), fifesim.Scenario().geobox()
     assert box.shape == (270, 270)
     assert (box.affine.c - whole.affine.c) % 30 == pytest.approx(0, abs=1e-6)
@@ -64,7 +62,7 @@ def test_maps_have_no_arp_slider_and_clear_air_no_haze_slider(tmp_path):
 
 def test_landscape_with_many_stages_has_fewer_settings():
     sweep = sweep_of(fifesim.scenario.default_scenario())
-    assert sweep.shape == (3, 2, 2, 2, 4) and sweep_of(fifesim.Scenario()).shape == (3, 3, 3, 4, 4)
+    assert sweep.shape == (1, 2, 2, 2, 4) and sweep_of(fifesim.Scenario(base="paper")).shape == (3, 3, 3, 4, 4)
     assert sweep.hazes == (10.0, 45.0) and sweep.szas[1] == 60.0 and sweep.instruments == ("MSI", "TM")
 
 

@@ -183,7 +183,7 @@ def test_input_that_changes_during_a_run_is_an_error(tmp_path, monkeypatch, run_
 def test_overwriting_removes_the_cells_of_an_earlier_run(tmp_path, run_without_pictures):
     run_without_pictures(parse_scenario(SMALL), tmp_path / "out", scene=True)
     (tmp_path / "out" / "notes.txt").touch()
-    run_without_pictures(parse_scenario(SMALL | {"ground": {"seed": 4}}), tmp_path / "out", overwrite=True)
+    run_without_pictures(parse_scenario(SMALL | {"ground": {"arp": 0.15, "seed": 4}}), tmp_path / "out", overwrite=True)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {*FILES, "notes.txt"}
 
 
@@ -194,7 +194,7 @@ def test_resuming_a_finished_run_computes_nothing(folder, tmp_path, monkeypatch)
     files = [tmp_path / "out" / name for name in FILES]
     assert simulate_to_folder(scenario, tmp_path / "out", resume=True) == (files, True)
     with pytest.raises(ValueError, match=r"of another scenario, with arp = 0\.24, seed = 3: name another.*--overwrite"):
-        simulate_to_folder(parse_scenario({**SMALL, "ground": {}}), tmp_path / "out", resume=True)
+        simulate_to_folder(parse_scenario({**SMALL, "ground": {"arp": 0.15}}), tmp_path / "out", resume=True)
     with pytest.raises(ValueError, match="nothing to resume"):
         simulate_to_folder(scenario, tmp_path / "out", resume=True, scene=True)
 
@@ -266,7 +266,7 @@ def test_unfinished_run_refuses_another_scenario_and_recomputes_a_changed_chunk(
         run_without_pictures(parse_scenario(SMALL), tmp_path / "out", scene=True)
     with pytest.raises(ValueError, match=r"the unfinished run has another scenario, with arp = 0\.24, seed = 3"):
         run_without_pictures(
-            parse_scenario({**SMALL, "ground": {"seed": 4}}), tmp_path / "out", scene=True, resume=True
+            parse_scenario({**SMALL, "ground": {"arp": 0.15, "seed": 4}}), tmp_path / "out", scene=True, resume=True
         )
     unfinished = tmp_path / "out" / UNFINISHED
     block = unfinished / "blocks" / "scene-lai" / "c" / "0" / "0"

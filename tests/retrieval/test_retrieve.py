@@ -20,6 +20,7 @@ from tests.lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 
 CHIP = fifesim.Scenario(
     grid={"width": 150, "height": 150},
+    ground={"arp": 0.15},
     terrain={"dem": "flat"},
     sensor={"instrument": "MSI", "bands": ["MSI3", "MSI4", "MSI8"]},
 )

@@ -9,7 +9,7 @@ from fifesim.experiments.scatter.errors import ERROR_STAGES
 from fifesim.experiments.scatter.shares import budget_cases
 
 SQUARE = {"west": 707970.0, "north": 4331220.0, "width": 420.0, "height": 420.0}
-BURNED = {"grid": SQUARE, "terrain": {"dem": "flat"}, "sensor": {"offset": [0.3, 0.0]}}
+BURNED = {"grid": SQUARE, "ground": {"arp": 0.15}, "terrain": {"dem": "flat"}, "sensor": {"offset": [0.3, 0.0]}}
 TREATMENTS = ("burned-grazed", "burned-ungrazed", "unburned-ungrazed")
 PASTURES = BURNED | {
     "landscape": {"cover": "voronoi", "size": 150.0, "deviations": {"soil": 0.03}},
@@ -136,7 +136,7 @@ def test_invalid_quantity_and_weather_are_named(lai, options, message):
         fifesim.budget(fifesim.Scenario(**BURNED), quantity="gpp", weather=weather, realisations=1)
 
 
-CHIP = fifesim.Scenario(grid={"width": 120, "height": 120}, terrain={"dem": "flat"})
+CHIP = fifesim.Scenario(grid={"width": 120, "height": 120}, ground={"arp": 0.15}, terrain={"dem": "flat"})
 
 
 def test_sensitivity_matches_a_linear_function():

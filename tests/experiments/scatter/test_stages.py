@@ -159,7 +159,7 @@ def test_tangent_has_the_value_and_slope_of_the_curve_at_the_middle():
 def test_quantisation_changes_ndvi_of_cells_and_of_means_alike():
     """The quantisation error is the same for NDVI of cells and of means, and at most one or two counts."""
     sections = {"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}, "sensor": {"offset": [0.0, 1.0]}}
-    scene = scene_of(Scenario(**sections))
+    scene = scene_of(Scenario(ground={"arp": 0.15}, **sections))
     red, nir = np.random.default_rng(2).uniform([[[0.04]], [[0.2]]], [[[0.1]], [[0.4]]], (2, 90, 90))
     cells = np.stack([red, nir, (nir - red) / (nir + red)])
     found = images_of(scene, cells, ((False, True), (False,), (False,), (False, True), (False,)))[:, 0, 0, :, 0]
@@ -204,7 +204,7 @@ def test_block_takes_the_value_of_its_middle_cell(land):
 def test_clouds_thinner_than_the_mask_are_stages():
     """Without clouds the stages are ideal; a loose mask keeps thin clouds, which then have a share, and more pixels."""
     sky = {"cloud_cover": 0.5, "thickness": 1.0, "length": 300.0, "base": 300.0, "top": 300.0}
-    base = {"grid": {"width": 600, "height": 600, "cell": 10}, "terrain": {"dem": "flat"}}
+    base = {"grid": {"width": 600, "height": 600, "cell": 10}, "ground": {"arp": 0.15}, "terrain": {"dem": "flat"}}
     clear = Scenario(**base)
     assert not {"clouds", "shadows"} & set(working_stages(clear))
     tight, loose = (Scenario(**base, clouds=sky | {"mask": mask}) for mask in (0.05, 100.0))
