@@ -9,7 +9,7 @@ from fifesim.experiments.scatter import endtoend, errors
 from fifesim.experiments.scatter.shares import budget_cases
 
 SQUARE = {"west": 707970.0, "north": 4331220.0, "width": 360.0, "height": 360.0}
-SECTIONS = {"grid": SQUARE, "terrain": {"dem": "flat"}, "sensor": {"offset": [0.3, 0.0]}}
+SECTIONS = {"grid": SQUARE, "ground": {"arp": 0.15}, "terrain": {"dem": "flat"}, "sensor": {"offset": [0.3, 0.0]}}
 
 
 def test_report_has_the_numbers_of_the_budget(tmp_path):
