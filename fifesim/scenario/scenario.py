@@ -263,7 +263,9 @@ class Scenario(Keys):
     def _of_a_stand(self):
         """Names of the given keys that describe leaf area in another way than a learned landscape."""
         ground, own = self.ground, self.landscape
-        found = [f"ground.{key}" for key in STAND if key in ground.model_fields_set and getattr(ground, key) is not None]
+        found = [
+            f"ground.{key}" for key in STAND if key in ground.model_fields_set and getattr(ground, key) is not None
+        ]
         return found + ["landscape.cover"] * (own.cover != "none") + ["landscape.covary"] * any(own.covary.values())
 
     @property

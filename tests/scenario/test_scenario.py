@@ -14,7 +14,6 @@ from affine import Affine
 from mistakes import check_message, lines, mistakes
 
 import fifesim
-from fifesim.base import files
 from fifesim.base.geometry import earth_sun_distance, sun_geometry
 from fifesim.base.times import SITE_TIME
 from fifesim.grids import grid as grids
@@ -293,8 +292,8 @@ def test_invalid_replacements_are_rejected(changes, message):
 ROOT = Path(__file__).parents[2]
 DEFAULT = (
     "Synthetic landscape: ground and hills are synthetic; only the location is FIFE's. Leaf area was learned from "
-    "Kings Creek, Konza Prairie: NDVI of Sentinel-2, 3 June 2022 (contains modified Copernicus Sentinel data 2022), and "
-    "elevation of USGS 3DEP. Hypothetical overpass, 6 June 1987 16:35 UTC."
+    "Kings Creek, Konza Prairie: NDVI of Sentinel-2, 3 June 2022 (contains modified Copernicus Sentinel data 2022), "
+    "and elevation of USGS 3DEP. Hypothetical overpass, 6 June 1987 16:35 UTC."
 )
 OVERPASS = "Hypothetical overpass, 6 June 1987 16:35 UTC."
 PASTURES = {"landscape": {"cover": "pastures"}}

@@ -61,12 +61,15 @@ def _look_up(x, nodes, inverse, scale, first, columns, out):
 
 def _between(one, rows, other, columns, table):
     """Bilinear interpolation of a table, constant beyond its edges."""
-    (i, u), (j, v) = (_node(np.nan_to_num(x), np.asarray(nodes)) for x, nodes in ((one, rows), (other, columns)))
+    (i, u), (j, v) = (
+        place_between(np.nan_to_num(x), np.asarray(nodes)) for x, nodes in ((one, rows), (other, columns))
+    )
     low, high = ((1 - v) * table[i + k, j] + v * table[i + k, j + 1] for k in (0, 1))
     return (1 - u) * low + u * high
 
 
-def _node(x, nodes):
+def place_between(x, nodes):
+    """Last node at or below each place, and the share of the way to the next."""
     x = np.clip(x, nodes[0], nodes[-1])
     i = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, nodes.size - 2)
     return i, (x - nodes[i]) / (nodes[i + 1] - nodes[i])
@@ -96,8 +99,8 @@ def scores(landscape, northing, easting, seed, elevation=None, mean=0.0, spread=
     """
     gusts = landscape.level_gusts if elevation is None else landscape.gusts
     shape = northing.size, easting.size
-    broad, fine, coarse = np.full(shape, spread), np.zeros(shape), np.zeros(shape)
-    benches = None
+    fine, coarse, benches = (np.zeros(shape) for _ in range(3))
+    broad = np.full(shape, spread)
 
     def blow(name):
         if gusts[name]:
@@ -107,7 +110,6 @@ def scores(landscape, northing, easting, seed, elevation=None, mean=0.0, spread=
         stream = field_seed(seed, f"residual {k}")
         deviation = np.sqrt(field.variance * variance_kept(field.spacing, cell))
         if field.height:
-            benches = np.zeros(shape) if benches is None else benches
             bench_noise(stream, field.spacing, field.height, northing, easting, elevation, deviation, benches)
         else:
             spline_noise(stream, field.spacing, northing, easting, deviation, fine if field.spacing <= FINE else coarse)
@@ -119,11 +121,9 @@ def scores(landscape, northing, easting, seed, elevation=None, mean=0.0, spread=
     blow("fine")
     scale += gusts["fine"] ** 2
     fine *= np.exp(broad - scale)
-    total = coarse + fine + mean
-    if benches is not None:
-        blow("benches")
-        benches *= np.exp(broad - (scale + gusts["benches"] ** 2))
-        total += benches
+    blow("benches")
+    benches *= np.exp(broad - (scale + gusts["benches"] ** 2))
+    total = coarse + fine + mean + benches
     return total if elevation is None else np.where(np.isnan(elevation), np.nan, total)
 
 
@@ -183,37 +183,25 @@ def bench_noise(seed, spacing, height, northing, easting, elevation, deviation=1
     (i, down), (j, across) = (_weights(place, spacing) for place in (-northing, easting))
     out = np.zeros((i.size, j.size)) if out is None else out
     out[np.isnan(elevation)] = np.nan
-    lowest, highest = np.nanmin(elevation, initial=np.inf), np.nanmax(elevation, initial=-np.inf)
-    if not lowest <= highest:
+    lowest, highest = np.nanmin(elevation, 1, initial=np.inf), np.nanmax(elevation, 1, initial=-np.inf)
+    if not min(lowest) <= max(highest):
         return out
-    first, last = int(np.floor(lowest / height)), int(np.floor(highest / height))
+    first, last = int(np.floor(min(lowest) / height)), int(np.floor(max(highest) / height))
     shape = (i[-1] - i[0] + _TAPS, j[-1] - j[0] + _TAPS)
     noise = [white_noise((seed + bed) % 2**63, i[0], j[0], shape) for bed in range(first, last + _TAPS)]
     beds = np.stack(noise, axis=-1)
     lines = np.empty(beds.shape[1:])
-    _expand_beds(beds, first, height, elevation, i - i[0], deviation * down, j - j[0], across, lines, out)
+    _expand_beds(
+        beds, first, height, elevation, lowest, highest, i - i[0], deviation * down, j - j[0], across, lines, out
+    )
     return out
 
 
 def _weights(place, spacing):
     """First lattice row of each place and weights of the four, scaled to variance 1; places ascend."""
-    first, weights = np.empty(place.size, np.int64), np.empty((place.size, _TAPS))
-    _fill_weights(place, spacing, first, weights)
-    return first, weights
-
-
-@compiled
-def _fill_weights(place, spacing, first, weights):
-    """Fill in the first lattice rows and the weights."""
-    for n in range(place.size):
-        lattice = np.floor(place[n] / spacing)
-        first[n] = int(lattice)
-        square = 0.0
-        for tap in range(_TAPS):
-            weights[n, tap] = _cubic(place[n] / spacing - lattice, tap)
-            square += weights[n, tap] ** 2
-        for tap in range(_TAPS):
-            weights[n, tap] /= np.sqrt(square)
+    first = np.floor(place / spacing)
+    weights = np.stack([_cubic(place / spacing - first, tap) for tap in range(_TAPS)], axis=1)
+    return first.astype(np.int64), weights / np.sqrt(np.sum(weights**2, axis=1, keepdims=True))
 
 
 @compiled
@@ -226,46 +214,39 @@ def _expand(lattice, rows, down, columns, across, line, out):
                 line[k] += down[a, p] * lattice[rows[a] + p, k]
         for b in range(columns.size):
             c = columns[b]
-            out[a, b] += (
-                across[b, 0] * line[c]
-                + across[b, 1] * line[c + 1]
-                + across[b, 2] * line[c + 2]
-                + across[b, 3] * line[c + 3]
-            )
+            out[a, b] += _weighted(across[b], line[c], line[c + 1], line[c + 2], line[c + 3])
+
+
+@jitable
+def _weighted(weights, a, b, c, d):
+    """Sum of four values with their weights."""
+    return weights[0] * a + weights[1] * b + weights[2] * c + weights[3] * d
 
 
 @jitable
 def _cubic(t, tap):
     """Weight of one of the four lattice nodes around a place in a uniform cubic B-spline, times six."""
+    cube = t * t * t
     if tap == 0:
-        return (1 - t) ** 3
+        return (1 - t) * (1 - t) * (1 - t)
     if tap == 1:
-        return 3 * t**3 - 6 * t**2 + 4
+        return 3 * cube - 6 * (t * t) + 4
     if tap == 2:
-        return -3 * t**3 + 3 * t**2 + 3 * t + 1
-    return t**3
+        return -3 * cube + 3 * (t * t) + 3 * t + 1
+    return cube
 
 
 @compiled
-def _expand_beds(beds, first, height, elevation, rows, down, columns, across, lines, out):
+def _expand_beds(beds, first, height, elevation, lowest, highest, rows, down, columns, across, lines, out):
     """Add the interpolation of lattices of successive beds by place and elevation; ``lines`` is memory."""
     for a in range(rows.size):
-        lowest, highest = np.inf, -np.inf
-        for b in range(columns.size):
-            if not np.isnan(elevation[a, b]):
-                lowest, highest = min(lowest, elevation[a, b]), max(highest, elevation[a, b])
-        if not lowest <= highest:
+        if not lowest[a] <= highest[a]:
             continue
-        start, stop = int(np.floor(lowest / height)) - first, int(np.floor(highest / height)) - first + _TAPS
+        start, stop = int(np.floor(lowest[a] / height)) - first, int(np.floor(highest[a] / height)) - first + _TAPS
         near, into = beds[rows[a] : rows[a] + _TAPS, :, start:stop], lines[:, start:stop]
         for k in range(into.shape[0]):
             for bed in range(into.shape[1]):
-                into[k, bed] = (
-                    down[a, 0] * near[0, k, bed]
-                    + down[a, 1] * near[1, k, bed]
-                    + down[a, 2] * near[2, k, bed]
-                    + down[a, 3] * near[3, k, bed]
-                )
+                into[k, bed] = _weighted(down[a], near[0, k, bed], near[1, k, bed], near[2, k, bed], near[3, k, bed])
         for b in range(columns.size):
             if np.isnan(elevation[a, b]):
                 continue
@@ -276,11 +257,6 @@ def _expand_beds(beds, first, height, elevation, rows, down, columns, across, li
             total, square = 0.0, 0.0
             for q in range(_TAPS):
                 weight = _cubic(t, q)
-                total += weight * (
-                    across[b, 0] * around[0, q]
-                    + across[b, 1] * around[1, q]
-                    + across[b, 2] * around[2, q]
-                    + across[b, 3] * around[3, q]
-                )
+                total += weight * _weighted(across[b], around[0, q], around[1, q], around[2, q], around[3, q])
                 square += weight**2
             out[a, b] += total / np.sqrt(square)

@@ -23,6 +23,7 @@ from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.chunks import Reads
+from fifesim.grids.opening import check_memory
 from fifesim.grids.sites import made_on_site
 from fifesim.ground.landscape import learning
 from fifesim.ground.landscape.description import Described
@@ -43,8 +44,8 @@ from fifesim.ground.terrain.forms import COARSE, between_squares, land_forms, re
 # Maximum size of a file. [byte]
 _LARGEST = 2**20
 
-# Edges of the blocks of a landscape in memory, and of the chunks of a lazy one. [cell]
-_BLOCK, _CHUNK = 2016, 1008
+# Edge of the blocks of a landscape in memory and of the chunks of a lazy one: larger ones pay for new memory. [cell]
+_BLOCK = 1008
 
 # Rows of cells that are made at once, so that their fields stay in the cache of a processor.
 _STRIP = 252
@@ -246,17 +247,18 @@ class Landscape(Described, frozen=True):
             )
         northing, easting = (grids.coordinates(grid)[axis].values for axis in ("y", "x"))
         cells = _Cells(self, seed, northing, easting, cell, grids.lattice_position(grid), mapped, names)
-        if dem is None:
-            return [windows.tiles(partial(_level, cells, k), grid, chunks, tile=_CHUNK) for k in range(1 + len(names))]
-        dem = grids.north_up(dem.transpose("y", "x"))
-        _check_covers(dem, asked)
-        reads, kernel = _window_reads(cells, dem, grid), partial(_on_terrain, cells)
-        shape = 1 + len(names), *grid.shape
-        if chunks is None and dem.chunks is None:
-            data = chunking.in_blocks(kernel, [reads], shape, _BLOCK)
+        reads, kernel, shape = [], partial(_simulated, cells), (1 + len(names), *grid.shape)
+        if dem is not None:
+            dem = grids.north_up(dem.transpose("y", "x"))
+            _check_covers(dem, asked)
+            reads = [_window_reads(cells, dem, grid)]
+        if chunks is None and (dem is None or dem.chunks is None):
+            what = "a landscape of {} x {} x {} values".format(*shape)
+            check_memory(np.prod(shape), 8, what, "give chunks='auto', which makes it by parts")
+            data = chunking.in_blocks(kernel, reads, shape, _BLOCK)
         else:
-            sizes = windows.chunk_sizes(grid, "auto" if chunks is None else chunks, tile=_CHUNK)
-            data = chunking.windows(kernel, [reads], shape, sizes)
+            sizes = windows.chunk_sizes(grid, "auto" if chunks is None else chunks, tile=_BLOCK)
+            data = chunking.windows(kernel, reads, shape, sizes)
         return [grids.place(xr.DataArray(each, dims=("y", "x")), grid) for each in chunking.along_first(data)]
 
     def _labelled(self, made, grid, dem, history, seed, method, source=None):
@@ -412,19 +414,6 @@ class _Cells(NamedTuple):
         return (at // self.ratio // COARSE * COARSE - self.margin) * self.ratio
 
 
-def _level(cells, layer, row, column, shape):
-    """Mapped scores of level ground, or the values of a property after them."""
-    place = cells.northing[row : row + shape[0]], cells.easting[column : column + shape[1]]
-    found = scores(cells.landscape, *place, cells.seed, cell=cells.cell)
-    return _property(cells, cells.names[layer - 1], place, found) if layer else cells.mapped(found)
-
-
-def _property(cells, name, place, residual, response=None):
-    """Values of a property."""
-    found = property_scores(cells.landscape, name, *place, cells.seed, residual, response, cells.cell)
-    return values_of(name, cells.landscape.properties[name].field)(found)
-
-
 def _check_covers(dem, grid):
     """Raise an error unless an elevation covers a grid."""
     own = grids.geobox(dem)
@@ -446,32 +435,37 @@ def _window_reads(cells, dem, grid):
     return Reads(dem.data, *bounds)
 
 
-def _on_terrain(cells, rows, columns, ground):
-    """Mapped scores and properties of cells from a window of elevation around them."""
-    ratio, size = cells.ratio, cells.ratio * cells.cell
-    total, count = square_sums(np.ascontiguousarray(ground, float), ratio)
-    nodes = np.divide(total, count, out=np.full(count.shape, np.nan), where=count > 0)
+def _simulated(cells, rows, columns, ground=None):
+    """Mapped scores and properties of cells, from a window of elevation around them or on level ground."""
+    landscape, ratio = cells.landscape, cells.ratio
+    properties = [(name, landscape.properties[name].field) for name in cells.names]
     # Cells lie between nodes that are at most one outside of the margin.
     outside = cells.margin - 1
-    forms, names = land_forms(nodes, size, outside), cells.names
-    terrain = terrain_response(cells.landscape, forms)
-    responses = [property_response(cells.landscape, name, forms) for name in names]
+    if ground is not None:
+        total, count = square_sums(np.ascontiguousarray(ground, float), ratio)
+        nodes = np.divide(total, count, out=np.full(count.shape, np.nan), where=count > 0)
+        forms = land_forms(nodes, ratio * cells.cell, outside)
+        layers = [*terrain_response(landscape, forms)]
+        layers += [property_response(landscape, name, forms) for name in cells.names]
     # Numbers of the cells from the first cell of the window.
     down, across = (
         start + np.arange(block.start, block.stop) - cells.begin(start + block.start)
         for start, block in zip(cells.first, (rows, columns), strict=True)
     )
-    out = np.empty((1 + len(names), down.size, across.size))
+    out = np.empty((1 + len(properties), down.size, across.size))
     for first in range(0, down.size, _STRIP):
         strip = slice(first, first + _STRIP)
-        at = down[strip] - outside * ratio, across - outside * ratio
-        mean, spread = (between_squares(each, ratio, *at) for each in terrain)
+        own, mean, spread, responses = None, 0.0, 0.0, [None] * len(properties)
+        if ground is not None:
+            at = down[strip] - outside * ratio, across - outside * ratio
+            mean, spread, *responses = (between_squares(each, ratio, *at) for each in layers)
+            own = ground[down[strip][0] : down[strip][-1] + 1, across[0] : across[-1] + 1]
         place = cells.northing[rows][strip], cells.easting[columns]
-        own = ground[down[strip][0] : down[strip][-1] + 1, across[0] : across[-1] + 1]
-        found = scores(cells.landscape, *place, cells.seed, own, mean, spread, cells.cell)
+        found = scores(landscape, *place, cells.seed, own, mean, spread, cells.cell)
         out[0, strip] = cells.mapped(found)
-        for k, (name, each) in enumerate(zip(names, responses, strict=True), start=1):
-            out[k, strip] = _property(cells, name, place, found - mean, between_squares(each, ratio, *at))
+        for k, (name, field) in enumerate(properties):
+            score = property_scores(landscape, name, *place, cells.seed, found - mean, responses[k], cells.cell)
+            out[k + 1, strip] = values_of(name, field)(score)
     return out
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import fft, ndimage, optimize, special, stats
 
 from fifesim.ground.landscape.description import Beds, Described, Residual, TerrainResponse
-from fifesim.ground.landscape.learned import GUST_LENGTHS, PROBABILITIES, scores, terrain_response
+from fifesim.ground.landscape.learned import GUST_LENGTHS, PROBABILITIES, place_between, scores, terrain_response
 from fifesim.ground.terrain.forms import FORMS, land_forms
 
 # Spacings of the isotropic fields. [cell of the map]
@@ -267,9 +267,7 @@ def _rounded(values):
 
 def _hats(values, nodes):
     """Weights of linear interpolation between nodes, shape (n, nodes)."""
-    values = np.clip(values, nodes[0], nodes[-1])
-    i = np.clip(np.searchsorted(nodes, values, side="right") - 1, 0, nodes.size - 2)
-    share = (values - nodes[i]) / (nodes[i + 1] - nodes[i])
+    i, share = place_between(values, nodes)
     out = np.zeros((values.size, nodes.size))
     at = np.arange(values.size)
     out[at, i], out[at, i + 1] = 1 - share, share

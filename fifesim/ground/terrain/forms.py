@@ -67,47 +67,34 @@ def land_forms(elevation, cell, margin=0):
     """
     elevation = np.ascontiguousarray(elevation, float)
     sums = square_sums(elevation, COARSE)
-    places = [np.arange(margin, size - margin) for size in elevation.shape]
-    # Beyond, only the larger scales matter.
-    beyond = max(margin - int(np.ceil((RADII[-1] + _TRUNCATE * _FINE_SCALES[-1]) / cell)), 0)
-    elevation = elevation[tuple(slice(beyond, size - beyond) for size in elevation.shape)]
-    margin -= beyond
-    known = np.isfinite(elevation)
-    height, share = np.where(known, elevation, 0.0), known.astype(float)
-    # Slopes and convergence are differences of neighbours.
-    beside = min(margin, 2)
-    around = tuple(slice(margin - beside, size - margin + beside) for size in known.shape)
-    inner = tuple(slice(margin, size - margin) for size in known.shape)
-    smooth = {scale: _smoothed(height, share, scale / cell) for scale in _FINE_SCALES}
     # Variances of a square of cells, and of the triangle of the interpolation.
     blur = (COARSE**2 - 1) / (12 * COARSE**2) + 1 / 6
-    elevation = elevation[inner]
-    forms = {"elevation": elevation}
-    for scale in SCALES[1:]:
-        if scale in _FINE_SCALES:
-            mean = smooth[scale][inner]
-        else:
-            mean = between_squares(_smoothed(*sums, np.sqrt((scale / cell / COARSE) ** 2 - blur)), COARSE, *places)
-        forms[f"position_{scale:.0f}"] = elevation - mean
-    cut = (slice(beside, -beside or None),) * 2
+    # Only the larger scales matter further out.
+    near = min(margin, int(np.ceil((RADII[-1] + _TRUNCATE * _FINE_SCALES[-1]) / cell)))
+    places = [np.arange(margin - near, size - margin + near) for size in elevation.shape]
+    elevation = elevation[np.ix_(*places)]
+    known = np.isfinite(elevation)
+    height, share = np.where(known, elevation, 0.0), known.astype(float)
+    smooth = {scale: _smoothed(height, share, scale / cell) for scale in _FINE_SCALES}
+    for scale in SCALES[len(_FINE_SCALES) :]:
+        coarse = _smoothed(*sums, np.sqrt((scale / cell / COARSE) ** 2 - blur))
+        smooth[scale] = between_squares(coarse, COARSE, *places)
+    forms = {f"position_{scale:.0f}": elevation - smooth[scale] for scale in SCALES[1:]}
     for scale in _FINE_SCALES:
-        south, east = np.gradient(smooth[scale][around], cell)
+        south, east = np.gradient(smooth[scale], cell)
         steepness = np.hypot(south, east)
-        if scale != 20.0:
-            slopes = {"slope": steepness, "northward": -south, "eastward": east}
-            forms |= {f"{name}_{scale:.0f}": each[cut] for name, each in slopes.items()}
-        if scale != 10.0:
-            steepness = steepness + _CLEAR
-            flow = np.gradient(south / steepness, cell, axis=0) + np.gradient(east / steepness, cell, axis=1)
-            forms[f"convergence_{scale:.0f}"] = flow[cut]
-    middle = smooth[10.0][inner]
-    lower, higher = (np.where(known, smooth[10.0], limit) for limit in (np.inf, -np.inf))
+        slopes = {"slope": steepness, "northward": -south, "eastward": east}
+        south, east = south / (steepness + _CLEAR), east / (steepness + _CLEAR)
+        slopes["convergence"] = np.gradient(south, cell, axis=0) + np.gradient(east, cell, axis=1)
+        forms |= {f"{name}_{scale:.0f}": each for name, each in slopes.items()}
     for radius in RADII:
-        forms[f"above_{radius:.0f}"] = middle - ndimage.minimum_filter(lower, size=_side(radius / cell))[inner]
-    forms["below_150"] = ndimage.maximum_filter(higher, size=_side(RADII[0] / cell))[inner] - middle
-    return {
-        name: each if name == "elevation" else np.where(np.isfinite(each), each, 0.0) for name, each in forms.items()
-    }
+        lowest = ndimage.minimum_filter(np.where(known, smooth[10.0], np.inf), size=_side(radius / cell))
+        forms[f"above_{radius:.0f}"] = smooth[10.0] - lowest
+    highest = ndimage.maximum_filter(np.where(known, smooth[10.0], -np.inf), size=_side(RADII[0] / cell))
+    forms["below_150"] = highest - smooth[10.0]
+    inner = tuple(slice(near, size - near) for size in known.shape)
+    forms = {name: forms[name][inner] for name in FORMS if name in forms}
+    return {"elevation": elevation[inner]} | {n: np.where(np.isfinite(each), each, 0.0) for n, each in forms.items()}
 
 
 def _smoothed(height, share, scale):

@@ -220,7 +220,9 @@ def test_properties_have_their_moments_and_correlations(large, hills):
     for name, given in KONZA.properties.items():
         # Three standard errors of the slowest field: 120 m have 156 independent squares in each of three realisations.
         assert np.mean(level[name]) == pytest.approx(given.mean, abs=0.14 * given.sd), name
-        assert np.std(level[name]) == pytest.approx(given.sd, rel=0.1), name
+        # The standard error of a standard deviation is 1 / sqrt(2 n); the broad fields of leaf area add 1 %.
+        squares = 3 * (3000 / (2 * max(given.spacings))) ** 2
+        assert np.std(level[name]) == pytest.approx(given.sd, rel=3 / np.sqrt(2 * squares) + 0.01), name
         known = np.full(level["lai"][0].shape, True)
         scores = [learning.rank_scores(each, known) for each in level["lai"]]
         found = np.corrcoef(np.ravel(scores), np.ravel(level[name]))[0, 1]
