@@ -66,6 +66,7 @@ PUBLIC = _table()
 
 # Removed public names and their replacements.
 REMOVED = {
+    "correlated_fields": "fifesim.landscape draws independent fields, and learned landscapes follow the terrain",
     "invert": "the line is fit.predict(ndvi.values); fifesim.train and retrieve map LAI with intervals and flags",
     "inversion_error": "use fifesim.score(estimate, truth)",
     "plot_reproduction": "fifesim.reproduce returns the data of Figures 3 to 9, and docs/paper_figures.py draws them",
@@ -93,7 +94,9 @@ def namespace_of(namespace):
 
     def get(name):
         if name not in names:
-            raise AttributeError(f"module 'fifesim.{namespace}' has no attribute {name!r}: {nearest(name, names)}")
+            raise AttributeError(
+                f"module 'fifesim.{namespace}' has no attribute {name!r}: {REMOVED.get(name) or nearest(name, names)}"
+            )
         return find(name)
 
     return get, lambda: names

@@ -79,7 +79,7 @@ def approx(value):
         ("ground", "arp", ["number", "1", "[0, 0.25)", "`0.15`"]),
         ("grid", "cell", ["number", "m", "≥ 0.001", "`3.333333333`"]),
         ("ground", "seed", ["whole number", "", "[0, 2⁶³)", "`7`"]),
-        ("landscape", "covary", ["table of numbers", "", "[-1, 1]", "empty"]),
+        ("landscape", "deviations", ["table of numbers", "", "[0, 1]", "empty"]),
         ("sensor", "offset", ["two numbers", "pixel", "", "`[0, 0]`"]),
         ("sensor", "interval", ["name or number", "m", "`product`, `native`", '`"product"`']),
         ("atmosphere", "adjacency", ["true or false", "", "", "`false`"]),

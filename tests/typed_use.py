@@ -28,9 +28,7 @@ def scene() -> xr.DataArray:
 def ground(lai: xr.DataArray) -> xr.DataArray:
     grid = lai.odc.geobox
     dem = fifesim.flint_hills(grid, seed=7)
-    fields = fifesim.ground.correlated_fields(
-        grid, {"soil": 0.24}, {"soil": {"wetness": 0.5}}, covariates={"wetness": dem}
-    )
+    soil = fifesim.landscape(grid, soil=fifesim.ground.Field(sd=0.03, arp=0.24))["soil"]
     light = fifesim.horizon(dem, directions=16, reach=300)
     print(
         fifesim.terrain.slope(dem).max() + fifesim.terrain.sky_view(dem, light).min(),
@@ -44,7 +42,7 @@ def ground(lai: xr.DataArray) -> xr.DataArray:
         canopy=fifesim.Canopy(
             leaf_optics=fifesim.Leaf(chlorophyll=xr.where(lai > 1, 45.0, 25.0)),
             background={"soil_dry": 0.4, "shade": 0.6},
-            soil=0.04 * fields["soil"],
+            soil=soil,
             leaf_angles="campbell(57)",
         ),
     )

@@ -38,8 +38,18 @@ def closest(value, allowed):
     return next((names[found] for found in get_close_matches(str(value).lower(), names, n=1)), "")
 
 
+# Removed names of arguments and keys, and what replaces them.
+_REMOVED = {
+    "covary": "it was removed, a learned landscape follows the terrain: remove covary, and give learned. ",
+    "coarser": "it was removed: remove coarser, and give a larger arp. ",
+    "arps": "it was removed: remove arps, fields have the arp of [ground]. ",
+}
+
+
 def nearest(value, allowed):
     """Beginning of a message that suggests the nearest allowed name; empty if none is near."""
+    if str(value) in _REMOVED:
+        return _REMOVED[str(value)]
     near = closest(value, allowed)
     return f"did you mean {near!r}? " if near else ""
 

@@ -76,7 +76,6 @@ STAGE_WORDS = {
     "dead leaves": "their fraction varies",
     "cover": "plants and background differ between fields",
     "clumping": "leaves stand in crowns, with gaps between",
-    "covariance": "leaf area is correlated with terrain and soil",
 }
 
 # Views of an image: quantity and band.

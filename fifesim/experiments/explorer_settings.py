@@ -281,7 +281,7 @@ def _images(scenario, offsets):
     """Camera, leaf area of the cells, LAI and FPAR of the pixels, and digital numbers of both bands at each offset."""
     grid, setup = scenario.geobox(), setup_of(scenario)
     dem, horizon, _ = elevation(scenario, grid)
-    land = ground_scene(scenario, grid, dem=dem)
+    land = ground_scene(scenario, grid)
     truth = aggregate(
         xr.Dataset(truth_of(scenario, setup, land))[list(VARIABLES)], scenario.sensor.size, min_valid=setup.min_valid
     )

@@ -12,7 +12,6 @@ from .landscape.cover import Patches as Patches
 from .landscape.distribution import lai_distribution as lai_distribution
 from .landscape.distribution import treatments as treatments
 from .landscape.downscaling_labels import downscale as downscale  # method
-from .landscape.field_labels import correlated_fields as correlated_fields
 from .landscape.lai_labels import phenology as phenology
 from .landscape.learned_labels import Landscape as Landscape
 from .landscape.learned_labels import compare_landscapes as compare_landscapes  # method

@@ -194,7 +194,7 @@ def _drawn(study, count, landscape):
 
 def is_of_a_landscape(key):
     """Whether a key is drawn once for each landscape, because it determines the random field shared by its chips."""
-    return key.key in ("arp", "arps") or (key.key == "seed" and key.place not in (("sensor",), ("clouds",)))
+    return key.key == "arp" or (key.key == "seed" and key.place not in (("sensor",), ("clouds",)))
 
 
 def _seeds(study, count, landscape):

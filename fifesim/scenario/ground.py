@@ -24,7 +24,6 @@ from fifesim.ground.terrain import sky_labels
 from fifesim.ground.terrain.elevation_labels import fine_dem, flint_hills, known_dem, source_dem
 from fifesim.ground.terrain.sky_labels import horizon_places
 from fifesim.ground.terrain.source_labels import beside_altitude, elevation_grid
-from fifesim.scenario.keys import COVARIATES
 
 # Resolution of the synthetic hills around a scene, equal to the resolution of its horizons. [m]
 _HILLS_AROUND = 30.0
@@ -134,13 +133,13 @@ def _padded(grid, margin):
     )
 
 
-def ground_scene(scenario, grid, chunks=None, dem=None):
+def ground_scene(scenario, grid, chunks=None):
     """Ground of a scenario: a Dataset with ``lai`` [m2 m-2], ``cover`` and varying properties."""
     land = scenario.ground
     if scenario.learned:
         scene = _learned(scenario, grid, chunks)
     elif not scenario.is_one():
-        scene = _landscape(scenario, grid, chunks, dem)
+        scene = _landscape(scenario, grid, chunks)
     elif land.lai_file:
         scene = lai_window(land.lai_file, grid, chunks=chunks).to_dataset(name="lai")
     else:
@@ -170,7 +169,7 @@ def _learned(scenario, grid, chunks):
     return scene
 
 
-def _landscape(scenario, grid, chunks, dem):
+def _landscape(scenario, grid, chunks):
     land, own = scenario.ground, scenario.landscape
     if own.cover == "none":
         cover, classes = None, CoverClass("ground", lai=land.distribution)
@@ -178,17 +177,12 @@ def _landscape(scenario, grid, chunks, dem):
         cover, classes = own.cover, scenario.class_table()
     if own.cover in PATTERNS:
         cover = Patches(own.cover, own.size, _shares(scenario))
-    covary = {name: correlation for name, correlation in own.covary.items() if correlation}
-    of_dem = bool(set(covary) & set(COVARIATES))
     return landscape(
         grid,
         cover=cover,
         classes=classes,
         lai=land.lai_file,
         arp=land.arp,
-        covary=covary or None,
-        dem=cut(dem, grid) if of_dem else None,
-        geometry=scenario.sun_and_view() if "illumination" in covary else None,
         seed=land.seed,
         chunks=chunks,
         **drawn_properties(scenario),
@@ -213,12 +207,7 @@ def drawn_properties(scenario):
     deviations = {name: each.sd for name, each in described.items() if name not in land.model_fields_set}
     means = {name: each.mean for name, each in described.items() if name not in land.model_fields_set}
     return {
-        name: Field(
-            mean=means.get(name, getattr(land, name)),
-            sd=deviation,
-            arp=own.arps.get(name, land.arp),
-            coarser=own.coarser,
-        )
+        name: Field(mean=means.get(name, getattr(land, name)), sd=deviation, arp=land.arp)
         for name, deviation in (deviations | own.deviations).items()
         if deviation
     }

@@ -6,7 +6,7 @@ from datetime import date, time
 from pathlib import Path
 from typing import Annotated, Literal, get_args, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, create_model, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
 from pydantic.fields import FieldInfo
 
 from fifesim.atmosphere.clouds import COVER, HEIGHT, LENGTH, THICKNESS
@@ -17,7 +17,7 @@ from fifesim.base.geometry import PLACE, Geometry
 from fifesim.base.messages import nearest
 from fifesim.base.times import SITE_CORNERS, SITE_SIZE, utc
 from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
-from fifesim.ground.landscape import ARP, STREAMING_ARP, Coarser
+from fifesim.ground.landscape import ARP
 
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 
@@ -160,7 +160,6 @@ COVERS = ("none", "pastures", "voronoi", "levels")
 VARYING = tuple(DRAWN)
 KEYS = {name: known for name, known in PROPERTIES.items() if known.default is not None}
 """Canopy properties that are single keys of a scenario."""
-COVARIATES = ("elevation", "wetness", "illumination")
 BASES = {
     "landscape": {},
     "paper": {"ground": {"distribution": "burned-grazed"}, "sensor": {"response": "paper"}},
@@ -168,7 +167,7 @@ BASES = {
 """Keys that differ from the defaults, by the name of the base of a scenario."""
 STAND = ("distribution", "arp", "method", "lai_file")
 """Keys of [ground] for leaf area that is not of a learned landscape."""
-FIELD_LIMITS = {"deviations": (0, 1), "arps": (0, STREAMING_ARP.highest), "covary": (-1, 1)}
+FIELD_LIMITS = {"deviations": (0, 1)}
 """Smallest and largest number in the tables of a landscape. [1]"""
 
 # Values by the name of a band, spectrum or leaf constituent.
@@ -250,7 +249,7 @@ class LandscapeKeys(Section):
     learned: str | None = file(
         None,
         "landscape learned from a map: konza; a .json file of Landscape.save; or none. By default konza, unless "
-        "distribution, arp, method or lai_file of [ground], cover or covary is given",
+        "distribution, arp, method or lai_file of [ground], or cover is given",
         names=("konza", "none"),
         suffix=".json",
     )
@@ -262,33 +261,18 @@ class LandscapeKeys(Section):
     )
     size: float = number(1200.0, "m", "side of a drawn pasture, or width of a drawn patch", gt=0)
     deviations: ByName = text({}, f"standard deviations [1] of properties drawn as fields: {', '.join(VARYING)}")
-    arps: ByName = text({}, "autoregressive parameters [1] of these fields; by default arp of [ground]")
-    coarser: Annotated[int, Strict()] = ranged(
-        1,
-        kind_of(Coarser).known,
-        "ground cells per lattice cell of these fields along each side; arps refers to lattice cells",
-    )
-    covary: ByName = text({}, f"correlations [1] of LAI with {', '.join(COVARIATES + VARYING)}")
 
-    @field_validator("deviations", "arps", "covary")
+    @field_validator("deviations")
     @classmethod
     def _known_properties(cls, values, info):
-        known = VARYING + (COVARIATES if info.field_name == "covary" else ())
         low, high = FIELD_LIMITS[info.field_name]
         for name, value in values.items():
-            if name not in known:
-                raise ValueError(f"unknown name {shown(name)}: {nearest(name, known)}allowed are {', '.join(known)}")
+            if name not in VARYING:
+                hint = nearest(name, VARYING)
+                raise ValueError(f"unknown name {shown(name)}: {hint}allowed are {', '.join(VARYING)}")
             if not low <= value <= high:
                 raise ValueError(f"{name} = {value:g}: must be in [{low:g}, {high:g}]")
         return values
-
-    @model_validator(mode="after")
-    def _drawn_fields(self):
-        for key in ("arps", "covary"):
-            for name in getattr(self, key):
-                if name in VARYING and name not in self.deviations:
-                    raise ValueError(f"{key}.{name} is for a field that is drawn: give deviations.{name} too")
-        return self
 
 
 LAND_FORMS = ("flint-hills", "flat")

@@ -24,7 +24,7 @@ from fifesim.ground.landscape.classes import SHARES, CoverClass, fife_classes
 from fifesim.ground.landscape.distribution import treatments
 from fifesim.ground.landscape.learned_labels import Landscape
 from fifesim.scenario.ground import check_leaf_area, drawn_properties
-from fifesim.scenario.keys import COVARIATES, EXTENT, OFFSET_PARTS, STAND, ByName, GridKeys, Keys
+from fifesim.scenario.keys import EXTENT, OFFSET_PARTS, STAND, ByName, GridKeys, Keys
 from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
 from fifesim.scenario.toml import full_path, load_values, mistakes
 from fifesim.sensor.description.fields import false_colour_bands
@@ -244,11 +244,6 @@ class Scenario(Keys):
             raise ValueError(
                 'ground.method = "periodic" needs a single stand: use method = "streaming" or cover = "none"'
             )
-        needing = [name for name in COVARIATES if self.landscape.covary.get(name)]
-        if needing and self.terrain.dem == "flat":
-            raise ValueError(f"landscape.covary: {', '.join(needing)} needs an elevation, but terrain.dem is flat")
-        if self.landscape.covary and self.ground.lai_file:
-            raise ValueError("landscape.covary cannot be used with a lai_file: remove covary")
         stands = [self.ground, *self.classes.values()]
         if self.atmosphere.coupling == "directional" and any(stand.model != "sail" for stand in stands):
             raise ValueError('atmosphere.coupling = "directional" needs model = "sail": the other has one direction')
@@ -263,10 +258,8 @@ class Scenario(Keys):
     def _of_a_stand(self):
         """Names of the given keys that describe leaf area in another way than a learned landscape."""
         ground, own = self.ground, self.landscape
-        found = [
-            f"ground.{key}" for key in STAND if key in ground.model_fields_set and getattr(ground, key) is not None
-        ]
-        return found + ["landscape.cover"] * (own.cover != "none") + ["landscape.covary"] * any(own.covary.values())
+        keys = [key for key in STAND if key in ground.model_fields_set and getattr(ground, key) is not None]
+        return [f"ground.{key}" for key in keys] + ["landscape.cover"] * (own.cover != "none")
 
     @property
     def learned(self) -> str | None:
@@ -279,8 +272,7 @@ class Scenario(Keys):
     def is_one(self) -> bool:
         """Whether one stand covers the scene and only its LAI varies."""
         own = self.landscape
-        varies = own.deviations.values(), own.covary.values()
-        return not self.learned and own.cover == "none" and not any(map(any, varies))
+        return not self.learned and own.cover == "none" and not any(own.deviations.values())
 
     def class_table(self) -> dict[str, CoverClass]:
         """Classes of cover by name, a dict of `CoverClass`; by default the classes of FIFE."""

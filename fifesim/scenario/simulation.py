@@ -77,7 +77,7 @@ def run_nodes(scenario, chunks, complete, whole=True):
     dem, horizon, reach = elevation(scenario, ground, chunks)
     dem, horizon = (dem, horizon) if whole else in_memory(dem, horizon)
     lit = replace(setup, dem=dem, horizon=horizon)
-    land = ground_scene(scenario, ground, chunks, dem)
+    land = ground_scene(scenario, ground, chunks)
     scene, nodes = land.isel(inside), {}
     level = reflectance = reflectance_of(setup if whole else lit, land)
     if whole:

@@ -79,7 +79,6 @@ PATCHES = {"landscape": {"cover": "pastures", "size": 100.0}}
 CLASSES = PATCHES | {"classes": {"a": {}, "b": {"brown": 0.5}}}
 SHARES = PATCHES | {"classes": {"a": {"share": 0.5}, "b": {"share": 0.5, "brown": 0.5}}}
 CODES = {"landscape": {"cover": "cover.tif"}, "classes": {"a": {"code": 1}, "b": {"code": 2, "brown": 0.5}}}
-SOILS = {"landscape": {"deviations": {"soil": 0.1}}}
 BY_BAND = {"leaf_reflectance": {"TM3": 0.08, "TM4": 0.4}, "leaf_transmittance": {"TM3": 0.05, "TM4": 0.3}}
 HILLS = {"terrain": {"dem": "flint-hills", "horizon_reach": 100.0}}
 DARK = {"terrain": {"dem": "flint-hills", "horizon_reach": 600.0}, "geometry": {"sza": 74.0, "saa": 95.0}}
@@ -130,9 +129,6 @@ CHANGES |= {
     "landscape.cover": ("pastures", {}),
     "landscape.size": (60.0, PATCHES),
     "landscape.deviations": ({"soil": 0.1}, {}),
-    "landscape.arps": ({"soil": 0.24}, SOILS),
-    "landscape.coarser": (3, SOILS),
-    "landscape.covary": ({"soil": 0.8}, SOILS),
     "classes.a.share": (0.8, SHARES, {"classes": {"b": {"share": 0.2}}}),
     "classes.a.code": (2, CODES, {"classes": {"b": {"code": 1}}}),
     "terrain.dem": ("flint-hills", {"terrain": {"horizon_reach": 100.0}}),

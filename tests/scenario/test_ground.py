@@ -48,9 +48,6 @@ OWN = {
         "cover": "voronoi",
         "size": 80.0,
         "deviations": {"soil": 0.03, "brown": 0.06, "crown_cover": 0.0},
-        "arps": {"soil": 0.24},
-        "coarser": 2,
-        "covary": {"soil": -0.3, "brown": 0.0},
     },
     "classes": {
         "grass": {"share": 0.7, "hotspot": 0.2, "arp": 0.2, "leaf_angles": "spherical"},
@@ -77,9 +74,8 @@ def by_hand(scenario):
             "wood": fifesim.CoverClass(lai="unburned-ungrazed", canopy=fifesim.Canopy(leaf_angles="erectophile")),
         },
         arp=0.1,
-        brown=fifesim.ground.Field(mean=0.2, sd=0.06, arp=0.1, coarser=2),
-        soil=fifesim.ground.Field(sd=0.03, arp=0.24, coarser=2),
-        covary={"soil": -0.3},
+        brown=fifesim.ground.Field(mean=0.2, sd=0.06, arp=0.1),
+        soil=fifesim.ground.Field(sd=0.03, arp=0.1),
         seed=11,
     )
 
@@ -131,29 +127,6 @@ def test_reflectance_and_truth_match_explicit_calls(scenario, by_hand):
     np.testing.assert_allclose(tree["truth"]["brown"], dead, rtol=1e-12)
 
 
-def test_leaf_area_follows_the_hills_of_a_scenario():
-    sections = {
-        "terrain": {"dem": "flint-hills", "seed": 3, "horizon_reach": 300},
-        "landscape": {"covary": {"elevation": 0.3, "wetness": 0.4, "illumination": -0.3}},
-        "geometry": {"sza": 50.0, "saa": 200.0},
-    }
-    case = parse_scenario(SMALL | sections)
-    scene = fifesim.simulate(case)["scene"]
-    grid = case.geobox()
-    dem = fifesim.flint_hills(grid.pad(1), 3)[1:-1, 1:-1]
-    land = fifesim.landscape(
-        grid,
-        classes=fifesim.CoverClass("ground", lai="burned-grazed"),
-        dem=dem,
-        covary=sections["landscape"]["covary"],
-        geometry=case.sun_and_view(),
-        seed=7,
-    )
-    np.testing.assert_array_equal(scene["lai"], land["lai"])
-    heights = np.corrcoef(scene["lai"].values.ravel(), dem.values.ravel())[0, 1]
-    assert heights > 0.1
-
-
 def test_mapped_leaf_area_is_kept_while_other_properties_vary(tmp_path):
     lai = make_scene(ground={"seed": 5})["lai"]
     ground = {"lai_file": str(write(tmp_path / "lai.tif", lai.values, parse_scenario(SMALL).geobox().affine))}
@@ -164,15 +137,14 @@ def test_mapped_leaf_area_is_kept_while_other_properties_vary(tmp_path):
 
 def test_drawn_properties_take_mean_and_arp_from_the_ground():
     deviations = {"soil": 0.03, "moisture": 0.1, "brown": 0.05, "crown_cover": 0.07}
-    arps = {"soil": 0.24, "brown": 0.0}
     case = parse_scenario(
         {"ground": {"arp": 0.1, "brown": 0.2, "crown_cover": 0.8, "soil": -0.1, "moisture": 0.3}}
-        | {"landscape": {"deviations": deviations, "arps": arps}}
+        | {"landscape": {"deviations": deviations}}
     )
     assert drawn_properties(case) == {
-        "soil": fifesim.ground.Field(mean=-0.1, sd=0.03, arp=0.24),
+        "soil": fifesim.ground.Field(mean=-0.1, sd=0.03, arp=0.1),
         "moisture": fifesim.ground.Field(mean=0.3, sd=0.1, arp=0.1),
-        "brown": fifesim.ground.Field(mean=0.2, sd=0.05, arp=0.0),
+        "brown": fifesim.ground.Field(mean=0.2, sd=0.05, arp=0.1),
         "crown_cover": fifesim.ground.Field(mean=0.8, sd=0.07, arp=0.1),
     }
 
@@ -224,7 +196,7 @@ LEVEL_LAND = [
     {"landscape": {"deviations": {"soil": 0.0, "moisture": 0.0, "brown": 0.0, "crown_cover": 0.0}}},
     {"ground": {"brown": 0.0, "dissociation": 1.0, "brown_leaf": {"brown": 1.0}}},
     {"ground": {"crown_cover": 1.0, "crown_shape": 0.3}},
-    {"ground": {"soil": 0.0, "moisture": 0.0}, "landscape": {"covary": {"elevation": 0.0}}},
+    {"ground": {"soil": 0.0, "moisture": 0.0}, "landscape": {"deviations": {"soil": 0.0}}},
     {"landscape": {"cover": "pastures"}, "classes": {"a": {"brown": 0.0, "crown_cover": 1.0}}},
     {"landscape": {"cover": "levels", "size": 50.0}, "classes": {"a": {}, "b": {"hotspot": 0.0}}},
 ]

@@ -93,8 +93,7 @@ def test_seed_is_an_integer_that_toml_can_hold(value):
 
 def test_numbers_come_with_their_unit_and_limits_are_allowed():
     assert LandscapeKeys(size="1.2 km").size == 1200.0
-    LandscapeKeys(deviations=dict.fromkeys(VARYING, 1), arps={"soil": 0.2498, "brown": 0})
-    LandscapeKeys(covary={"wetness": 1, "illumination": -1}, deviations={})
+    LandscapeKeys(deviations=dict.fromkeys(VARYING, 1))
     StandKeys(hotspot=1e-6, brown=1, dissociation=1, crown_cover=0, crown_shape=10, soil=-1, moisture=1)
     ClassKeys(share=1)
 
@@ -104,12 +103,10 @@ def test_numbers_come_with_their_unit_and_limits_are_allowed():
     [
         ({"learned": "konza"}, False),
         ({"cover": "none", "size": 50.0}, True),
-        ({"deviations": {"soil": 0.0, "brown": 0}, "arps": {"soil": 0.24}}, True),
-        ({"deviations": {"soil": 0.0}, "covary": {"elevation": 0.0, "soil": 0}}, True),
+        ({"deviations": {"soil": 0.0, "brown": 0}}, True),
         ({"cover": "pastures"}, False),
         ({"cover": "cover.tif"}, False),
         ({"deviations": {"soil": 0.0, "brown": 0.1}}, False),
-        ({"covary": {"elevation": -0.3}}, False),
     ],
 )
 def test_landscape_is_one_stand_if_only_leaf_area_varies(values, is_one):

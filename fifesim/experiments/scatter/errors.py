@@ -168,7 +168,7 @@ def on_line(ndvi, lai):
 
 
 def _truths(scene, target, switches):
-    """LAI and quantity of the blocks, and LAI of the footprints, each (16 axes of stages, y, x)."""
+    """LAI and quantity of the blocks, and LAI of the footprints, each (15 axes of stages, y, x)."""
     kinds = list(product(*(switches[name] for name in IDEAL_PROPERTIES)))
     grounds = [scene.ground([name for name, on in zip(IDEAL_PROPERTIES, each, strict=True) if on]) for each in kinds]
     size, (rows, columns), valid = grids.cell_size(scene.blocks)[0], scene.shape, scene.setup.min_valid

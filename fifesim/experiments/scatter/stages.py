@@ -68,30 +68,24 @@ IDEAL_PROPERTIES = {
     "dead leaves": "uniform fraction of dead leaves",
     "cover": "leaves and background of the first class everywhere",
     "clumping": "evenly distributed leaves, without gaps between crowns",
-    "covariance": "leaf area is not correlated with other properties",
 }
 
 
 def varying_ground(scenario):
     """Properties that vary over the ground of a scenario apart from leaf area, in the order of `IDEAL_PROPERTIES`."""
-    own, classes = scenario.landscape, scenario.class_table() if scenario.landscape.cover != "none" else {}
+    classes = scenario.class_table() if scenario.landscape.cover != "none" else {}
     found = {DRAWN[name].effect for name in drawn_properties(scenario)}
     if len(classes) > 1 and any(each.canopy.given for each in classes.values()):
         found.add("cover")
     clumped = {name: known.default for name, known in DRAWN.items() if known.effect == "clumping"}
     if any(set(numbers_of_stands(scenario, name)) != {default} for name, default in clumped.items()):
         found.add("clumping")
-    if any(own.covary.values()):
-        found.add("covariance")
     return tuple(name for name in IDEAL_PROPERTIES if name in found)
 
 
-def ground_with(scenario, grid, at_work, dem=None):
+def ground_with(scenario, grid, at_work):
     """Ground of a scenario with some varying properties ideal, from the same random numbers."""
-    own, ideal = scenario.landscape, {}
-    if "covariance" not in at_work:
-        ideal["covary"] = {}
-    land = ground_scene(scenario.model_copy(update={"landscape": own.model_copy(update=ideal)}), grid, dem=dem)
+    land = ground_scene(scenario, grid)
     for name, known in DRAWN.items():
         # Without clumping there are no gaps between crowns; other ideal properties have their means.
         if known.effect == "clumping" and known.effect in varying_ground(scenario) and known.effect not in at_work:
@@ -174,7 +168,7 @@ STAGES = {
     "shadows": "no clouds toward the sun or overhead; in the budget, those thinner than the mask",
 } | IDEAL_PROPERTIES
 # Ground properties that affect leaf area or absorbed light, in order.
-_TRUE = ("cover", "clumping", "covariance")
+_TRUE = ("cover", "clumping")
 _SENSED = ("NDVI scaling", "point spread", "registration", "quantisation", "noise")
 VARIABLES = ("lai", "fpar")
 # Half of the step of LAI over which tangents are taken: wide compared with the error of the reflectance table, 1e-6.
@@ -238,7 +232,7 @@ def switches_of(stages):
 
 
 def images_of_all(scenes, switches):
-    """Images of scenes that differ in the offset for all states of their stages, each (16 axes of stages, y, x)."""
+    """Images of scenes that differ in the offset for all states of their stages, each (15 axes of stages, y, x)."""
     lit, images = [name for name in STAGES if name not in _SENSED], [[] for _ in scenes]
     for states in product(*(switches[0][name] for name in lit)):
         at_work = {name for name, state in zip(lit, states, strict=True) if state}
@@ -289,7 +283,7 @@ class _Scene:
         """Ground with some stages active, computed once."""
         kind = frozenset(at_work) & set(IDEAL_PROPERTIES)
         if kind not in self.grounds:
-            land = ground_with(self.scenario, self.grid, kind, self.setup.dem)
+            land = ground_with(self.scenario, self.grid, kind)
             self.grounds[kind] = _Ground(land, self.spread_out(land["lai"]).values)
         return self.grounds[kind]
 

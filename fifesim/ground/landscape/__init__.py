@@ -1,12 +1,7 @@
 """Spatial distribution of leaves: random fields of leaf area with a given density."""
 
-from typing import Annotated, TypeAlias
-
 from fifesim.base.arguments import Range
 
-# Autoregressive parameters of any field and of fields computed in tiles, and cells along a side of a coarser lattice.
+# Autoregressive parameters of any field and of fields computed in tiles.
 ARP = Range("1", 0, 0.25, note="the process is not stationary from 0.25 up; the paper uses 0.05 to 0.24", ends="[)")
 STREAMING_ARP = Range("1", 0, 0.2498)
-Coarser: TypeAlias = Annotated[
-    int, Range("1", 1, 100, note="it counts ground cells along a side of a cell of the field")
-]

@@ -8,25 +8,21 @@ products, quotients and square roots of single precision are used, which all mac
 
 The streaming field is a function of (seed, row, column) on an unbounded lattice. It is made in fixed lattice tiles,
 each filtered with a margin, so that no tile depends on the requested window or chunk.
-
-A field on a coarser lattice has cells of whole cells of the ground, counted from the origin of the reference system.
-Splines interpolate from their centres to the centres of the ground cells. For each place within a cell of the lattice,
-their weights are divided by the standard deviation of the interpolated process, so that it is normal with variance 1
-everywhere.
 """
 
 from __future__ import annotations
 
+import zlib
 from functools import partial
 
 import numpy as np
 from scipy import fft, optimize, special
 
-from fifesim.base.arguments import Range, check, check_number, kind_of
-from fifesim.base.arrays import compiled, jitable
+from fifesim.base.arguments import Range, check_number
+from fifesim.base.arrays import compiled
 from fifesim.base.caches import cached
 from fifesim.base.lattice import assemble, check_seed, generator
-from fifesim.ground.landscape import ARP, STREAMING_ARP, Coarser
+from fifesim.ground.landscape import ARP, STREAMING_ARP
 
 # Largest arp of the streaming field, and of an arp found from a length. [1]
 LARGEST_STREAMING_ARP = STREAMING_ARP.highest
@@ -349,6 +345,17 @@ _ROWS = 32
 # Stream of the periodic field's noise.
 _PERIODIC = 1
 
+# First of the streams of random numbers that are named after fields.
+_STREAM = 2**50
+
+
+def field_seed(seed, name):
+    """Seed of the noise of a field; "lai" has the seed of the landscape."""
+    seed = check_seed(seed)
+    if name == "lai":
+        return seed
+    return int(generator(seed, _STREAM + zlib.crc32(name.encode())).integers(2**63))
+
 
 def streaming_field(seed, arp, row, column, shape):
     """
@@ -376,16 +383,8 @@ def streaming_field(seed, arp, row, column, shape):
     ----------
     [Friedl1995]_, Fig. 2, steps 1 to 4; [Salmon2011]_ for the counter-based noise
     """
-    return mixed_field({check_seed(seed): 1.0}, arp, row, column, shape)
-
-
-def mixed_field(weights, arp, row, column, shape, *, tile=FIELD_TILE):
-    """Field of a mixture of noises by place, with zero mean and unit variance, shape (rows, columns). [1]"""
     check_streaming_arp(arp, 'use method="periodic"')
-    for seed in weights:
-        check_seed(seed)
-    make_tile = partial(_tile if tile == FIELD_TILE else _small_tile, tile, tuple(weights.items()), arp)
-    return assemble(make_tile, tile, row, column, shape)
+    return assemble(partial(_tile, check_seed(seed), arp), FIELD_TILE, row, column, shape)
 
 
 def periodic_field(seed, arp, shape):
@@ -401,43 +400,23 @@ def periodic_field(seed, arp, shape):
 # In single precision, cells are within 2e-6 standard deviations of the double-precision result for the same noise, 3e-7
 # rms, and reflectances within 6e-8: a tile of four seeds, for each of the paper's three distributions and arp from 0.05
 # to 0.2498.
-def _filtered_tile(size, weights, arp, tile_row, tile_column):
+#
+# Chunks smaller than tiles, or cut elsewhere, ask for a tile more than once. Twelve tiles are 49 MB.
+@cached(12, "tiles of random fields")
+def _tile(seed, arp, tile_row, tile_column):
     """One tile of a field, in single precision."""
-    tile = _window(weights, arp, tile_row * size, tile_column * size, (size, size)).copy()
+    tile = window_field(seed, arp, tile_row * FIELD_TILE, tile_column * FIELD_TILE, (FIELD_TILE, FIELD_TILE)).copy()
     tile.flags.writeable = False
     return tile
 
 
-# Chunks smaller than tiles, or cut elsewhere, ask for a tile more than once. Twelve tiles are 49 MB.
-_tile = cached(12, "tiles of random fields")(_filtered_tile)
-
-# Splines between cells of a coarser lattice reach into the tiles around: those of four properties in a row of chunks of
-# 20 million cells are kept until the next row needs them. So many of 252 cells are 33 MB.
-_small_tile = cached(128, "small tiles of random fields")(_filtered_tile)
-
-
 def window_field(seed, arp, row, column, shape):
-    """Window of the streaming field that is filtered directly rather than by tiles, equal within 1e-5."""
-    return _window(((seed, 1.0),), arp, row, column, shape)
-
-
-def _window(weights, arp, row, column, shape):
-    """Cells of a field of mixed noises, filtered with a margin."""
+    """Window of the streaming field that is filtered with a margin rather than by tiles, equal within 1e-5."""
     around = margin(arp)
     size = tuple(fft.next_fast_len(length + 2 * around, real=True) for length in shape)
-    noise = _mixed_noise(weights, row - around, column - around, size)
+    noise = white_noise(seed, row - around, column - around, size)
     inside = tuple(slice(around, around + length) for length in shape)
     return _filter(noise, _half_response(arp, size, np.float32))[inside]
-
-
-def _mixed_noise(weights, row, column, shape):
-    mixture = None
-    for seed, weight in weights:
-        noise = white_noise(seed, row, column, shape)
-        if weight != 1.0:
-            noise *= np.float32(weight)
-        mixture = noise if mixture is None else np.add(mixture, noise, out=mixture)
-    return mixture
 
 
 def _filter(noise, half_response):
@@ -469,112 +448,3 @@ def pair_correlations(arp, ratio):
         np.where(np.arange(number) > 0, 2.0, 1.0) * (number - np.arange(number)) / number**2 for number in ratio
     )
     return covariance[: ratio[0], : ratio[1]] / covariance[0, 0], down[:, None] * across
-
-
-# Edge of a tile. [cell of the lattice]
-COARSE_TILE = 252
-
-
-_TAPS = 4  # of a cubic spline
-
-
-def coarse_field(seed, arp, coarser, row, column, shape):
-    r"""
-    Standard normal field that varies over several cells of the ground, as a function of place.
-
-    .. math:: z(p) = \frac{\sum_k w_k(p) \, x_k}{\sqrt{\sum_{kl} w_k(p) \, w_l(p) \, \rho_{kl}}}
-
-    with x the process on the coarser lattice, :math:`\rho` its correlations and w the weights of the 4 x 4 nearest of
-    its cells in a uniform cubic B-spline.
-
-    Parameters
-    ----------
-    seed : int
-        In [0, 2**63).
-    arp : float
-        Between cells of the coarser lattice, in [0, 0.2498]. [1]
-    coarser : int
-        Cells of the ground along a side of a cell of the coarser lattice; 1 is the field of the ground's own.
-    row, column : int
-        Lattice position of the first cell of the ground; rows count southward.
-    shape : (int, int)
-        Rows and columns.
-
-    Returns
-    -------
-    field : array, shape (rows, columns)
-        Zero mean and unit variance over the ensemble, in every cell. [1]
-
-    Notes
-    -----
-    The splines are smooth to the second derivative, and no structure is finer than the lattice. A correlation over
-    cells of the ground is longer than in the process by about 0.6 cells of the lattice.
-    """
-    if check_coarser(coarser) == 1:
-        return streaming_field(seed, arp, row, column, shape)
-    rows, columns = (_knots(first, size, coarser) for first, size in zip((row, column), shape, strict=True))
-    size = tuple(int(knots[-1]) + _TAPS - int(knots[0]) if knots.size else 0 for knots in (rows, columns))
-    start = tuple(int(knots[0]) if knots.size else 0 for knots in (rows, columns))
-    lattice = mixed_field({seed: 1.0}, arp, *start, size, tile=COARSE_TILE)
-    out = np.empty(shape)
-    phases = tuple((first + np.arange(length)) % coarser for first, length in zip((row, column), shape, strict=True))
-    _interpolate(lattice, rows - start[0], columns - start[1], *phases, *spline_weights(arp, coarser), out)
-    return out
-
-
-def check_coarser(coarser):
-    """Raise an error if the coarsening factor is invalid."""
-    check("coarser", coarser, kind_of(Coarser))
-    return int(coarser)
-
-
-@cached(32, "spline weights of a coarse lattice")
-def spline_weights(arp, coarser):
-    """Spline weights by place, shape (coarser, 4), and factors for variance 1, shape (coarser, coarser). [1]"""
-    share = ((2 * np.arange(coarser) + 1 + coarser) % (2 * coarser)) / (2 * coarser)
-    rest = 1.0 - share
-    along = np.stack(
-        [rest**3, 4.0 + share**2 * (3.0 * share - 6.0), 4.0 + rest**2 * (3.0 * rest - 6.0), share**3], axis=1
-    )
-    along /= 6.0
-    lags = np.abs(np.subtract.outer(np.arange(_TAPS), np.arange(_TAPS)))
-    correlation = pair_correlations(arp, (_TAPS, _TAPS))[0]
-    between = correlation[lags[:, :, None, None], lags]
-    variance = np.einsum("pa,pb,qc,qd,abcd->pq", along, along, along, along, between)
-    return along, 1.0 / np.sqrt(variance)
-
-
-def _knots(first, size, coarser):
-    """First of the four lattice cells from which each ground cell along an axis is interpolated."""
-    # A centre lies at (2 i + 1 - coarser) / (2 coarser) centres of the lattice; one more lies before it.
-    return (2 * (first + np.arange(size)) + 1 - coarser) // (2 * coarser) - 1
-
-
-@compiled
-def _interpolate(lattice, rows, columns, down, across, along, factor, out):
-    """Interpolate the lattice to cells."""
-    # First along rows of the lattice, which are few, then for several cells of the ground at once.
-    lines, scaled = np.empty((_TAPS, columns.size)), np.empty((factor.shape[0], columns.size))
-    for p in range(factor.shape[0]):
-        for j in range(columns.size):
-            scaled[p, j] = factor[p, across[j]]
-    made = rows[0] if rows.size else 0
-    for i in range(rows.size):
-        r, p = rows[i], down[i]
-        while made < r + _TAPS:
-            _expand(lattice[made], columns, across, along, lines[made % _TAPS])
-            made += 1
-        w0, w1, w2, w3 = along[p, 0], along[p, 1], along[p, 2], along[p, 3]
-        l0, l1, l2, l3 = lines[r % _TAPS], lines[(r + 1) % _TAPS], lines[(r + 2) % _TAPS], lines[(r + 3) % _TAPS]
-        scale, cells = scaled[p], out[i]
-        for j in range(columns.size):
-            cells[j] = scale[j] * (w0 * l0[j] + w1 * l1[j] + w2 * l2[j] + w3 * l3[j])
-
-
-@jitable
-def _expand(line, columns, across, along, out):
-    """Interpolate a row of the lattice to the columns of the ground."""
-    for j in range(columns.size):
-        c, q = columns[j], across[j]
-        value = along[q, 0] * line[c] + along[q, 1] * line[c + 1]
-        out[j] = value + along[q, 2] * line[c + 2] + along[q, 3] * line[c + 3]

@@ -26,7 +26,6 @@ from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background, Spectrum
-from fifesim.ground.landscape import Coarser
 from fifesim.ground.landscape.autoregression import check_streaming_arp
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
 
@@ -47,9 +46,6 @@ class Field:
         Standard deviation. [1]
     arp : float, optional
         Autoregressive parameter of the field, in [0, 0.2498]. [1]
-    coarser : int, optional
-        Ground cells per lattice cell along each side. `arp` refers to lattice cells. With 4 and ground cells of 3.3 m,
-        the field varies over 27 m or more, and takes a tenth of the time. By default the lattice is the ground grid.
 
     Raises
     ------
@@ -68,7 +64,6 @@ class Field:
     mean: Annotated[float, Range("1", -1, 1)] = 0.0
     sd: Annotated[float, Range("1", 0, np.inf, note="it is a standard deviation", ends="[)")] = 0.0
     arp: float = 0.15
-    coarser: Coarser = 1
 
     def __post_init__(self):
         check_fields(self)

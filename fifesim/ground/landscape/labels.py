@@ -17,7 +17,6 @@ from fifesim.grids import cf, windows
 from fifesim.grids import chunks as chunking
 from fifesim.grids import grid as grids
 from fifesim.grids.classes import NO_CLASS, check_codes, numbers_of
-from fifesim.grids.directions import Directions
 from fifesim.grids.inputs import FileOrRaster
 from fifesim.grids.sites import is_fife, made_on_site, on_fife_site
 from fifesim.grids.source import open_source
@@ -28,7 +27,7 @@ from fifesim.ground.landscape import distribution
 from fifesim.ground.landscape.autoregression import FIELD_TILE, check_arp, streaming_field
 from fifesim.ground.landscape.classes import CoverClass, Field, class_table, fife_classes, read_table, table_text
 from fifesim.ground.landscape.cover import Patches, patch_classes
-from fifesim.ground.landscape.field_labels import drawn_fields
+from fifesim.ground.landscape.field_labels import drawn_field
 from fifesim.ground.landscape.lai_labels import lai_window
 from fifesim.ground.landscape.learned_labels import Landscape
 from fifesim.ground.terrain.elevation_labels import flint_hills
@@ -114,10 +113,7 @@ def landscape(
     crown_cover: GroundProperty | None = None,
     soil: GroundProperty | None = None,
     moisture: GroundProperty | None = None,
-    covary: Mapping[str, float] | None = None,
     dem: xr.DataArray | None = None,
-    reference: Mapping[str, xr.DataArray] | None = None,
-    geometry: Directions | None = None,
     seed: WholeNumber = 0,
     chunks: Chunks | None = None,
     allow_remote: bool = False,
@@ -125,8 +121,8 @@ def landscape(
     """
     Create a landscape: leaf area, land cover classes and other ground properties on one grid.
 
-    By default, leaf area is that of a landscape learned from Konza Prairie; ``cover``, ``classes``, ``lai``, ``arp`` or
-    ``covary`` replace it.
+    By default, leaf area is that of a landscape learned from Konza Prairie; ``cover``, ``classes``, ``lai`` or ``arp``
+    replace it.
 
     Parameters
     ----------
@@ -148,17 +144,10 @@ def landscape(
     brown, crown_cover, soil, moisture : float, Field, xarray.DataArray, str or path, optional
         Dead fraction of the leaf area, crown cover, soil brightness and soil moisture, as in `surface_reflectance`: a
         number, a `Field` for a random field, or a map. They replace the values of the classes. [1]
-    covary : dict of str to float, optional
-        Correlations of leaf area with ``elevation``, ``wetness``, ``illumination``, ``slope`` and random fields, such
-        as ``{"wetness": 0.5, "soil": -0.4}``. They refer to standard normal scores of the same cell. [1]
     dem : xarray.DataArray, dims (y, x), optional
-        Elevation on the grid, required if ``covary`` names a terrain property. A learned landscape follows it, and
-        that of `Landscape.around` if it extends so far; without it, by default the landscape follows `flint_hills` of
-        the same seed on the FIFE site, and lies on level ground elsewhere. [m]
-    reference : dict of str to xarray.DataArray, optional
-        Terrain properties of a larger area that contains the grid, as in `correlated_fields`.
-    geometry : Geometry, optional
-        Direction of the sun, required if ``covary`` names the illumination.
+        Elevation on the grid. A learned landscape follows it, and that of `Landscape.around` if it extends so far;
+        without it, by default the landscape follows `flint_hills` of the same seed on the FIFE site, and lies on level
+        ground elsewhere. [m]
     seed : int, optional
         Seed of the random fields, in [0, 2**63).
     chunks : mapping or int or "auto", optional
@@ -175,9 +164,8 @@ def landscape(
     Raises
     ------
     ValueError
-        If the grid, arp, seed, a class or its area fraction is invalid; correlations are impossible; a standard
-        deviation is too large; a map is invalid; or a class has no leaf area. A lazy map with a code without a class
-        raises when it is computed.
+        If the grid, arp, seed, a class or its area fraction is invalid; a standard deviation is too large; a map is
+        invalid; or a class has no leaf area. A lazy map with a code without a class raises when it is computed.
     TypeError
         If an argument has the wrong type.
 
@@ -208,7 +196,7 @@ def landscape(
     """
     grid = grids.check_grid(grid)
     seed = check_seed(seed)
-    others = {"cover": cover, "classes": classes, "lai": lai, "arp": arp, "covary": covary}
+    others = {"cover": cover, "classes": classes, "lai": lai, "arp": arp}
     others = [name for name, each in others.items() if each is not None]
     if learned is not None and others:
         raise ValueError(
@@ -217,8 +205,6 @@ def landscape(
     given = {"brown": brown, "crown_cover": crown_cover, "soil": soil, "moisture": moisture}
     given = {name: each.mean if isinstance(each, Field) and not each.sd else each for name, each in given.items()}
     drawn = {name: each for name, each in given.items() if isinstance(each, Field)}
-    if covary and lai is not None:
-        raise ValueError("covary cannot be used with a map of lai: remove one of them")
     variables = {
         name: _property(name, each, grid, chunks, allow_remote)
         for name, each in given.items()
@@ -230,15 +216,11 @@ def landscape(
     if classes is not None or cover is not None or (others and lai is None):
         table = class_table(_default_classes(cover) if classes is None else classes)
         variables["cover"] = _cover(grid, cover, table, seed, chunks, allow_remote)
-    by_class = bool(others) and lai is None
-    arps = [arp if each is None or each.arp is None else each.arp for each in (table if by_class else [None])]
-    scores, made = drawn_fields(
-        grid, drawn, covary, arps, dem=dem, geometry=geometry, seed=seed, reference=reference, chunks=chunks
-    )
+    made = {name: drawn_field(name, each, grid, seed, chunks) for name, each in drawn.items()}
     if not others:
         variables = _learned(grid, learned, dem, seed, chunks) | variables
-    elif by_class:
-        variables["lai"] = _lai(grid, variables["cover"], table, arp, seed, scores)
+    elif lai is None:
+        variables["lai"] = _lai(grid, variables["cover"], table, arp, seed)
     else:
         variables["lai"] = lai_window(lai, grid, chunks, allow_remote=allow_remote)
         if isinstance(lai, xr.DataArray) and is_fife(lai):
@@ -290,8 +272,8 @@ def _cover(grid, cover, table, seed, chunks, allow_remote):
     return cover_map(cover, grid, table, chunks, allow_remote=allow_remote)
 
 
-def _lai(grid, cover, table, arp, seed, scores):
-    """Leaf area of each class from its distribution and arp; from the scores by arp where it follows the ground."""
+def _lai(grid, cover, table, arp, seed):
+    """Leaf area of each class from its distribution and arp."""
     lacking = [each.name for each in table if each.lai is None]
     if lacking:
         raise ValueError(
@@ -307,12 +289,8 @@ def _lai(grid, cover, table, arp, seed, scores):
         streaming_field(seed, of_class, 0, 0, (0, 0))
     plain = cover.copy(deep=False)
     plain.attrs = {}
-    if scores:
-        kernel = partial(_leaf_area_of_scores, codes, tables, arps, tuple(scores))
-        lai = grids.place(chunking.pointwise(kernel, plain, *scores.values()), grid)
-    else:
-        kernel = partial(_leaf_area, codes, tables, arps, seed, grids.lattice_position(grid))
-        lai = grids.place(windows.located(kernel, plain, tile=FIELD_TILE), grid)
+    kernel = partial(_leaf_area, codes, tables, arps, seed, grids.lattice_position(grid))
+    lai = grids.place(windows.located(kernel, plain, tile=FIELD_TILE), grid)
     history = "\n".join([cover.attrs["history"], f"landscape: leaf area of {len(table)} classes, seed {seed}"])
     made = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": "by class"} | made_on_site(grid)
     return cf.label(lai, "lai", history=history, **made, method="streaming", references=_REFERENCE)
@@ -328,16 +306,10 @@ def _quantiles(lai):
 def _leaf_area(codes, tables, arps, seed, lattice, cover, starts):
     """Leaf area of a block of codes that begins at a row and column of the grid."""
     row, column = (first + start for first, start in zip(lattice, starts, strict=True))
-    return _of_fields(codes, tables, arps, cover, lambda arp: streaming_field(seed, arp, row, column, cover.shape))
 
+    def field_of(arp):
+        return streaming_field(seed, arp, row, column, cover.shape)
 
-def _leaf_area_of_scores(codes, tables, arps, scored, cover, *scores):
-    """Leaf area of cells from the standard normal scores of each arp."""
-    return _of_fields(codes, tables, arps, cover, dict(zip(scored, scores, strict=True)).__getitem__)
-
-
-def _of_fields(codes, tables, arps, cover, field_of):
-    """Leaf area of cells; ``field_of(arp)`` gives standard normal deviates, and is called only if needed."""
     numbers, present = numbers_of(cover, codes)
     varies = (tables[:-1, 0] != tables[:-1, -1]) & present[:-1]
     needed = list(dict.fromkeys(arp for arp, each in zip(arps, varies, strict=True) if each))

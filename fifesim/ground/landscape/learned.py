@@ -5,8 +5,7 @@ from scipy import special
 from scipy.interpolate import BSpline
 
 from fifesim.base.arrays import compiled, jitable
-from fifesim.ground.landscape.autoregression import white_noise
-from fifesim.ground.landscape.covariance import field_seed
+from fifesim.ground.landscape.autoregression import field_seed, white_noise
 
 PROBABILITIES = (0.005, *np.linspace(0.03, 0.97, 8).tolist(), 0.995)
 """Probabilities of the quantiles of a form of the land that are the nodes of its response."""

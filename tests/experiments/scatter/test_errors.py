@@ -27,7 +27,7 @@ def test_shares_add_up_and_ideal_stages_have_none(quantity):
     found = shares_of(BURNED, quantity)
     for kind in ("bias", "variance"):
         np.testing.assert_allclose(found[kind].sum("stage"), found[f"total_{kind}"], rtol=0, atol=1e-9)
-        ideal = ["noise", "topography", "soil", "dead leaves", "cover", "clumping", "covariance"]
+        ideal = ["noise", "topography", "soil", "dead leaves", "cover", "clumping"]
         assert (found[kind].sel(stage=ideal) == 0).all()
     assert list(found.stage.values) == list(ERROR_STAGES)
     assert found.bias.attrs["units"] in ("g m-2 d-1", "kg m-2 d-1")

@@ -20,8 +20,6 @@ ALL = {
         "cover": "voronoi",
         "size": 60.0,
         "deviations": {"soil": 0.04, "moisture": 0.1, "brown": 0.1, "crown_cover": 0.1},
-        "arps": {"soil": 0.24},
-        "covary": {"soil": -0.4},
     },
     "classes": {
         "grass": {"background_spectra": {"soil_dry": 0.5, "shade": 0.5}},
@@ -65,7 +63,6 @@ def ideal(everything):
         ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"hotspot": 0.1}, "b": {}}}, ("cover",)),
         ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"arp": 0.1}, "b": {}}}, ()),
         ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"crown_cover": 0.9}}}, ("clumping",)),
-        ({"landscape": {"deviations": {"soil": 0.02}, "covary": {"soil": 0.0}}}, ("soil",)),
         (ALL, tuple(IDEAL_PROPERTIES)),
     ],
     ids=str,
@@ -91,22 +88,6 @@ def test_ideal_property_is_uniform_and_the_rest_unchanged(ideal, whole):
     assert first.attrs["flag_meanings"] == whole["cover"].attrs["flag_meanings"] and (whole["cover"] == 2).any()
 
 
-def test_without_covariance_leaf_area_is_independent_of_the_soil(everything, ideal, whole):
-    """Other variables are unchanged; leaf area of each class equals a scene of this class alone."""
-    found = ideal("covariance")
-    for name in set(whole) - {"lai"}:
-        np.testing.assert_array_equal(found[name], whole[name], err_msg=name)
-    for code, treatment in ((1, "burned-grazed"), (2, "unburned-ungrazed")):
-        alone = fifesim.lai_scene(everything.geobox(), treatment, arp=0.15, seed=7)
-        cells = (whole["cover"] == code).values
-        np.testing.assert_array_equal(found["lai"].values[cells], alone.values[cells])
-    soil = whole["soil"].values.ravel()
-    with_soil, without = (np.corrcoef(each["lai"].values.ravel(), soil)[0, 1] for each in (whole, found))
-    # Leaf area is not Gaussian, so it keeps part of the correlation. Standard error with about 2,000 independent cells:
-    # 0.02.
-    assert with_soil < -0.2 and abs(without) < 0.1
-
-
 def test_missing_cover_stays_missing(tmp_path, everything):
     """A cell of unknown class does not get the first class."""
     codes = np.where(ground_scene(everything, everything.geobox())["cover"] == 1, 3, 0)
@@ -122,11 +103,11 @@ def test_missing_cover_stays_missing(tmp_path, everything):
 
 def test_pixels_with_an_ideal_property_equal_a_scenario_without_it():
     """With the same random numbers, the image equals the image of a scenario that omits the property."""
-    land = {"deviations": {"soil": 0.04}, "covary": {"soil": -0.4}}
+    land = {"deviations": {"soil": 0.04}}
     seen = pixels(case_of(landscape=land))
-    for (soil, goes), own in {(1, 1): land, (1, 0): {"deviations": {"soil": 0.04}}, (0, 0): {}}.items():
+    for soil, own in {1: land, 0: {}}.items():
         run = fifesim.simulate(case_of(landscape=own))
-        at = tuple({"soil": soil, "covariance": goes}.get(stage, 1) for stage in seen.stages)
+        at = tuple({"soil": soil}.get(stage, 1) for stage in seen.stages)
         ndvi, fpar = seen.ndvi[at], np.broadcast_to(seen.truth["fpar"], seen.ndvi.shape)[at]
         np.testing.assert_array_equal(ndvi, run["image"]["ndvi"].values.ravel(), err_msg=str(own))
         np.testing.assert_array_equal(fpar, run["truth"]["fpar"].values.ravel(), err_msg=str(own))

@@ -12,9 +12,9 @@ from fifesim.ground.landscape.autoregression import (
     LARGEST_STREAMING_ARP,
     _box_muller,
     autocorrelation,
+    field_seed,
     field_variance,
     margin,
-    mixed_field,
     periodic_field,
     philox,
     response,
@@ -252,13 +252,10 @@ def test_streaming_refuses_arps_and_lengths_with_too_large_a_margin():
         fifesim.ground.arp_for_length(1e6)
 
 
-def test_field_of_mixed_noise_equals_mixed_fields():
-    """The filter is linear; single precision rounds each field by 3e-7 rms."""
-    window = 0.15, FIELD_TILE - 20, -30, (50, 60)
-    one, other = (streaming_field(seed, *window) for seed in (7, 8))
-    found = mixed_field({7: 0.6, 8: -0.8}, *window)
-    np.testing.assert_allclose(found, 0.6 * one - 0.8 * other, rtol=0, atol=5e-6)
-    np.testing.assert_array_equal(mixed_field({7: 1.0}, *window), one)
+def test_each_name_and_seed_has_different_noise():
+    seeds = {field_seed(seed, name) for seed in (0, 1) for name in ("lai", "soil", "moisture", "brown")}
+    assert len(seeds) == 8
+    assert field_seed(2**63 - 1, "lai") == 2**63 - 1
 
 
 @pytest.mark.parametrize("arp", [0.0, 0.15, 0.24])

@@ -9,17 +9,18 @@ import rioxarray
 import xarray as xr
 from affine import Affine
 from elevations import write
-from lazy import ODD_CHUNKS, check_place, in_chunks, no_compute
+from lazy import ODD_CHUNKS, check_place, no_compute
 from odc.geo.geobox import GeoBox
 from scipy import stats
 
 import fifesim
 from fifesim.grids import cf
 from fifesim.grids import grid as grids
+from fifesim.ground.landscape.autoregression import field_seed, streaming_field
 from fifesim.ground.landscape.classes import CoverClass, Field, class_table
 from fifesim.ground.landscape.cover import Patches, patch_classes
 from fifesim.ground.landscape.distribution import quantile_map, quantile_table
-from fifesim.ground.landscape.field_labels import drawn_fields
+from fifesim.ground.landscape.field_labels import drawn_field
 from fifesim.ground.landscape.labels import classes_of, cover_map, drawn_cover
 
 DRAWN = {
@@ -27,7 +28,6 @@ DRAWN = {
     "brown": Field(mean=0.2, sd=0.1, arp=0.1),
     "crown_cover": Field(mean=0.7, sd=0.15),
 }
-COVARY = {"elevation": 0.3, "soil": -0.4, "brown": 0.2}
 CLASSES = {
     "grass": fifesim.CoverClass(lai="burned-grazed", arp=0.05),
     "wood": fifesim.CoverClass(lai="unburned-ungrazed", arp=0.2),
@@ -41,17 +41,12 @@ def grid():
 
 
 @pytest.fixture(scope="module")
-def hills(grid):
-    return fifesim.flint_hills(grid, seed=7)
-
-
-@pytest.fixture(scope="module")
-def make(grid, hills):
+def make(grid):
     """Function that makes the landscape of this file, or variants of it."""
 
-    def made(grid=grid, dem=hills, **changes):
-        options = {"cover": fifesim.ground.Patches("voronoi", 200), "classes": CLASSES, "covary": COVARY, "seed": 7}
-        return fifesim.landscape(grid, **options | DRAWN | {"dem": dem} | changes)
+    def made(grid=grid, **changes):
+        options = {"cover": fifesim.ground.Patches("voronoi", 200), "classes": CLASSES, "seed": 7}
+        return fifesim.landscape(grid, **options | DRAWN | changes)
 
     return made
 
@@ -61,12 +56,14 @@ def land(make):
     return make()
 
 
-def test_properties_are_mapped_from_correlated_fields(grid):
-    """Same bits as from `correlated_fields`."""
-    scores = fifesim.ground.correlated_fields(grid, {name: each.arp for name, each in DRAWN.items()}, seed=7)
-    made = drawn_fields(grid, DRAWN, None, (), seed=7)[1]
+def test_properties_are_mapped_from_fields_of_their_own_noise(grid):
+    made = {name: drawn_field(name, each, grid, seed=7) for name, each in DRAWN.items()}
+    scores = {
+        name: streaming_field(field_seed(7, name), DRAWN[name].arp, *grids.lattice_position(grid), tuple(grid.shape))
+        for name in ("soil", "brown")
+    }
     np.testing.assert_array_equal(made["soil"], scores["soil"] * DRAWN["soil"].sd)
-    brown = quantile_map(scores["brown"].values, quantile_table(DRAWN["brown"].distribution("brown")))
+    brown = quantile_map(scores["brown"], quantile_table(DRAWN["brown"].distribution("brown")))
     np.testing.assert_array_equal(made["brown"], brown)
     assert made["soil"].name == "soil" and made["soil"].attrs["arp"] == 0.2 and made["brown"].attrs["site"] == "FIFE"
     assert made["soil"].attrs["history"].endswith("soil: standard deviation 0.04")
@@ -83,40 +80,36 @@ def test_each_class_equals_a_landscape_of_this_class(land, make):
             np.testing.assert_array_equal(land[other], alone[other])
 
 
-def test_without_covariance_properties_do_not_change_leaf_area(grid, make):
-    plain = make(covary=None)
+def test_properties_do_not_change_leaf_area(grid, make):
+    plain = make()
     bare = fifesim.landscape(grid, cover=fifesim.ground.Patches("voronoi", 200), classes=CLASSES, seed=7)
     # The leaf area names the other variables that matter.
     del plain["lai"].attrs["landscape"]
     xr.testing.assert_identical(plain[["lai", "cover"]], bare)
-    fields, made = drawn_fields(grid, DRAWN, None, (0.15,), seed=7)
-    assert fields == {} and list(made) == list(DRAWN)
-    assert drawn_fields(grid, {}, None, (0.15,), seed=7) == ({}, {})
 
 
-def test_landscapes_have_the_same_bits_in_windows_and_chunks(grid, hills, land, make):
+def test_landscapes_have_the_same_bits_in_windows_and_chunks(grid, land, make):
     with no_compute():
-        lazy = make(dem=in_chunks(hills, {"y": 211, "x": 97}), chunks={"y": 211, "x": 97})
+        lazy = make(chunks={"y": 211, "x": 97})
     assert all(each.chunks is not None for each in lazy.data_vars.values())
     found = lazy.compute()
     for name in land:
         xr.testing.assert_identical(found[name], land[name])
-    part = make(grid[WINDOW], hills[WINDOW], reference={"elevation": hills})
-    lazy_hills = {"elevation": in_chunks(hills, {"y": 50})}
+    part = make(grid[WINDOW])
     with no_compute():
-        lazy_part = make(grid[WINDOW], hills[WINDOW], reference=lazy_hills, chunks=33)
+        lazy_part = make(grid[WINDOW], chunks=33)
     for name in land:
         np.testing.assert_array_equal(part[name], land[name][WINDOW], err_msg=name)
         np.testing.assert_array_equal(lazy_part[name], land[name][WINDOW], err_msg=name)
 
 
 def test_numbers_and_rasters_replace_fields(grid, make, land):
-    numbers = make(soil=-0.02, moisture=0.3, crown_cover=1, covary={"brown": 0.2})
+    numbers = make(soil=-0.02, moisture=0.3, crown_cover=1)
     for name, value in (("soil", -0.02), ("moisture", 0.3), ("crown_cover", 1.0)):
         assert numbers[name].ndim == 0 and numbers[name] == value
     np.testing.assert_array_equal(numbers["brown"], land["brown"])
     halved = (land["soil"] * 0.5).assign_attrs(units="1")
-    rasters = make(soil=halved, moisture=land["brown"].rename("moisture"), covary=None)
+    rasters = make(soil=halved, moisture=land["brown"].rename("moisture"))
     np.testing.assert_array_equal(rasters["soil"], halved)
     np.testing.assert_array_equal(rasters["moisture"], land["brown"])
     assert rasters["moisture"].attrs["long_name"] == "moisture of the soil"
@@ -127,11 +120,9 @@ def test_numbers_and_rasters_replace_fields(grid, make, land):
     [
         ({"brown": Field(mean=0.2, sd=0.5)}, ValueError, "brown lies between 0 and 1: with a mean of 0.2"),
         ({"moisture": Field(sd=0.1)}, ValueError, "moisture lies between 0 and 1"),
-        ({"soil": 0.02}, ValueError, "soil"),
-        ({"covary": {"soil": -0.9, "brown": 0.9}}, ValueError, "lai-soil -0.9, lai-brown 0.9 cannot be"),
-        ({"reference": {}}, ValueError, "reference has no 'elevation'"),
-        ({"soil": "none.tif", "covary": None}, ValueError, "cannot read none.tif as a raster"),
-        ({"moisture": 1.2, "covary": None}, ValueError, r"moisture must be in \[0, 1\], got 1.2"),
+        ({"covary": {"soil": -0.4}}, TypeError, "no argument 'covary': it was removed, a learned landscape follows"),
+        ({"soil": "none.tif"}, ValueError, "cannot read none.tif as a raster"),
+        ({"moisture": 1.2}, ValueError, r"moisture must be in \[0, 1\], got 1.2"),
         ({"moisture": [0.2]}, TypeError, "moisture must be a number, .*Field, the path of a raster or an xarray"),
     ],
 )
@@ -141,10 +132,8 @@ def test_impossible_properties_are_refused_with_a_short_message(make, changes, e
     assert len(str(caught.value)) <= 500
 
 
-def test_map_of_leaf_area_excludes_covary(make, land):
-    with pytest.raises(ValueError, match="covary cannot be used with a map of lai: remove one of them"):
-        make(lai=land["lai"])
-    mapped = make(lai=land["lai"], covary=None)
+def test_properties_vary_beside_a_map_of_leaf_area(make, land):
+    mapped = make(lai=land["lai"])
     np.testing.assert_array_equal(mapped["lai"], land["lai"])
     np.testing.assert_array_equal(mapped["brown"], land["brown"])
 
