@@ -55,16 +55,11 @@ moisture = 0.25
 [landscape]
 cover = "voronoi"
 size = 200.0
-coarser = 4
 [landscape.deviations]
 brown = 0.06
 crown_cover = 0.1
 soil = 0.03
 moisture = 0.08
-[landscape.covary]
-wetness = 0.4
-elevation = -0.2
-soil = -0.3
 [classes.burned-grazed]
 distribution = "burned-grazed"
 share = 0.6
@@ -189,7 +184,6 @@ def steps():
     ndvi, truth = image.fifesim.ndvi(), lai.fifesim.aggregate(30)
     fit = fifesim.regress(truth, ndvi)
     thick = fifesim.Atmosphere(aerosol="urban", visibility=8, engine="successive-orders")
-    coarse = fifesim.fife_site(30, window=((0, 27), (0, 27)))
     away = {"nadir_offset": -60e3, "heading": 193.6}
     view = fifesim.sensor.scan_geometry("TM", lai.odc.geobox, **away).assign(sza=28.5, saa=117.0)
     swath = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=view).fifesim.to_toa()
@@ -225,7 +219,6 @@ def steps():
         "as_seen_by": rho.fifesim.as_seen_by("OLI", bands=["OLI4", "OLI5"]),
         "sense_swath": swath.fifesim.sense_swath("TM", **away),
         "season": growing.fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().fifesim.sense(),
-        "fields": xr.Dataset(fifesim.ground.correlated_fields(coarse, {"soil": 0.24, "brown": 0.1}, seed=7)),
         "compare": fifesim.compare(lai, ["TM", "OLI"]),
     }
     return {key: value for name, result in found.items() for key, value in of_result(name, result).items()}
@@ -263,12 +256,12 @@ def landscapes():
     """A landscape of classes and drawn fields, through the chain."""
     _, dem, _ = ground()
     fields = {
-        "soil": fifesim.ground.Field(sd=0.03, arp=0.05, coarser=4),
-        "brown": fifesim.ground.Field(mean=0.15, sd=0.06, arp=0.05, coarser=4),
-        "moisture": fifesim.ground.Field(mean=0.25, sd=0.08, arp=0.242, coarser=4),
+        "soil": fifesim.ground.Field(sd=0.03, arp=0.05),
+        "brown": fifesim.ground.Field(mean=0.15, sd=0.06, arp=0.05),
+        "moisture": fifesim.ground.Field(mean=0.25, sd=0.08, arp=0.242),
     }
-    patches, covary = fifesim.ground.Patches("voronoi", size=200), {"wetness": 0.4, "soil": -0.3}
-    land = fifesim.landscape(dem.odc.geobox, cover=patches, **fields, covary=covary, dem=dem, seed=7)
+    patches = fifesim.ground.Patches("voronoi", size=200)
+    land = fifesim.landscape(dem.odc.geobox, cover=patches, **fields, seed=7)
     rho = land.fifesim.surface_reflectance("MSI", bands=["MSI4", "MSI8"], dem=dem)
     found = of_result("landscape", land) | of_result("landscape, truth", land.fifesim.aggregate(30))
     found |= of_result("landscape, fpar", land.fifesim.fpar())

@@ -21,7 +21,7 @@ from timing import in_turn
 
 import fifesim
 from fifesim.atmosphere.labels import diffuse_fraction
-from fifesim.ground.landscape.autoregression import autocorrelation, field_variance, response
+from fifesim.ground.landscape.autoregression import autocorrelation, field_variance, response, streaming_field
 
 ARP = 0.15
 RESPONSES = tuple(band.response for band in fifesim.instrument("TM").select(BANDS))
@@ -51,7 +51,7 @@ class Work(NamedTuple):
 
 def ours_field(side):
     grid = grid_of(side)
-    return lambda: fifesim.ground.correlated_fields(grid, {"lai": ARP}, seed=next(SEEDS))["lai"].values
+    return lambda: streaming_field(next(SEEDS), ARP, 0, 0, tuple(grid.shape))
 
 
 def covariance_error(field, model):

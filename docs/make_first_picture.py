@@ -165,7 +165,7 @@ def _scatter(axis, found):
 def _bars(axis, shares):
     """Shares of the variance of leaf area, of stages that are not ideal."""
     percent = 100 * shares[shares != 0].to_series().sort_values()
-    ground = ("soil", "dead leaves", "cover", "covariance")
+    ground = ("soil", "dead leaves", "cover")
     sensor = ("registration", "point spread", "quantisation")
     for names, color, label in (
         (ground, "#8c6d31", "ground"),

@@ -29,7 +29,6 @@ CAUSES = {
         "dead leaves",
         "cover",
         "clumping",
-        "covariance",
     ),
     "+ blur, noise, digital numbers": ("point spread", "noise", "quantisation"),
     "+ geolocation error": ("registration",),
@@ -46,7 +45,6 @@ ROWS = {
     "curved relation between LAI and NDVI": (CURVATURE,),
     "terrain": ("topography",),
     "atmosphere": ("atmosphere",),
-    "correlation of LAI with soil and terrain": ("covariance",),
 }
 
 

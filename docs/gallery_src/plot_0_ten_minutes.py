@@ -11,15 +11,12 @@ import matplotlib.pyplot as plt
 import fifesim
 
 # %%
-# **1. Create the ground.** The scene covers 3 km x 3 km of the FIFE site in Kansas with cells of 3.33 m. Three
-# grassland treatments are laid out as pastures on synthetic hills, and leaf area is higher in the valleys. ``land`` is
-# a Dataset.
+# **1. Create the ground.** The scene covers 3 km x 3 km of the FIFE site in Kansas with cells of 3.33 m. Leaf
+# area is learned from a map of Konza Prairie and follows synthetic hills. ``land`` is a Dataset.
 
 grid = fifesim.fife_site(cell=30 / 9, window=((1800, 2700), (900, 1800)))
 dem = fifesim.flint_hills(grid, seed=7)
-land = fifesim.landscape(
-    grid, soil=fifesim.ground.Field(sd=0.03, arp=0.24), covary={"wetness": 0.5}, dem=dem, seed=7
-)
+land = fifesim.landscape(grid, soil=fifesim.ground.Field(sd=0.03, arp=0.24), dem=dem, seed=7)
 land.lai.fifesim.plot()
 print(land)
 

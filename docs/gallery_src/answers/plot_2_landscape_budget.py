@@ -24,7 +24,7 @@ table = pd.read_csv(
 )
 table = table[table["variable"] == "lai"].set_index(["instrument", "stage"])
 instruments = list(dict.fromkeys(table.index.get_level_values("instrument")))
-GROUND = ["soil", "dead leaves", "cover", "covariance"]
+GROUND = ["soil", "dead leaves", "cover"]
 SENSOR = ["registration", "point spread", "noise", "quantisation"]
 OTHERS = ["topography", "atmosphere", "NDVI scaling", "non-linearity", "curvature"]
 stages = [*GROUND, *SENSOR, *OTHERS]
@@ -99,7 +99,5 @@ sentences = [
     f"and treatment-dependent leaves and litter {percent('cover')};",
     f"the stated geolocation error of the product contributes {percent('registration')},",
     f"and the point spread {percent('point spread')}.",
-    "The correlation of leaf area with wetness and dark soil changes the total by",
-    f"{percent('covariance')}, because leaf area then varies more between pixels.",
 ]
 print(textwrap.fill(" ".join(sentences), 90))

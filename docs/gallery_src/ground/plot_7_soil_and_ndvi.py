@@ -61,7 +61,9 @@ axes[1].annotate("dots: brightest or wettest soil", (0.2, 0.04), fontsize=9)
 
 grid = fifesim.fife_site(cell=30 / 9, window=((0, 900), (0, 900)))
 lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.24, seed=7)
-score = fifesim.ground.correlated_fields(grid, {"soil": 0.24}, seed=7)["soil"]
+score = fifesim.landscape(
+    grid, lai=lai, soil=fifesim.ground.Field(sd=1.0, arp=0.24), seed=7
+).soil
 truth = lai.fifesim.aggregate(30)
 
 
