@@ -23,7 +23,8 @@ from fifesim.retrieval.description import FORMAT, RETRIEVED, Retrieval
 from fifesim.retrieval.inversion import DRAWN_STATES
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.ensemble import uniform_reflectance
-from fifesim.scenario.keys import VARYING
+from fifesim.scenario.keys import STAND, VARYING
+from fifesim.scenario.scenario import parse_scenario, put, values_of
 from fifesim.scenario.simulation import setup_of
 from fifesim.scenario.studies import Study, parse_study, read_study
 
@@ -186,7 +187,10 @@ def _study(source, landscape):
     study = source if isinstance(source, Study) else read_study(source)
     if landscape is None:
         return study
-    return replace(study, scenario=study.scenario.replace(**{"landscape.learned": str(landscape)}))
+    values = values_of(study.scenario)
+    values["ground"] = {key: value for key, value in values.get("ground", {}).items() if key not in STAND}
+    put(values, ("landscape", "learned"), str(landscape))
+    return replace(study, scenario=parse_scenario(values))
 
 
 def _check(names, levels):

@@ -67,7 +67,7 @@ class Residual(_Part, frozen=True):
     height: Annotated[float, Field(ge=0)] = 0.0
 
 
-class Property(_Part, frozen=True):
+class DeclaredProperty(_Part, frozen=True):
     """Property of the ground that varies with leaf area, forms of the land and fields of its own."""
 
     mean: float
@@ -112,7 +112,7 @@ class Described(_Part, frozen=True):
     explained: float = 0.0
     scores: _Numbers
     lai: _Numbers
-    properties: dict[Literal["soil", "brown", "moisture"], Property] = {}
+    properties: dict[Literal["soil", "brown", "moisture"], DeclaredProperty] = {}
 
     @model_validator(mode="after")
     def _check(self):

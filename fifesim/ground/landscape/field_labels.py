@@ -14,18 +14,22 @@ from fifesim.ground.landscape.distribution import quantile_map, quantile_table
 
 def drawn_field(name, given, grid, seed=0, chunks=None):
     """Property that varies as a random field of its own noise, dims (y, x)."""
-    kernel = partial(_cells, field_seed(seed, name), given.arp, grids.lattice_position(grid), values_of(name, given))
+    kernel = partial(
+        _cells, field_seed(seed, name), given.arp, grids.lattice_position(grid), property_values(name, given)
+    )
     # Chunks and the field are checked before anything lazy is built.
     kernel(0, 0, (0, 0))
     field = windows.tiles(kernel, grid, chunks, tile=FIELD_TILE)
-    return labelled(name, given, field).assign_attrs(arp=float(given.arp), rng_seed=str(seed), **made_on_site(grid))
+    return labelled_property(name, given, field).assign_attrs(
+        arp=float(given.arp), rng_seed=str(seed), **made_on_site(grid)
+    )
 
 
 def _cells(seed, arp, lattice, values, row, column, shape):
     return values(streaming_field(seed, arp, lattice[0] + row, lattice[1] + column, shape))
 
 
-def values_of(name, given):
+def property_values(name, given):
     """Function that maps standard normal scores to a property in place."""
     if name in SHARES:
         return partial(_share, quantile_table(given.distribution(name)))
@@ -43,7 +47,7 @@ def _normal(mean, deviation, scores):
     return scores
 
 
-def labelled(name, given, values):
+def labelled_property(name, given, values):
     """Raster of a property that varies as a random field."""
     spread = "by quantiles" if name in SHARES else f"standard deviation {given.sd:g}"
     return cf.label(values, name, source=values, history=f"{name}: {spread}")

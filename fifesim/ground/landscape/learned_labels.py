@@ -30,7 +30,7 @@ from fifesim.ground.landscape.description import Described
 from fifesim.ground.landscape.distribution import quantile_deviates
 from fifesim.ground.landscape.downscaling import Marginal, SplineFields, densities_of_means
 from fifesim.ground.landscape.downscaling_labels import CellModel, FieldReads, cells_within, field_grid, pixel_reads
-from fifesim.ground.landscape.field_labels import labelled, values_of
+from fifesim.ground.landscape.field_labels import labelled_property, property_values
 from fifesim.ground.landscape.learned import (
     leaf_area,
     property_response,
@@ -39,7 +39,7 @@ from fifesim.ground.landscape.learned import (
     terrain_response,
     variance_kept,
 )
-from fifesim.ground.terrain.forms import COARSE, between_squares, land_forms, reach, square_sums
+from fifesim.ground.terrain.forms import COARSE, between_squares, forms_reach, land_forms, square_sums
 
 # Maximum size of a file. [byte]
 _LARGEST = 2**20
@@ -81,7 +81,7 @@ class Landscape(Described, frozen=True):
         Share of the variance of scores that the terrain explains in squares that were left out. [1]
     scores, lai : tuple of float
         Nodes of the function from scores to leaf area. [1], [m2 m-2]
-    properties : dict of str to Property
+    properties : dict of str to DeclaredProperty
         Soil brightness, dead fraction and moisture by the names of `fifesim.landscape`: a map of leaf area does not
         teach them, so that they are declared.
 
@@ -271,7 +271,7 @@ class Landscape(Described, frozen=True):
             attributes["landscape"] = ", ".join(name for name, _ in described)
         land = {"lai": cf.label(made[0], "lai", history=history, source=source, method=method, **attributes)}
         for (name, each), values in zip(described, made[1:], strict=True):
-            land[name] = labelled(name, each.field, values).assign_attrs(rng_seed=str(seed), comment=each.note)
+            land[name] = labelled_property(name, each.field, values).assign_attrs(rng_seed=str(seed), comment=each.note)
         return xr.Dataset(land, attrs=made_on_site(grid))
 
     def around(self, grid: GeoBox) -> GeoBox:
@@ -297,7 +297,7 @@ class Landscape(Described, frozen=True):
         """
         cell = grids.cell_size(grids.check_grid(grid))[0]
         ratio = max(1, round(self.cell / cell))
-        return grid.pad((reach(ratio * cell) + COARSE) * ratio)
+        return grid.pad((forms_reach(ratio * cell) + COARSE) * ratio)
 
     def _share_beyond(self, dem, cell):
         """Share of a sample of cells outside of the learned range of elevation or slope."""
@@ -407,7 +407,7 @@ class _Cells(NamedTuple):
     @property
     def margin(self):
         """Nodes around a node on which its forms depend."""
-        return reach(self.ratio * self.cell)
+        return forms_reach(self.ratio * self.cell)
 
     def begin(self, at):
         """First cell on the lattice of the window that a cell reads, which begins with a whole square of the forms."""
@@ -465,7 +465,7 @@ def _simulated(cells, rows, columns, ground=None):
         out[0, strip] = cells.mapped(found)
         for k, (name, field) in enumerate(properties):
             score = property_scores(landscape, name, *place, cells.seed, found - mean, responses[k], cells.cell)
-            out[k + 1, strip] = values_of(name, field)(score)
+            out[k + 1, strip] = property_values(name, field)(score)
     return out
 
 

@@ -33,7 +33,7 @@ FORMS = {
 """Units of the forms; numbers in names are metres of the scale or radius."""
 
 
-def reach(cell):
+def forms_reach(cell):
     """Number of cells, a multiple of `COARSE`, beyond which elevation matters neither for forms nor between cells."""
     return COARSE * int(np.ceil((_TRUNCATE * SCALES[-1] / cell + 10) / COARSE))
 

@@ -30,7 +30,7 @@ ALL["classes"]["litter"]["leaf_angles"] = "planophile"
 
 
 def case_of(**sections):
-    return parse_scenario(FLAT | sections)
+    return parse_scenario(FLAT | sections | {"ground": {"arp": 0.15} | sections.get("ground", {})})
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import fifesim
 from fifesim.grids import grid as grids
 from fifesim.ground.landscape import learning
 from fifesim.ground.landscape.learned import bench_noise, spline_noise, variance_kept
-from fifesim.ground.terrain.forms import COARSE, land_forms, reach
+from fifesim.ground.terrain.forms import COARSE, forms_reach, land_forms
 
 GRID = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 900.0, 600.0, 10.0)
 KONZA = fifesim.ground.Landscape.read("konza")
@@ -111,7 +111,7 @@ def test_a_hollow_is_convergent_and_low():
 
 def test_forms_depend_on_elevation_within_reach_only():
     ground = np.random.default_rng(0).normal(400.0, 5.0, (260, 262))
-    margin, start = reach(10.0), 2 * COARSE
+    margin, start = forms_reach(10.0), 2 * COARSE
     whole, part = land_forms(ground, 10.0), land_forms(ground[start:-9, start:-10], 10.0, margin)
     inner = slice(start + margin, -9 - margin), slice(start + margin, -10 - margin)
     for name, each in part.items():
