@@ -135,7 +135,7 @@ def budget(
     >>> scenario = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
     >>> shares = fifesim.budget(scenario, realisations=1, cells=90)
     >>> round(float(shares["total"].sel(variable="lai").mean()), 2)
-    0.24
+    0.14
     >>> errors = fifesim.budget(scenario, quantity="gpp", realisations=1, cells=90)
     >>> bool(errors["bias"].sel(stage="scaling") > 0.9 * errors["total_bias"])
     True

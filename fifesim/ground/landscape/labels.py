@@ -188,9 +188,9 @@ def landscape(
     --------
     >>> import fifesim
     >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
-    >>> land = fifesim.landscape(grid, soil=fifesim.ground.Field(sd=0.03, arp=0.24), seed=7)
+    >>> land = fifesim.landscape(grid, seed=7)
     >>> sorted(land.data_vars)
-    ['cover', 'lai', 'soil']
+    ['brown', 'lai', 'moisture', 'soil']
     >>> land.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).dims
     ('band', 'y', 'x')
     """
