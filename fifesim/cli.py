@@ -3,6 +3,7 @@
 import os
 import time
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import typer
@@ -242,8 +243,13 @@ def budget_command(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first scene; by default from the scenario.")] = None,
     sensor: Annotated[
-        str | None, typer.Option(help="Instrument over level ground, instead of a scenario file.")
+        str | None, typer.Option(help="Instrument over level ground, or of the raster of --like.")
     ] = None,
+    like: Annotated[
+        Path | None, typer.Option(help="Raster file of LAI or NDVI from which the ground is learned.")
+    ] = None,
+    dem: Annotated[Path | None, typer.Option(help="Elevation file that covers the raster of --like.")] = None,
+    when: Annotated[str | None, typer.Option("--time", help="Its time, such as 2022-06-03T17:15Z.")] = None,
     paper: _Paper = False,
     overwrite: _Overwrite = False,
     allow_remote: _AllowRemote = False,
@@ -253,17 +259,23 @@ def budget_command(
     """Attribute the scatter of LAI and FPAR to stages. Writes budget.csv, budget.png, report.html, scenario.toml."""
     start = time.monotonic()
     _check_spelling(scenario)
-    if sensor and (scenario or paper):
-        raise ValueError("--sensor cannot be combined with a scenario file or --paper: give one of them")
+    if (sensor or like) and (scenario or paper):
+        raise ValueError("--sensor and --like cannot be combined with a scenario file or --paper: give one of them")
+    if (dem or when) and not like:
+        raise ValueError("--dem and --time belong to --like: give the raster from which the ground is learned")
 
     with importing():
         from fifesim.experiments.scatter.report import budget_to_folder
-        from fifesim.experiments.scatter.shares import instrument_scenario, window_cells
+        from fifesim.experiments.scatter.shares import instrument_scenario, scenario_like, window_cells
 
-    found = instrument_scenario(sensor) if sensor else _scenario(scenario, paper)
-    if cells is None:
-        cells = window_cells(found) if sensor else 333
-    files = budget_to_folder(found, output, realisations=realisations, cells=cells, seed=seed, overwrite=overwrite)
+    with TemporaryDirectory() as folder:
+        if like:
+            found = scenario_like(like, dem, file=Path(folder) / "landscape.json", instrument=sensor, time=when)
+        else:
+            found = instrument_scenario(sensor) if sensor else _scenario(scenario, paper)
+        if cells is None:
+            cells = window_cells(found) if sensor else 333
+        files = budget_to_folder(found, output, realisations=realisations, cells=cells, seed=seed, overwrite=overwrite)
     report(files, time.monotonic() - start, f"{output / 'report.html'} in a browser")
 
 

@@ -2,5 +2,6 @@
 
 # Files and runs
 from .explorer import explore as explore
+from .scatter.shares import scenario_like as scenario_like
 from .scatter.study_indices import sensitivity as sensitivity
 from .verification import verify as verify

@@ -1,5 +1,6 @@
 """Bar chart, HTML page and folder of a scatter budget."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -134,6 +135,7 @@ def _drift(scenario, run):
     return (min(int(length / interval), int(length / size)) - 0.5) * abs(interval - size)
 
 
+_LANDSCAPE = "landscape.json"
 BUDGET_FILES = ("budget.csv", "budget.png", "report.html", "scenario.toml")
 
 _DPI = 200
@@ -146,7 +148,14 @@ def budget_to_folder(scenario, folder, *, realisations=20, cells=333, seed=None,
     complete = (default_scenario() if scenario is None else scenario).complete()
     check_memory_of_cells(min(cells, *complete.geobox().shape))
     options = {"realisations": realisations, "cells": cells, "seed": seed}
-    with results(folder, BUDGET_FILES, overwrite=overwrite) as partial:
+    shown, names = complete, BUDGET_FILES
+    if "learned" in complete.landscape.files:
+        # The folder has a copy, which its scenario reads.
+        shown = complete.model_copy(update={"landscape": complete.landscape.with_paths(lambda path: _LANDSCAPE)})
+        names = (*names, _LANDSCAPE)
+    with results(folder, names, overwrite=overwrite) as partial:
+        if shown is not complete:
+            shutil.copyfile(complete.learned, partial / _LANDSCAPE)
         found = scatter.budget(complete, **options)
         table = scatter.budget_table(found)
         rows, columns = (min(cells, size) for size in complete.geobox().shape)
@@ -158,5 +167,5 @@ def budget_to_folder(scenario, folder, *, realisations=20, cells=333, seed=None,
         ends = scatter.total_range(complete, **options, each=iter)
         page = budget_page(complete, found, table, chart, run, ends)
         (partial / "report.html").write_text(page, encoding="utf-8")
-        (partial / "scenario.toml").write_text(write_scenario(complete), encoding="utf-8")
-    return [folder / name for name in BUDGET_FILES]
+        (partial / "scenario.toml").write_text(write_scenario(shown), encoding="utf-8")
+    return [folder / name for name in names]

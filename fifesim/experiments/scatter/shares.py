@@ -5,17 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
+import rioxarray
 import xarray as xr
 from odc.geo.geobox import GeoBox
+from scipy import ndimage
 
 from fifesim.analysis.scaling import by_itself, shapley, taken_away
-from fifesim.base.arguments import Kind, WholeNumber
+from fifesim.base.arguments import FilePath, Kind, WholeNumber
+from fifesim.base.geometry import sun_geometry
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import warn
+from fifesim.chain.landscape_learning import learn_landscape
 from fifesim.experiments.scatter.errors import (
     QuantityOrFunction,
     check_retrieval,
@@ -25,7 +29,11 @@ from fifesim.experiments.scatter.errors import (
 )
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
 from fifesim.grids import grid as grids
+from fifesim.grids import projection
+from fifesim.grids.inputs import FileOrRaster
 from fifesim.grids.opening import raster_file
+from fifesim.grids.source import open_source
+from fifesim.grids.warp import onto_grid
 from fifesim.models.weather import Weather
 from fifesim.output.progress import steps
 from fifesim.retrieval.description import Retrieval
@@ -132,10 +140,12 @@ def budget(
     Examples
     --------
     >>> import fifesim
-    >>> scenario = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
+    >>> scenario = fifesim.Scenario(
+    ...     grid={"width": 300, "height": 300}, ground={"arp": 0.15}, terrain={"dem": "flat"}
+    ... )
     >>> shares = fifesim.budget(scenario, realisations=1, cells=90)
     >>> round(float(shares["total"].sel(variable="lai").mean()), 2)
-    0.14
+    0.24
     >>> errors = fifesim.budget(scenario, quantity="gpp", realisations=1, cells=90)
     >>> bool(errors["bias"].sel(stage="scaling") > 0.9 * errors["total_bias"])
     True
@@ -342,6 +352,114 @@ def instrument_scenario(name, *, arp=0.15, response=None):
     sensor = {"instrument": name, "bands": [band.name for band in bands], "noise": noise, "offset": [shift, shift]}
     sensor |= {} if response is None else {"response": response}
     return Scenario(sensor=sensor, ground={"arp": arp}, terrain={"dem": "flat"})
+
+
+# Largest ground cell of a scenario for an image. [m]
+_CELL = 10 / 3
+
+
+def scenario_like(
+    image: FileOrRaster,
+    dem: FilePath | None = None,
+    *,
+    file: FilePath,
+    quantity: Literal["lai", "ndvi"] | None = None,
+    instrument: str | None = None,
+    time: str | None = None,
+) -> Scenario:
+    """
+    Scenario whose ground is a landscape learned from an image, on the terrain of the image.
+
+    Parameters
+    ----------
+    image : str, path or xarray.DataArray
+        Map of leaf area or NDVI of the ground as in `fifesim.learn_landscape`, in a projected CRS.
+    dem : str or path, optional
+        Elevation file that covers the image; level ground by default.
+    file : str or path
+        JSON file to which the landscape is written; the scenario reads it.
+    quantity : {"lai", "ndvi"}, optional
+        Quantity of the image; by default its name, or that of its file.
+    instrument : str, optional
+        Instrument of the image and of the scenario, with its blur, noise and geolocation error; required for NDVI. By
+        default the scenario has TM, and cells of the image are means of the ground.
+    time : str, optional
+        Date and time of the image, UTC unless it has an offset; required for NDVI and outside of the FIFE site.
+
+    Returns
+    -------
+    scenario : Scenario
+        For `fifesim.budget` and `fifesim.simulate`. It covers the image, or the largest square in which the elevation
+        is known.
+
+    Raises
+    ------
+    ValueError
+        As in `fifesim.learn_landscape`; if NDVI has no time, or the place needs one.
+
+    See Also
+    --------
+    fifesim.learn_landscape, fifesim.budget
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(10.0, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.landscape(grid, seed=1)["lai"]  # stands for your map
+    >>> scenario = fifesim.experiments.scenario_like(lai, file=Path(mkdtemp()) / "mine.json")
+    >>> scenario.geobox().shape, scenario.terrain.dem
+    (Shape2d(x=270, y=270), 'flat')
+    """
+    cells = image if isinstance(image, xr.DataArray) else _map_of(image)
+    grid, seen = grids.geobox(cells), instrument_scenario(instrument or "TM")
+    longitude, latitude = projection.middle(grid)
+    if instrument is not None and time is None:
+        raise ValueError("the image of an instrument needs its time: type for instance time='2022-06-03T17:15Z'")
+    geometry = None if time is None else sun_geometry(time, latitude, longitude)
+    source = f"{cells.name or 'a map'}, {time}" if time else str(cells.name or "a map")
+    own = {"quantity": quantity, "instrument": instrument, "geometry": geometry, "source": source}
+    learn_landscape(cells, dem, **own).save(file)
+    heights = None if dem is None else onto_grid(open_source(dem, "dem"), grid)
+    pixel, box = seen.sensor.size, _known_part(grid, heights).boundingbox
+    west, north = math.ceil(box.left / pixel) * pixel, math.floor(box.top / pixel) * pixel
+    width, height = ((math.floor(end / pixel) * pixel) for end in (box.right - west, north - box.bottom))
+    ground = {"crs": grid.crs.to_wkt(), "west": west, "north": north, "width": width, "height": height}
+    keys = {"grid": ground | {"cell": min(_CELL, pixel / 3)}, "sensor": seen.sensor.model_dump(exclude_unset=True)}
+    keys |= {"landscape": {"learned": str(file)}, "geometry": {} if time is None else {"time": time}}
+    keys["terrain"] = {"dem": "flat" if dem is None else str(dem)}
+    if heights is not None:
+        keys["atmosphere"] = {"altitude": round(max(float(heights.mean()) / 1000, 0.0), 3)}
+    return Scenario(**keys)
+
+
+# Cells of a map around a part with known elevation, so that its spline is known too.
+_MARGIN = 4
+
+
+def _known_part(grid, heights):
+    """Largest square of a grid with known elevation; the whole grid if all of it is known."""
+    if heights is None or bool(heights.notnull().all()):
+        return grid
+    known = np.pad(np.isfinite(heights.values), 1)
+    far = ndimage.distance_transform_cdt(known, "chessboard")[1:-1, 1:-1]
+    (row, column), half = np.unravel_index(far.argmax(), far.shape), max(int(far.max()) - 1 - _MARGIN, 0)
+    return grid[row - half : row + half + 1, column - half : column + half + 1]
+
+
+def _map_of(path):
+    """Map of a raster file in a projected CRS, named after the file."""
+    cells = rioxarray.open_rasterio(path, masked=True, mask_and_scale=True)
+    if cells.sizes["band"] > 1:
+        raise ValueError(f"{Path(path).name} has {cells.sizes['band']} bands: give a file with LAI or NDVI alone")
+    cells = cells.squeeze("band", drop=True).rename(Path(path).stem)
+    if not cells.rio.crs or cells.rio.crs.is_projected:
+        return cells
+    # Nearest cells, because interpolation would blur the map once more.
+    crs = cells.rio.estimate_utm_crs()
+    size = np.sqrt(np.prod(np.abs(cells.rio.reproject(crs).rio.resolution())))
+    return cells.rio.reproject(crs, resolution=float(f"{size:.1g}"), nodata=np.nan)
 
 
 def window_cells(scenario):
