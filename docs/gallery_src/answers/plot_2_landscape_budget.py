@@ -64,13 +64,13 @@ axis.legend(frameon=False, loc="lower right")
 # sphinx_gallery_end_ignore
 
 # %%
-# *Covariance* is the correlation of leaf area with terrain and soil. *Curvature* remains with all stages ideal. For
-# MODIS, most shares are close to zero. The values for the ground and the instrument:
+# *Curvature* remains with all stages ideal. For MODIS, most shares are close to zero. The values for the ground and the
+# instrument:
 
 for instrument in instruments:
     shares = 100 * table.loc[instrument]["share"]
     errors = 100 * table.loc[instrument]["share_error"]
-    ground, sensor = shares[GROUND[:3]].sum(), shares[SENSOR].sum()
+    ground, sensor = shares[GROUND].sum(), shares[SENSOR].sum()
     shown = shares.round(1) + 0.0  # no -0.0
     listed = ", ".join(f"{stage} {shown[stage]:.1f} ± {errors[stage]:.1f}" for stage in GROUND)
     print(f"{instrument}: {listed} % of the variance.")
