@@ -27,8 +27,18 @@ _ELSEWHERE = {
 }  # fmt: skip
 
 
+# Removed names of arguments and keys, and what replaces them.
+_REMOVED = {
+    "covary": "it was removed, a learned landscape follows the terrain: remove covary, and give learned. ",
+    "coarser": "it was removed: remove coarser, and give a larger arp. ",
+    "arps": "it was removed: remove arps, fields have the arp of [ground]. ",
+}
+
+
 def closest(value, allowed):
     """Name that a misspelt or foreign one probably stands for, ignoring case; empty if none is close."""
+    if str(value) in _REMOVED:
+        return ""
     names = {str(name).lower(): str(name) for name in allowed}
     typed = str(value).lower().replace("_", "")
     known = next((name for name, others in _ELSEWHERE.items() if typed in others.split()), "")
@@ -38,20 +48,10 @@ def closest(value, allowed):
     return next((names[found] for found in get_close_matches(str(value).lower(), names, n=1)), "")
 
 
-# Removed names of arguments and keys, and what replaces them.
-_REMOVED = {
-    "covary": "it was removed, a learned landscape follows the terrain: remove covary, and give learned. ",
-    "coarser": "it was removed: remove coarser, and give a larger arp. ",
-    "arps": "it was removed: remove arps, fields have the arp of [ground]. ",
-}
-
-
 def nearest(value, allowed):
     """Beginning of a message that suggests the nearest allowed name; empty if none is near."""
-    if str(value) in _REMOVED:
-        return _REMOVED[str(value)]
     near = closest(value, allowed)
-    return f"did you mean {near!r}? " if near else ""
+    return f"did you mean {near!r}? " if near else _REMOVED.get(str(value), "")
 
 
 def unknown_argument(name, signature, options):
