@@ -72,7 +72,7 @@ def draw(dn, ndvi, truth, cells_shown):
     )
     land.plot([0.5, 2.5], [0.42, 0.42], color="white", linewidth=3)
     land.text(1.5, 0.55, "2 km", color="white", ha="center", fontsize=13, weight="bold")
-    drawn = cells.imshow(cells_shown, cmap="YlGn", vmin=0, vmax=2.4, interpolation="nearest")
+    drawn = cells.imshow(cells_shown, cmap="YlGn", vmin=0, vmax=4, interpolation="nearest")
     pixels.imshow(image_map(_part(dn), "", stretch).pixels, interpolation="nearest")
     _titles(
         land,
@@ -82,7 +82,7 @@ def draw(dn, ndvi, truth, cells_shown):
         f"Landsat pixels of {pixel:g} m",
     )
     beside = figure.add_axes((0.65, 0.545, 0.006, 0.38))
-    figure.colorbar(drawn, cax=beside, ticks=[0, 1, 2]).ax.tick_params(labelsize=11, length=0)
+    figure.colorbar(drawn, cax=beside, ticks=[0, 2, 4]).ax.tick_params(labelsize=11, length=0)
     for side, (axis, height) in zip((1, 0), ((cells, 1), (pixels, 0)), strict=True):
         start = corner[0] + SIDE / 1000, corner[1] + side * SIDE / 1000
         line = {
