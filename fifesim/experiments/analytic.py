@@ -1,0 +1,195 @@
+"""
+Moments of pixels over a Gaussian field mapped to leaf area, without simulation.
+
+Cells have properties f(z) of a standard normal field z with correlation rho. In Hermite polynomials,
+f(z) = sum_k a_k He_k(z) / sqrt(k!), so that the covariance of two properties at a lag is sum_k a_k b_k rho^k. Pixels are
+weighted means of cells. Their covariance is the mean over all frequencies of the spectrum times both transfer functions.
+
+NDVI is curved. A pixel is divided into its mean given Z, the weighted mean of z over its footprint, and a remainder.
+NDVI is evaluated at the first by quadrature, and along its tangent for the second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy import fft, special
+
+from fifesim.ground.landscape.autoregression import margin, response
+
+# Orders of the Hermite expansion, nodes of the quadratures over cells and over pixels.
+ORDERS, _NODES, _PIXEL_NODES = 24, 4001, 31
+
+
+class Footprint(NamedTuple):
+    """Weights of rows and columns of cells in a pixel, each with sum 1, and the position of the first ones. [cell]"""
+
+    rows: np.ndarray
+    columns: np.ndarray
+    first: tuple[float, float] = (0.0, 0.0)
+
+
+class Pixel(NamedTuple):
+    """Quantity of a pixel: a function of the means of properties of its cells over their footprints."""
+
+    names: tuple[str, ...]
+    footprints: tuple[Footprint, ...]
+    function: Callable[..., np.ndarray]
+    """Of an array of means, shape (property, ...)."""
+    noise: np.ndarray | float = 0.0
+    """Variance of the noise of each mean, shape (property,)."""
+
+
+class Line(NamedTuple):
+    """Regression of a truth on an image: scatter 1 - R2, slope, residual standard deviation, and moments of pixels."""
+
+    scatter: float
+    slope: float
+    rmse: float
+    truth_variance: float
+    image_variance: float
+    covariance: float
+    truth_mean: float
+    image_mean: float
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Spectra of the powers of a field's correlation, and Hermite coefficients of properties of its cells."""
+
+    powers: np.ndarray
+    """Spectra of rho^k on a periodic lattice divided by its size, shape (order from 1, n, n // 2 + 1)."""
+    properties: dict[str, np.ndarray]
+    """Coefficients by name, shape (order from 0,). The covariance at lag d is sum_k a_k b_k rho(d)^k."""
+    window: np.ndarray | float = 0.0
+    """Variance of the mean of fields of correlation rho^k over the window of a regression, shape (order from 1,)."""
+    known: dict = field(default_factory=dict, repr=False)
+    """Transfer functions and overlaps of footprints."""
+
+    def regression(self, truth, image):
+        """Line of the pixels of a truth on those of an image, without noise in the truth."""
+        names = truth.names + image.names
+        footprints = [*truth.footprints, *image.footprints]
+        a = np.array([self.properties[name] for name in names])
+        given = a[:, 1:] * [self.overlap(image.footprints[0], each)[1] for each in footprints]
+        means = a[:, :1] + given @ _HE[1:]
+        overlaps = np.array([[self.overlap(one, other)[0] for other in footprints] for one in footprints])
+        rest = np.einsum("ik,jk,ijk->ij", a[:, 1:], a[:, 1:], overlaps - self.window) - given @ given.T
+        split = len(truth.names)
+        rest[split:, split:] += np.diag(np.broadcast_to(image.noise, len(image.names)))
+        values, tangents = [], np.zeros((2, len(names), _Z.size))
+        for number, (pixel, own) in enumerate(((truth, slice(0, split)), (image, slice(split, None)))):
+            values.append(pixel.function(means[own]))
+            tangents[number, own] = _tangents(pixel.function, means[own])
+        mean = np.array(values) @ _W
+        apart = np.array(values) - mean[:, None]
+        moments = (apart * _W) @ apart.T + np.einsum("piz,qjz,ij,z->pq", tangents, tangents, rest, _W, optimize=True)
+        (of_truth, both), (_, of_image) = moments
+        left = of_truth - both**2 / of_image
+        return Line(left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both, *mean)
+
+    def overlap(self, one, other):
+        """
+        Covariance of the means of two footprints over fields of correlation rho^k, and the mean of the powers of the
+        correlation of the cells of the second with the mean of z in the first, shape (2, order from 1).
+        """
+        key = id(one), id(other)
+        if key not in self.known:
+            n = self.powers.shape[1]
+            shared = self._transfer(one) * self._transfer(other).conj()
+            weighted = shared.real.copy()
+            weighted[:, 1 : (n + 1) // 2] *= 2
+            covariance = self.powers.reshape(len(self.powers), -1) @ weighted.reshape(-1)
+            # Cells of the second footprint at whole positions from its first one.
+            seen = self._transfer(one) * self._shift(other.first).conj() * self.powers[0]
+            near = fft.irfft2(seen, (n, n))[: len(other.rows), : len(other.columns)] * n**2
+            near /= np.sqrt((self._power(one) * self.powers[0]).sum())
+            area, powers = np.multiply.outer(other.rows, other.columns), np.ones_like(near)
+            given = [(area * (powers := powers * near)).sum() for _ in range(ORDERS)]
+            # Footprints are kept too, so that their ids stay theirs.
+            self.known[key] = np.array([covariance, given]), one, other
+        return self.known[key][0]
+
+    def _power(self, footprint):
+        n = self.powers.shape[1]
+        power = np.abs(self._transfer(footprint)) ** 2
+        power[:, 1 : (n + 1) // 2] *= 2
+        return power
+
+    def _transfer(self, footprint):
+        """Transfer function of a footprint, shape (n, n // 2 + 1)."""
+        if id(footprint) not in self.known:
+            n = self.powers.shape[1]
+            if max(map(len, footprint[:2])) > n // 2:
+                raise ValueError(f"a footprint of {max(map(len, footprint[:2]))} cells exceeds half of {n} cells")
+            of_weights = fft.fft(footprint.rows, n)[:, None] * fft.rfft(footprint.columns, n)
+            self.known[id(footprint)] = of_weights * self._shift(footprint.first), footprint
+        return self.known[id(footprint)][0]
+
+    def _shift(self, first):
+        """Phase of a displacement of rows and columns. [cell]"""
+        n = self.powers.shape[1]
+        frequencies = fft.fftfreq(n), fft.rfftfreq(n)
+        down, across = (np.exp(-2j * np.pi * each * place) for each, place in zip(frequencies, first, strict=True))
+        return down[:, None] * across
+
+
+def prepare(arp, functions, *, window=None, widest=96):
+    """
+    Prepared field of an arp with functions of deviates z that return the properties of cells, by name.
+
+    Regressions are of pixels in a window of rows and columns [cell], whose mean they remove; by default unlimited.
+    """
+    n = fft.next_fast_len(max(192, 2 * widest, margin(arp)), real=True)
+    u = 2 * np.pi * fft.fftfreq(n)
+    spectrum = response(arp, u[:, None], u[: n // 2 + 1]) ** 2
+    rho = fft.irfft2(spectrum, (n, n))
+    rho /= rho[0, 0]
+    powers, power = np.empty((ORDERS, n, n // 2 + 1)), np.ones_like(rho)
+    for k in range(ORDERS):
+        power = power * rho
+        powers[k] = fft.rfft2(power).real / n**2
+    lost = 0.0 if window is None else _of_mean(rho, window)
+    return Prepared(powers, {name: coefficients(each) for name, each in functions.items()}, lost)
+
+
+def _of_mean(rho, window):
+    """Variance of the mean over a window of fields of correlation rho^k, shape (order from 1,)."""
+    lags = np.abs(fft.fftfreq(len(rho), 1 / len(rho)))
+    down, across = (np.maximum(1 - lags / cells, 0) / cells for cells in window)
+    return np.array([down @ rho**k @ across for k in range(1, ORDERS + 1)])
+
+
+def coefficients(function):
+    """Coefficients of a function of a standard normal deviate for He_k / sqrt(k!), shape (ORDERS + 1,)."""
+    # Trapezoidal rule, because a quantile function may have kinks.
+    z = np.linspace(-8.0, 8.0, _NODES)
+    weights = np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi) * (z[1] - z[0])
+    return polynomials(z) @ (weights * function(z))
+
+
+def polynomials(z, orders=ORDERS):
+    """He_k(z) / sqrt(k!), shape (orders + 1, z)."""
+    found = [np.ones_like(z), z]
+    for k in range(1, orders):
+        found.append((z * found[-1] - np.sqrt(k) * found[-2]) / np.sqrt(k + 1))
+    return np.array(found)
+
+
+# Nodes and weights over the mean of a footprint.
+_Z, _W = special.roots_hermitenorm(_PIXEL_NODES)
+_W = _W / _W.sum()
+_HE = polynomials(_Z)
+
+
+def _tangents(function, means):
+    """Derivatives of a function of means, shape as the means."""
+    found = np.empty_like(means)
+    for number, row in enumerate(means):
+        step = np.zeros((len(means), 1))
+        step[number] = 1e-5 * max(np.abs(row).max(), 1e-3)
+        found[number] = (function(means + step) - function(means - step)) / (2 * step[number])
+    return found
