@@ -2,8 +2,9 @@
 Moments of pixels over a Gaussian field mapped to leaf area, without simulation.
 
 Cells have properties f(z) of a standard normal field z with correlation rho. In Hermite polynomials,
-f(z) = sum_k a_k He_k(z) / sqrt(k!), so that the covariance of two properties at a lag is sum_k a_k b_k rho^k. Pixels are
-weighted means of cells. Their covariance is the mean over all frequencies of the spectrum times both transfer functions.
+f(z) = sum_k a_k He_k(z) / sqrt(k!), so that the covariance of two properties at a lag is sum_k a_k b_k rho^k.
+Pixels are weighted means of cells. Their covariance is the mean over all frequencies of the spectrum times both
+transfer functions.
 
 NDVI is curved. A pixel is divided into its mean given Z, the weighted mean of z over its footprint, and a remainder.
 NDVI is evaluated at the first by quadrature, and along its tangent for the second.
@@ -39,8 +40,8 @@ class Pixel(NamedTuple):
     footprints: tuple[Footprint, ...]
     function: Callable[..., np.ndarray]
     """Of an array of means, shape (property, ...)."""
-    noise: np.ndarray | float = 0.0
-    """Variance of the noise of each mean, shape (property,)."""
+    noise: Callable[..., np.ndarray | float] = lambda means: 0.0
+    """Variance of the noise of the quantity, a function of the same means."""
 
 
 class Line(NamedTuple):
@@ -79,15 +80,16 @@ class Prepared:
         overlaps = np.array([[self.overlap(one, other)[0] for other in footprints] for one in footprints])
         rest = np.einsum("ik,jk,ijk->ij", a[:, 1:], a[:, 1:], overlaps - self.window) - given @ given.T
         split = len(truth.names)
-        rest[split:, split:] += np.diag(np.broadcast_to(image.noise, len(image.names)))
+        steps = np.sqrt(np.maximum(np.diag(rest), 0.0)) / 3 + 1e-4 * np.abs(means).max(axis=1)
         values, tangents = [], np.zeros((2, len(names), _Z.size))
         for number, (pixel, own) in enumerate(((truth, slice(0, split)), (image, slice(split, None)))):
             values.append(pixel.function(means[own]))
-            tangents[number, own] = _tangents(pixel.function, means[own])
+            tangents[number, own] = _tangents(pixel.function, means[own], steps[own])
         mean = np.array(values) @ _W
         apart = np.array(values) - mean[:, None]
         moments = (apart * _W) @ apart.T + np.einsum("piz,qjz,ij,z->pq", tangents, tangents, rest, _W, optimize=True)
         (of_truth, both), (_, of_image) = moments
+        of_image = of_image + np.sum(image.noise(means[split:]) * _W)
         left = of_truth - both**2 / of_image
         return Line(left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both, *mean)
 
@@ -123,8 +125,11 @@ class Prepared:
         """Transfer function of a footprint, shape (n, n // 2 + 1)."""
         if id(footprint) not in self.known:
             n = self.powers.shape[1]
-            if max(map(len, footprint[:2])) > n // 2:
-                raise ValueError(f"a footprint of {max(map(len, footprint[:2]))} cells exceeds half of {n} cells")
+            widest = max(map(len, footprint[:2]))
+            if widest > n // 2:
+                raise ValueError(
+                    f"a footprint has {widest} cells, at most {n // 2} are allowed: prepare a wider lattice"
+                )
             of_weights = fft.fft(footprint.rows, n)[:, None] * fft.rfft(footprint.columns, n)
             self.known[id(footprint)] = of_weights * self._shift(footprint.first), footprint
         return self.known[id(footprint)][0]
@@ -185,11 +190,20 @@ _W = _W / _W.sum()
 _HE = polynomials(_Z)
 
 
-def _tangents(function, means):
-    """Derivatives of a function of means, shape as the means."""
+def _tangents(function, means, steps):
+    """Derivatives of a function of means over steps of them, shape as the means."""
     found = np.empty_like(means)
-    for number, row in enumerate(means):
-        step = np.zeros((len(means), 1))
-        step[number] = 1e-5 * max(np.abs(row).max(), 1e-3)
-        found[number] = (function(means + step) - function(means - step)) / (2 * step[number])
+    for number, step in enumerate(np.diag(steps)[..., None]):
+        found[number] = (function(means + step) - function(means - step)) / (2 * steps[number])
     return found
+
+
+def noise_of_ndvi(variance):
+    """Noise of NDVI of means of red and near infrared with a variance of each, a function of their means."""
+
+    def noise(means):
+        red, nir = means
+        of_red, of_nir = np.broadcast_to(variance, 2)
+        return 4 * (nir**2 * of_red + red**2 * of_nir) / (nir + red) ** 4
+
+    return noise
