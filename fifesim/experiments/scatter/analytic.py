@@ -1,0 +1,191 @@
+"""Scatter budget of a scenario without simulation, from the covariances of its pixels."""
+
+from itertools import product
+
+import numpy as np
+
+from fifesim.chain.driver import shared_operators
+from fifesim.experiments.analytic import Footprint, Pixel, prepare
+from fifesim.experiments.scatter.stages import VARIABLES, scene_of, working_stages
+from fifesim.grids import grid as grids
+from fifesim.grids.reductions import areas
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
+from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP
+from fifesim.sensor.labels import noise_models
+from fifesim.sensor.response.calibration import digital_step
+from fifesim.sensor.response.noise import radiance_std
+
+_DEVIATES = np.linspace(-6.0, 6.0, 1201)
+
+
+def obstacles(scenario):
+    """Reasons for which the budget of a complete scenario needs simulation, each with what to give instead."""
+    own, land, air = scenario.sensor, scenario.ground, scenario.atmosphere
+    down, across = grids.cell_size(scenario.geobox())
+    ratio = own.size / down
+    found = {
+        "ground.lai_file is a map: give ground.distribution and arp": bool(land.lai_file),
+        "the landscape is learned: give landscape.learned = 'none'": bool(scenario.learned),
+        "the ground has classes or other varying properties: give landscape.cover = 'none' without deviations": (
+            not scenario.learned and not scenario.is_one()
+        ),
+        f"ground.arp is {land.arp:g}: give at most {LARGEST_STREAMING_ARP}": land.arp > LARGEST_STREAMING_ARP,
+        "ground.method is 'periodic': give 'streaming'": land.method == "periodic",
+        "the ground is not level: give terrain.dem = 'flat'": scenario.terrain.dem != "flat",
+        "there are clouds: give clouds.cloud_cover = 0": scenario.clouds.cloud_cover > 0,
+        "atmosphere.coupling is not 'lambert'": air.coupling != "lambert",
+        "light comes from adjacent cells: give atmosphere.adjacency = false": bool(air.adjacency),
+        "pixels drift along the grid: give sensor.interval = 'product'": own.interval not in ("product", own.size),
+        f"a pixel has {ratio:.4g} cells along an edge: give a grid.cell that divides sensor.pixel": (
+            abs(ratio - round(ratio)) > 1e-6 or down != across
+        ),
+    }
+    return [reason for reason, holds in found.items() if holds]
+
+
+class Covariances:
+    """Prepared covariances of a scenario: the line of a truth on NDVI for any set of stages."""
+
+    def __init__(self, scenario):
+        self.stages = working_stages(scenario)
+        self.scene = scene_of(scenario)
+        self.driver, self.scenario = self.scene.driver, scenario
+        self.table = quantile_table(lai_distribution(scenario.ground.distribution))
+        setup, driver = self.scene.setup, self.driver
+        self.noisy = noise_models(driver.instrument, driver.bands, setup.noise, setup.noise_models) if setup.noise else []
+        self.square = self._footprints(False, False)[0]
+        self.seen = {state: self._footprints(*state) for state in product((False, True), repeat=2)}
+        widest = max(len(line) for pair in self.seen.values() for each in pair for line in each[:2])
+        self.prepared = prepare(
+            scenario.ground.arp,
+            {
+                "lai": self.leaf_area,
+                "fpar": lambda z: self.fpar(self.leaf_area(z)),
+                **{
+                    f"{name}{hazy:d}": lambda z, layer=layer, hazy=hazy: self.cells(self.leaf_area(z), hazy)[layer]
+                    for layer, name in enumerate(("red", "nir", "ndvi"))
+                    for hazy in (False, True)
+                },
+            },
+            window=self.scene.grid.shape,
+            widest=widest,
+        )
+
+    def leaf_area(self, z):
+        """Leaf area of deviates of the field, shape as z."""
+        return quantile_map(z, self.table)
+
+    def fpar(self, lai):
+        """FPAR of leaf area, shape as lai."""
+        return self.driver.fpar(np.maximum(lai, 0.0), self.scenario.ground.fpar_inf)
+
+    def cells(self, lai, hazy):
+        """Red and near infrared reflectance and NDVI of cells, shape (3, ...)."""
+        area = np.atleast_2d(np.clip(lai, 0.0, self.table[-1]))
+        seen = self.driver.reflectance(area)
+        seen = self.driver.toa(seen) if hazy else seen
+        return np.concatenate([seen, self.driver.ndvi(seen)[None]]).reshape(3, *np.shape(lai))
+
+    def line(self, variable, at_work):
+        """Regression of a variable on NDVI with some stages active."""
+        hazy, curved = "atmosphere" in at_work, "non-linearity" in at_work
+        seen = self.seen["point spread" in at_work, "registration" in at_work]
+        if curved:
+            truth = Pixel((variable,), (self.square,), lambda means: means[0])
+        else:
+            truth = self._of_leaf_area(variable, self.square)
+        counts, grains = "quantisation" in at_work, "noise" in at_work
+        if not curved:
+            image = self._image_of_leaf_area(seen, hazy, counts, grains)
+        elif "NDVI scaling" in at_work:
+            names = f"red{hazy:d}", f"nir{hazy:d}"
+            image = Pixel(names, seen, self.driver.ndvi, lambda means: self._noise(means, counts, grains))
+        else:
+            names = f"ndvi{hazy:d}", f"red{hazy:d}", f"nir{hazy:d}"
+            image = Pixel(
+                names, (seen[0], *seen), lambda means: means[0], lambda means: self._noise(means[1:], counts, grains)
+            )
+        return self.prepared.regression(truth, image)
+
+    def uniform_line(self, variable):
+        """Regression with all stages active over ground that is uniform within each pixel."""
+        at_work = set(self.stages)
+        seen = self._footprints("point spread" in at_work, "registration" in at_work, even=True)
+        image = self._image_of_leaf_area(seen, True, "quantisation" in at_work, "noise" in at_work)
+        return self.prepared.regression(self._of_leaf_area(variable, self.square), image)
+
+    def _of_leaf_area(self, variable, footprint):
+        function = {"lai": lambda means: means[0], "fpar": lambda means: self.fpar(means)[0]}[variable]
+        return Pixel(("lai",), (footprint,), function)
+
+    def _image_of_leaf_area(self, seen, hazy, counts, grains):
+        """NDVI of the mean leaf area over the footprint of each band."""
+
+        def means_of(areas):
+            return np.array([self.cells(area, hazy)[layer] for layer, area in enumerate(areas)])
+
+        return Pixel(
+            ("lai", "lai"),
+            seen,
+            lambda areas: self.driver.ndvi(means_of(areas)),
+            lambda areas: self._noise(means_of(areas), counts, grains),
+        )
+
+    def _noise(self, means, counts, grains):
+        """Variance of NDVI by noise and digital numbers, shape of the means of each band."""
+        driver = self.driver
+        radiance = driver.radiance(means[:, None])[:, 0]
+        white = driver.radiance(np.ones((2, 1, 1)))[:, 0]
+        (gain, offset, _), compression = driver.scale, driver.compression
+        of_bands = []
+        for k, each in enumerate(radiance):
+            step = digital_step(each, gain[k], offset[k], compression[k]) if counts else 0.0
+            variance = radiance_std(each, *self.noisy[k], step) ** 2 if grains else step**2 / 12 + 0 * each
+            of_bands.append(variance / white[k] ** 2)
+        red, nir = means
+        return 4 * (nir**2 * of_bands[0] + red**2 * of_bands[1]) / (nir + red) ** 4
+
+    def _footprints(self, blurred, displaced, even=False):
+        """Footprints of the red and the near infrared band of a pixel in the middle, from the cells of the scene."""
+        scene, setup = self.scene, self.scene.setup
+        size = grids.cell_size(scene.blocks)
+        shifts = tuple(offset * each for offset, each in zip(setup.offset, size, strict=True))
+        found = []
+        for band in self.driver.bands:
+            spreads = setup.instrument.line_spreads(band) if blurred else areas(scene.blocks)
+            along = shared_operators(
+                spreads, scene.grid, scene.blocks, tuple(map(float, shifts)) if displaced else (0.0, 0.0)
+            )
+            lines, first = [], []
+            for axis, each in zip(along, size, strict=True):
+                middle = len(axis) // 2
+                line, start = axis.weights[middle][: axis.count[middle]], int(axis.start[middle])
+                if even:
+                    cells = round(each / grids.cell_size(scene.grid)[0])
+                    line, start = _even(line, start, cells)
+                lines.append(line / line.sum())
+                first.append(start)
+            found.append(Footprint(*lines, tuple(first)))
+        return tuple(found)
+
+
+def _even(line, start, cells):
+    """Weights with their mean in each pixel of a number of cells, and the first cell."""
+    before = start % cells
+    after = -(before + len(line)) % cells
+    padded = np.pad(line, (before, after)).reshape(-1, cells)
+    return np.repeat(padded.mean(axis=1), cells), start - before
+
+
+def scatters(scenario):
+    """Scatter of each variable for all sets of stages, its value over uniform pixels, and the stages."""
+    covariances = Covariances(scenario)
+    stages = covariances.stages
+    found = {}
+    for variable in VARIABLES:
+        values = np.empty((2,) * len(stages))
+        for state in np.ndindex(values.shape):
+            at_work = {stage for stage, active in zip(stages, state, strict=True) if active}
+            values[state] = covariances.line(variable, at_work).scatter
+        found[variable] = values, covariances.uniform_line(variable).scatter
+    return stages, found
