@@ -17,12 +17,12 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy import fft, special
+from scipy import fft
 
 from fifesim.ground.landscape.autoregression import margin, response
 
 # Orders of the Hermite expansion, nodes of the quadratures over cells and over pixels.
-ORDERS, _NODES, _PIXEL_NODES = 24, 4001, 31
+ORDERS, _NODES, _PIXEL_NODES = 24, 4001, 41
 
 
 class Footprint(NamedTuple):
@@ -185,7 +185,8 @@ def polynomials(z, orders=ORDERS):
 
 
 # Nodes and weights over the mean of a footprint.
-_Z, _W = special.roots_hermitenorm(_PIXEL_NODES)
+_Z = np.linspace(-5.0, 5.0, _PIXEL_NODES)
+_W = np.exp(-(_Z**2) / 2)
 _W = _W / _W.sum()
 _HE = polynomials(_Z)
 

@@ -9,10 +9,9 @@ from fifesim.experiments.analytic import Footprint, Pixel, prepare
 from fifesim.experiments.scatter.stages import VARIABLES, scene_of, working_stages
 from fifesim.grids import grid as grids
 from fifesim.grids.reductions import areas
-from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
 from fifesim.sensor.labels import noise_models
-from fifesim.sensor.response.calibration import digital_step
 from fifesim.sensor.response.noise import radiance_std
 
 _DEVIATES = np.linspace(-6.0, 6.0, 1201)
@@ -52,7 +51,9 @@ class Covariances:
         self.driver, self.scenario = self.scene.driver, scenario
         self.table = quantile_table(lai_distribution(scenario.ground.distribution))
         setup, driver = self.scene.setup, self.driver
-        self.noisy = noise_models(driver.instrument, driver.bands, setup.noise, setup.noise_models) if setup.noise else []
+        self.noisy = (
+            noise_models(driver.instrument, driver.bands, setup.noise, setup.noise_models) if setup.noise else []
+        )
         self.square = self._footprints(False, False)[0]
         self.seen = {state: self._footprints(*state) for state in product((False, True), repeat=2)}
         widest = max(len(line) for pair in self.seen.values() for each in pair for line in each[:2])
@@ -77,7 +78,7 @@ class Covariances:
 
     def fpar(self, lai):
         """FPAR of leaf area, shape as lai."""
-        return self.driver.fpar(np.maximum(lai, 0.0), self.scenario.ground.fpar_inf)
+        return self.driver.fpar(np.clip(lai, 0.0, self.table[-1]), self.scenario.ground.fpar_inf)
 
     def cells(self, lai, hazy):
         """Red and near infrared reflectance and NDVI of cells, shape (3, ...)."""
@@ -94,56 +95,81 @@ class Covariances:
             truth = Pixel((variable,), (self.square,), lambda means: means[0])
         else:
             truth = self._of_leaf_area(variable, self.square)
-        counts, grains = "quantisation" in at_work, "noise" in at_work
-        if not curved:
-            image = self._image_of_leaf_area(seen, hazy, counts, grains)
-        elif "NDVI scaling" in at_work:
-            names = f"red{hazy:d}", f"nir{hazy:d}"
-            image = Pixel(names, seen, self.driver.ndvi, lambda means: self._noise(means, counts, grains))
-        else:
-            names = f"ndvi{hazy:d}", f"red{hazy:d}", f"nir{hazy:d}"
-            image = Pixel(
-                names, (seen[0], *seen), lambda means: means[0], lambda means: self._noise(means[1:], counts, grains)
-            )
-        return self.prepared.regression(truth, image)
+        return self.prepared.regression(truth, self._image(seen, at_work, hazy, curved))
 
     def uniform_line(self, variable):
         """Regression with all stages active over ground that is uniform within each pixel."""
         at_work = set(self.stages)
         seen = self._footprints("point spread" in at_work, "registration" in at_work, even=True)
-        image = self._image_of_leaf_area(seen, True, "quantisation" in at_work, "noise" in at_work)
-        return self.prepared.regression(self._of_leaf_area(variable, self.square), image)
+        truth = self._of_leaf_area(variable, self.square)
+        return self.prepared.regression(truth, self._image(seen, at_work, "atmosphere" in at_work, False))
 
     def _of_leaf_area(self, variable, footprint):
         function = {"lai": lambda means: means[0], "fpar": lambda means: self.fpar(means)[0]}[variable]
         return Pixel(("lai",), (footprint,), function)
 
-    def _image_of_leaf_area(self, seen, hazy, counts, grains):
-        """NDVI of the mean leaf area over the footprint of each band."""
+    def _image(self, seen, at_work, hazy, curved):
+        """NDVI of pixels, from the reflectance of their cells or from that of the mean leaf area of each footprint."""
+        scaled = curved and "NDVI scaling" not in at_work
+        names = (f"red{hazy:d}", f"nir{hazy:d}") if curved else ("lai", "lai")
 
-        def means_of(areas):
-            return np.array([self.cells(area, hazy)[layer] for layer, area in enumerate(areas)])
+        def bands(means):
+            own = means[scaled:]
+            return own if curved else np.array([self.cells(area, hazy)[layer] for layer, area in enumerate(own)])
 
-        return Pixel(
-            ("lai", "lai"),
-            seen,
-            lambda areas: self.driver.ndvi(means_of(areas)),
-            lambda areas: self._noise(means_of(areas), counts, grains),
-        )
+        gain, shift, noise = self._recorded(names, seen, bands if not scaled else lambda means: means, at_work)
 
-    def _noise(self, means, counts, grains):
-        """Variance of NDVI by noise and digital numbers, shape of the means of each band."""
-        driver = self.driver
-        radiance = driver.radiance(means[:, None])[:, 0]
+        def recorded(means):
+            return gain * bands(means) + shift
+
+        def value(means):
+            found = self.driver.ndvi(recorded(means), linear=True)
+            return found if not scaled else found + means[0] - self.driver.ndvi(bands(means), linear=True)
+
+        def variance(means):
+            red, nir = recorded(means)
+            of_red, of_nir = noise(bands(means))
+            return 4 * (nir**2 * of_red + red**2 * of_nir) / (nir + red) ** 4
+
+        if scaled:
+            names, seen = (f"ndvi{hazy:d}", *names), (seen[0], *seen)
+        return Pixel(names, seen, value, variance)
+
+    def _recorded(self, names, seen, bands, at_work):
+        """
+        Gain, shift, shape (2, 1), and variance of the recorded reflectance of each band, a function of reflectance.
+
+        Rounding to digital numbers of a normal signal is a line and an uncorrelated remainder.
+        """
+        driver, of_truth = self.driver, self._of_leaf_area("lai", self.square)
         white = driver.radiance(np.ones((2, 1, 1)))[:, 0]
-        (gain, offset, _), compression = driver.scale, driver.compression
-        of_bands = []
-        for k, each in enumerate(radiance):
-            step = digital_step(each, gain[k], offset[k], compression[k]) if counts else 0.0
-            variance = radiance_std(each, *self.noisy[k], step) ** 2 if grains else step**2 / 12 + 0 * each
-            of_bands.append(variance / white[k] ** 2)
-        red, nir = means
-        return 4 * (nir**2 * of_bands[0] + red**2 * of_bands[1]) / (nir + red) ** 4
+
+        def grains(means):
+            if "noise" not in at_work:
+                return np.zeros_like(means)
+            radiance = white * means
+            return (
+                np.array([radiance_std(each, *own) ** 2 for each, own in zip(radiance, self.noisy, strict=True)])
+                / white**2
+            )
+
+        if "quantisation" not in at_work:
+            return 1.0, 0.0, grains
+        lines = [
+            self.prepared.regression(of_truth, Pixel(names, seen, lambda means, k=k: bands(means)[k])) for k in (0, 1)
+        ]
+        mean = np.array([[line.image_mean] for line in lines])
+        spread = np.sqrt(np.array([[line.image_variance] for line in lines]) + grains(mean))
+        signal = mean + spread * _DEVIATES
+        counted = driver.planetary(driver.recorded(driver.radiance(signal[:, None])))[:, 0]
+        if np.isnan(counted).any():
+            raise ValueError("pixels are saturated: give method='simulate'")
+        share = np.exp(-(_DEVIATES**2) / 2)
+        share = share / share.sum()
+        center = counted @ share
+        gain = ((counted * _DEVIATES) @ share / spread[:, 0])[:, None]
+        rest = ((counted**2) @ share - center**2)[:, None] - (gain * spread) ** 2
+        return gain, center[:, None] - gain * mean, lambda means: gain**2 * grains(means) + rest
 
     def _footprints(self, blurred, displaced, even=False):
         """Footprints of the red and the near infrared band of a pixel in the middle, from the cells of the scene."""
@@ -177,15 +203,27 @@ def _even(line, start, cells):
     return np.repeat(padded.mean(axis=1), cells), start - before
 
 
+# Largest scatter by digital numbers alone. Rounding errors of both bands are taken as independent; they are not where
+# the bands depend on each other, which changes the scatter by up to this much.
+_LARGEST_ROUNDING = 0.01
+
+
 def scatters(scenario):
-    """Scatter of each variable for all sets of stages, its value over uniform pixels, and the stages."""
+    """Stages of a complete scenario, the scatter of each variable for all sets of them, and over uniform pixels."""
+    if reasons := obstacles(scenario):
+        raise ValueError(f"method='analytic' does not hold: {'; '.join(reasons)}. Or give method='simulate'")
     covariances = Covariances(scenario)
     stages = covariances.stages
-    found = {}
-    for variable in VARIABLES:
-        values = np.empty((2,) * len(stages))
+    if "quantisation" in stages:
+        rounding = covariances.line("lai", {"quantisation"}).scatter - covariances.line("lai", set()).scatter
+        if rounding > _LARGEST_ROUNDING:
+            raise ValueError(
+                f"method='analytic' does not hold: digital numbers alone give a scatter of {rounding:.2g}, at most "
+                f"{_LARGEST_ROUNDING} is allowed: give sensor.quantise = false, or method='simulate'"
+            )
+    found = {name: np.empty((2,) * len(stages)) for name in VARIABLES}
+    for variable, values in found.items():
         for state in np.ndindex(values.shape):
             at_work = {stage for stage, active in zip(stages, state, strict=True) if active}
             values[state] = covariances.line(variable, at_work).scatter
-        found[variable] = values, covariances.uniform_line(variable).scatter
-    return stages, found
+    return stages, found, {name: covariances.uniform_line(name).scatter for name in VARIABLES}
