@@ -72,26 +72,35 @@ class Prepared:
 
     def regression(self, truth, image):
         """Line of the pixels of a truth on those of an image, without noise in the truth."""
-        names = truth.names + image.names
-        footprints = [*truth.footprints, *image.footprints]
-        a = np.array([self.properties[name] for name in names])
-        given = a[:, 1:] * [self.overlap(image.footprints[0], each)[1] for each in footprints]
-        means = a[:, :1] + given @ _HE[1:]
-        overlaps = np.array([[self.overlap(one, other)[0] for other in footprints] for one in footprints])
-        rest = np.einsum("ik,jk,ijk->ij", a[:, 1:], a[:, 1:], overlaps - self.window) - given @ given.T
+        means, rest = self.split(truth.names + image.names, (*image.footprints, *truth.footprints, *image.footprints))
         split = len(truth.names)
         steps = np.sqrt(np.maximum(np.diag(rest), 0.0)) / 3 + 1e-4 * np.abs(means).max(axis=1)
-        values, tangents = [], np.zeros((2, len(names), _Z.size))
+        values, tangents = [], np.zeros((2, len(means), NODES.size))
         for number, (pixel, own) in enumerate(((truth, slice(0, split)), (image, slice(split, None)))):
             values.append(pixel.function(means[own]))
-            tangents[number, own] = _tangents(pixel.function, means[own], steps[own])
-        mean = np.array(values) @ _W
+            tangents[number, own] = tangents_of(pixel.function, means[own], steps[own])
+        mean = np.array(values) @ SHARES
         apart = np.array(values) - mean[:, None]
-        moments = (apart * _W) @ apart.T + np.einsum("piz,qjz,ij,z->pq", tangents, tangents, rest, _W, optimize=True)
+        moments = (apart * SHARES) @ apart.T + np.einsum(
+            "piz,qjz,ij,z->pq", tangents, tangents, rest, SHARES, optimize=True
+        )
         (of_truth, both), (_, of_image) = moments
-        of_image = of_image + np.sum(image.noise(means[split:]) * _W)
+        of_image = of_image + np.sum(image.noise(means[split:]) * SHARES)
         left = of_truth - both**2 / of_image
         return Line(left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both, *mean)
+
+    def split(self, names, footprints):
+        """
+        Means of properties given Z at its nodes, shape (property, node), and the covariance of their remainders.
+
+        Z is the mean of z over the first of the footprints; the last ones are those of the properties.
+        """
+        first, footprints = footprints[0], footprints[-len(names) :]
+        a = np.array([self.properties[name] for name in names])
+        given = a[:, 1:] * [self.overlap(first, each)[1] for each in footprints]
+        overlaps = np.array([[self.overlap(one, other)[0] for other in footprints] for one in footprints])
+        rest = np.einsum("ik,jk,ijk->ij", a[:, 1:], a[:, 1:], overlaps - self.window) - given @ given.T
+        return a[:, :1] + given @ _POLYNOMIALS[1:], rest
 
     def overlap(self, one, other):
         """
@@ -185,13 +194,13 @@ def polynomials(z, orders=ORDERS):
 
 
 # Nodes and weights over the mean of a footprint.
-_Z = np.linspace(-5.0, 5.0, _PIXEL_NODES)
-_W = np.exp(-(_Z**2) / 2)
-_W = _W / _W.sum()
-_HE = polynomials(_Z)
+NODES = np.linspace(-5.0, 5.0, _PIXEL_NODES)
+SHARES = np.exp(-(NODES**2) / 2)
+SHARES = SHARES / SHARES.sum()
+_POLYNOMIALS = polynomials(NODES)
 
 
-def _tangents(function, means, steps):
+def tangents_of(function, means, steps):
     """Derivatives of a function of means over steps of them, shape as the means."""
     found = np.empty_like(means)
     for number, step in enumerate(np.diag(steps)[..., None]):
