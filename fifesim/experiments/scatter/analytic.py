@@ -6,8 +6,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from fifesim.chain.driver import shared_operators
-from fifesim.experiments.analytic import NODES, Footprint, Pixel, prepare, tangents_of
-from fifesim.experiments.scatter.stages import VARIABLES, scene_of, working_stages
+from fifesim.experiments.analytic import NODES, Footprint, Pixel, coefficients, prepare, tangents_of
+from fifesim.experiments.scatter.stages import STEP, VARIABLES, along_tangent, scene_of, working_stages
 from fifesim.grids import grid as grids
 from fifesim.grids.reductions import areas
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP
@@ -59,6 +59,7 @@ class Covariances:
         self.noisy = (
             noise_models(driver.instrument, driver.bands, setup.noise, setup.noise_models) if setup.noise else []
         )
+        self.mean = coefficients(self.leaf_area)[0]
         self.square = self._footprints(False, False)[0]
         self.seen = {state: self._footprints(*state) for state in product((False, True), repeat=2)}
         widest = max(len(line) for pair in self.seen.values() for each in pair for line in each[:2])
@@ -66,6 +67,10 @@ class Covariances:
             scenario.ground.arp,
             {
                 "lai": self.leaf_area,
+                **{
+                    f"tangent{hazy:d}": lambda z, hazy=hazy: self.along_tangent(self.leaf_area(z), hazy)
+                    for hazy in (0, 1)
+                },
                 "fpar": lambda z: self.fpar(self.leaf_area(z)),
                 **{
                     f"{name}{hazy:d}": lambda z, layer=layer, hazy=hazy: self.cells(self.leaf_area(z), hazy)[layer]
@@ -88,9 +93,26 @@ class Covariances:
     def cells(self, lai, hazy):
         """Red and near infrared reflectance and NDVI of cells, shape (3, ...)."""
         area = np.atleast_2d(np.clip(lai, 0.0, self.table[-1]))
-        seen = self.driver.reflectance(area)
-        seen = self.driver.toa(seen) if hazy else seen
-        return np.concatenate([seen, self.driver.ndvi(seen)[None]]).reshape(3, *np.shape(lai))
+        return self._seen(self.driver.reflectance(area), hazy).reshape(3, *np.shape(lai))
+
+    def along_tangent(self, lai, hazy, middle=None):
+        """NDVI of cells whose reflectance is linear in leaf area, along the tangent at a middle or the field's mean."""
+        area = np.atleast_2d(lai)
+        at = np.full_like(area, self.mean) if middle is None else np.atleast_2d(np.clip(middle, 0.0, self.table[-1]))
+        return self._seen(along_tangent(self.driver.reflectance, area, at), hazy)[2].reshape(np.shape(lai))
+
+    def _of_tangent(self, mean, area, hazy):
+        """Mean NDVI of cells along the tangent at their mean area less NDVI there, from that along one tangent."""
+
+        def curvature(middle):
+            sides = [self.along_tangent(area + step, hazy, middle) for step in (-STEP, 0.0, STEP)]
+            return sides[0] - 2 * sides[1] + sides[2]
+
+        return (mean - self.along_tangent(area, hazy)) * curvature(area) / curvature(None)
+
+    def _seen(self, reflectance, hazy):
+        seen = self.driver.toa(reflectance) if hazy else reflectance
+        return np.concatenate([seen, self.driver.ndvi(seen, linear=True)[None]])
 
     def line(self, variable, at_work):
         """Regression of a variable on NDVI with some stages active."""
@@ -107,25 +129,32 @@ class Covariances:
         at_work = set(self.stages)
         seen = self._footprints("point spread" in at_work, "registration" in at_work, even=True)
         truth = self._of_leaf_area(variable, self.square)
-        return self.prepared.regression(truth, self._image(seen, at_work, "atmosphere" in at_work, False))
+        return self.prepared.regression(truth, self._image(seen, at_work, "atmosphere" in at_work, False, even=True))
 
     def _of_leaf_area(self, variable, footprint):
         function = {"lai": lambda means: means[0], "fpar": lambda means: self.fpar(means)[0]}[variable]
         return Pixel(("lai",), (footprint,), function)
 
-    def _image(self, seen, at_work, hazy, curved):
+    def _image(self, seen, at_work, hazy, curved, even=False):
         """NDVI of pixels, from the reflectance of their cells or from that of the mean leaf area of each footprint."""
-        scaled = curved and "NDVI scaling" not in at_work
+        scaled = "NDVI scaling" not in at_work and not even
         names = (f"red{hazy:d}", f"nir{hazy:d}") if curved else ("lai", "lai")
 
         def bands(means):
             own = means[scaled:]
-            return own if curved else np.array([self.cells(area, hazy)[layer] for layer, area in enumerate(own)])
+            return (
+                np.asarray(own)
+                if curved
+                else np.array([self.cells(area, hazy)[layer] for layer, area in enumerate(own)])
+            )
 
         # Footprints are kept too, so that their ids stay theirs.
         key = names, id(seen), hazy, "quantisation" in at_work, "noise" in at_work
         if key not in self.known:
-            self.known[key] = self._recorded(names, seen, bands if not scaled else lambda means: means, at_work), seen
+            self.known[key] = (
+                self._recorded(names, seen, lambda means: bands([0.0, *means] if scaled else means), at_work),
+                seen,
+            )
         gain, shift, noise, shared = self.known[key][0]
 
         def recorded(means):
@@ -133,7 +162,11 @@ class Covariances:
 
         def value(means):
             found = self.driver.ndvi(recorded(means), linear=True)
-            return found if not scaled else found + means[0] - self.driver.ndvi(bands(means), linear=True)
+            if not scaled:
+                return found
+            if curved:
+                return found + means[0] - self.driver.ndvi(bands(means), linear=True)
+            return found + self._of_tangent(means[0], means[1], hazy)
 
         def variance(means):
             red, nir = recorded(means)
@@ -141,7 +174,7 @@ class Covariances:
             return 4 * (nir**2 * of_red + red**2 * of_nir - 2 * red * nir * shared) / (nir + red) ** 4
 
         if scaled:
-            names, seen = (f"ndvi{hazy:d}", *names), (seen[0], *seen)
+            names, seen = (f"{'ndvi' if curved else 'tangent'}{hazy:d}", *names), (seen[0], *seen)
         return Pixel(names, seen, value, variance)
 
     def _recorded(self, names, seen, bands, at_work):
