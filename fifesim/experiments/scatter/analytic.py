@@ -88,12 +88,22 @@ class Covariances:
 
     def fpar(self, lai):
         """FPAR of leaf area, shape as lai."""
-        return self.driver.fpar(np.clip(lai, 0.0, self.table[-1]), self.scenario.ground.fpar_inf)
+        return self._interpolated(
+            "fpar", lai, lambda area: self.driver.fpar(area, self.scenario.ground.fpar_inf)[None]
+        )[0]
 
     def cells(self, lai, hazy):
         """Red and near infrared reflectance and NDVI of cells, shape (3, ...)."""
-        area = np.atleast_2d(np.clip(lai, 0.0, self.table[-1]))
-        return self._seen(self.driver.reflectance(area), hazy).reshape(3, *np.shape(lai))
+        return self._interpolated(
+            f"cells{hazy:d}", lai, lambda area: self._seen(self.driver.reflectance(area[None]), hazy)[:, 0]
+        )
+
+    def _interpolated(self, name, lai, function):
+        """Rows of a function of leaf area, interpolated between areas of a table, shape (row, ...)."""
+        areas = np.linspace(0.0, self.table[-1], 2001)
+        if name not in self.known:
+            self.known[name] = function(areas)
+        return np.array([np.interp(lai, areas, row) for row in self.known[name]])
 
     def along_tangent(self, lai, hazy, middle=None):
         """NDVI of cells whose reflectance is linear in leaf area, along the tangent at a middle or the field's mean."""
@@ -104,11 +114,15 @@ class Covariances:
     def _of_tangent(self, mean, area, hazy):
         """Mean NDVI of cells along the tangent at their mean area less NDVI there, from that along one tangent."""
 
-        def curvature(middle):
-            sides = [self.along_tangent(area + step, hazy, middle) for step in (-STEP, 0.0, STEP)]
-            return sides[0] - 2 * sides[1] + sides[2]
+        def both(area):
+            def curvature(middle):
+                sides = [self.along_tangent(area + step, hazy, middle) for step in (-STEP, 0.0, STEP)]
+                return sides[0] - 2 * sides[1] + sides[2]
 
-        return (mean - self.along_tangent(area, hazy)) * curvature(area) / curvature(None)
+            return np.array([self.along_tangent(area, hazy), curvature(area) / curvature(None)])
+
+        along, ratio = self._interpolated(f"tangent{hazy:d}", area, both)
+        return (mean - along) * ratio
 
     def _seen(self, reflectance, hazy):
         seen = self.driver.toa(reflectance) if hazy else reflectance

@@ -1,0 +1,131 @@
+"""Budgets from covariances: an independent Monte Carlo table, limits of theory, and the simulated budget."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+import fifesim
+from fifesim.experiments.analytic import Footprint, Pixel, noise_of_ndvi, prepare
+from fifesim.experiments.scatter.shares import standard_error
+
+_BOX = np.full(9, 1 / 9)
+_FIELDS = {
+    "lognormal mean 1 cv .6": stats.lognorm(np.sqrt(np.log(1.36)), scale=1.36**-0.5),
+    "gamma shape 4 mean 2": stats.gamma(4, scale=0.5),
+}
+
+
+def _ndvi(means):
+    return (means[1] - means[0]) / (means[1] + means[0])
+
+
+def _blurred(sd, down):
+    """Footprint of a box of 9 cells blurred by a Gaussian and displaced by cells downward."""
+    reach = int(6 * sd)
+    kernel = stats.norm.pdf(np.arange(-reach, reach + 1), scale=sd) if sd else np.ones(1)
+    line = np.convolve(_BOX, kernel / kernel.sum())
+    return Footprint(line, line, (down - reach, -reach))
+
+
+def test_scatter_agrees_with_an_independent_simulation():
+    table = pd.read_csv(Path(__file__).parents[2] / "data" / "analytic_budget.csv", comment="#")
+    assert len(table) > 150
+    for (name, arp), rows in table.groupby(["lai", "arp"]):
+        lai = _FIELDS[name]
+        functions = {
+            "lai": lambda z, lai=lai: lai.ppf(stats.norm.cdf(z)),
+            "red": lambda z, lai=lai: 0.03 + 0.12 * np.exp(-0.75 * lai.ppf(stats.norm.cdf(z))),
+            "nir": lambda z, lai=lai: 0.36 - 0.20 * np.exp(-0.55 * lai.ppf(stats.norm.cdf(z))),
+        }
+        field = prepare(arp, functions, window=(1152, 1152), widest=112)
+        truth = Pixel(("lai",), (Footprint(_BOX, _BOX),), lambda means: means[0])
+        for row in rows.itertuples():
+            seen = _blurred(row.blur_sd_cells, 9 * row.shift_pixels_down)
+            noise = noise_of_ndvi(row.noise_sd_reflectance**2)
+            found = field.regression(truth, Pixel(("red", "nir"), (seen, seen), _ndvi, noise))
+            assert abs(found.scatter - row.scatter) <= max(0.003, 3 * row.se_scatter), row
+            assert found.image_variance == pytest.approx(row.var_ndvi, rel=0.02)
+
+
+def test_linear_pixels_with_noise_have_the_scatter_of_their_variances():
+    field = prepare(0.2, {"lai": lambda z: 2 + 0.5 * z, "seen": lambda z: 3 - z})
+    truth, seen = Footprint(_BOX, _BOX), Footprint(_BOX, _BOX)
+    lines = [
+        field.regression(
+            Pixel(("lai",), (truth,), lambda means: means[0]),
+            Pixel(("seen",), (seen,), lambda means: means[0], lambda means, noise=noise: noise),
+        )
+        for noise in (0.0, 0.1)
+    ]
+    assert lines[0].scatter == pytest.approx(0, abs=1e-9) and lines[0].slope == pytest.approx(-0.5)
+    assert lines[1].scatter == pytest.approx(0.1 / (lines[0].image_variance + 0.1))
+    # The variance of the mean of 9 x 9 cells, from the correlation along the lattice.
+    assert lines[0].truth_variance == pytest.approx(0.25 * lines[0].image_variance)
+
+
+def test_only_the_distance_of_truth_and_image_matters():
+    field = prepare(0.2, {"lai": lambda z: np.exp(0.5 * z)})
+
+    def scatter(truth, image, function=lambda means: np.exp(-means[0])):
+        truth, image = (Footprint(_BOX, _BOX, place) for place in (truth, image))
+        truth = Pixel(("lai",), (truth,), lambda means: means[0])
+        return field.regression(truth, Pixel(("lai",), (image,), function)).scatter
+
+    near = scatter((0.0, 0.0), (3.0, -1.0))
+    assert scatter((40.0, 7.5), (43.0, 6.5)) == pytest.approx(near, abs=1e-6)
+    assert abs(scatter((0.0, 0.0), (3.0, -2.0)) - near) > 0.01
+
+
+@pytest.mark.parametrize("draw", range(3))
+def test_analytic_budget_agrees_with_simulation(draw):
+    u = stats.qmc.Sobol(5, seed=5).random(4)[draw]
+    names = fifesim.ground.treatments()
+    scenario = fifesim.Scenario(
+        grid={"width": 990, "height": 990},
+        terrain={"dem": "flat"},
+        landscape={"learned": "none"},
+        ground={"arp": 0.06 + 0.18 * u[0], "distribution": names[int(3 * u[1])]},
+        sensor={"offset": [0.4 * u[2], -0.4 * u[3]], "noise": ["all"]},
+        atmosphere={"visibility": 15 + 40 * u[4]},
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = fifesim.budget(scenario, method="analytic", cells=297)
+        drawn = fifesim.budget(scenario, realisations=6, cells=297)
+    assert found.attrs["method"] == "analytic" and drawn.attrs["method"] == "simulate"
+    for name in ("total", "curvature", "variation", "share"):
+        allowed = np.maximum(0.005, 3 * standard_error(drawn[name]))
+        apart = abs(found[name].isel(realisation=0) - drawn[name].mean("realisation"))
+        assert (apart <= allowed).mean() >= 0.95, name
+        assert (apart <= allowed + 0.01).all(), name
+    np.testing.assert_allclose(found["share"].sum("stage") + found["curvature"], found["total"], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("sections", "reason"),
+    [
+        ({"clouds": {"cloud_cover": 0.2}}, "clouds.cloud_cover = 0"),
+        ({"terrain": {"dem": "flint-hills"}}, "terrain.dem = 'flat'"),
+        ({"landscape": {"learned": "konza"}, "ground": {}}, "landscape.learned = 'none'"),
+        ({"sensor": {"interval": 31.0}}, "sensor.interval = 'product'"),
+        ({"grid": {"width": 990, "height": 990, "cell": 4.0}}, "a grid.cell that divides"),
+        ({"atmosphere": {"adjacency": True}}, "atmosphere.adjacency = false"),
+    ],
+)
+def test_scenarios_beyond_the_analytic_budget_are_refused(sections, reason):
+    plain = {
+        "grid": {"width": 990, "height": 990},
+        "terrain": {"dem": "flat"},
+        "landscape": {"learned": "none"},
+        "ground": {"arp": 0.15},
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with pytest.raises(ValueError, match=reason.replace(".", r"\.")):
+            fifesim.budget(fifesim.Scenario(**(plain | sections)), method="analytic", cells=240)
+    with pytest.raises(ValueError, match="has no errors of a quantity"):
+        fifesim.budget(fifesim.Scenario(**plain), quantity="lai", method="analytic")
