@@ -81,9 +81,7 @@ class Prepared:
             tangents[number, own] = tangents_of(pixel.function, means[own], steps[own])
         mean = np.array(values) @ SHARES
         apart = np.array(values) - mean[:, None]
-        moments = (apart * SHARES) @ apart.T + np.einsum(
-            "piz,qjz,ij,z->pq", tangents, tangents, rest, SHARES, optimize=True
-        )
+        moments = (apart * SHARES) @ apart.T + np.einsum("piz,qjz,ij,z->pq", tangents, tangents, rest, SHARES)
         (of_truth, both), (_, of_image) = moments
         of_image = of_image + np.sum(image.noise(means[split:]) * SHARES)
         left = of_truth - both**2 / of_image

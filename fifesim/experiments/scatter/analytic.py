@@ -59,6 +59,7 @@ class Covariances:
         self.noisy = (
             noise_models(driver.instrument, driver.bands, setup.noise, setup.noise_models) if setup.noise else []
         )
+        self.areas = np.linspace(0.0, self.table[-1], 2001)
         self.mean = coefficients(self.leaf_area)[0]
         self.square = self._footprints(False, False)[0]
         self.seen = {state: self._footprints(*state) for state in product((False, True), repeat=2)}
@@ -100,10 +101,9 @@ class Covariances:
 
     def _interpolated(self, name, lai, function):
         """Rows of a function of leaf area, interpolated between areas of a table, shape (row, ...)."""
-        areas = np.linspace(0.0, self.table[-1], 2001)
         if name not in self.known:
-            self.known[name] = function(areas)
-        return np.array([np.interp(lai, areas, row) for row in self.known[name]])
+            self.known[name] = function(self.areas)
+        return np.array([np.interp(lai, self.areas, row) for row in self.known[name]])
 
     def along_tangent(self, lai, hazy, middle=None):
         """NDVI of cells whose reflectance is linear in leaf area, along the tangent at a middle or the field's mean."""
