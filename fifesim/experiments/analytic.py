@@ -44,7 +44,7 @@ class Pixel(NamedTuple):
     """Variance of the noise of the quantity, a function of the same means."""
 
 
-class Line(NamedTuple):
+class PixelLine(NamedTuple):
     """Regression of a truth on an image: scatter 1 - R2, slope, residual standard deviation, and moments of pixels."""
 
     scatter: float
@@ -75,24 +75,21 @@ class Prepared:
         means, rest = self.split(truth.names + image.names, (*image.footprints, *truth.footprints, *image.footprints))
         split = len(truth.names)
         steps = np.sqrt(np.maximum(np.diag(rest), 0.0)) / 3 + 1e-4 * np.abs(means).max(axis=1)
-        values, tangents = [], np.zeros((2, len(means), NODES.size))
+        values, tangents = [], np.zeros((2, len(means), FIELD_NODES.size))
         for number, (pixel, own) in enumerate(((truth, slice(0, split)), (image, slice(split, None)))):
             values.append(pixel.function(means[own]))
             tangents[number, own] = tangents_of(pixel.function, means[own], steps[own])
-        mean = np.array(values) @ SHARES
+        mean = np.array(values) @ NODE_SHARES
         apart = np.array(values) - mean[:, None]
-        moments = (apart * SHARES) @ apart.T + np.einsum("piz,qjz,ij,z->pq", tangents, tangents, rest, SHARES)
+        moments = (apart * NODE_SHARES) @ apart.T + np.einsum("piz,qjz,ij,z->pq", tangents, tangents, rest, NODE_SHARES)
         (of_truth, both), (_, of_image) = moments
-        of_image = of_image + np.sum(image.noise(means[split:]) * SHARES)
+        of_image = of_image + np.sum(image.noise(means[split:]) * NODE_SHARES)
         left = of_truth - both**2 / of_image
-        return Line(left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both, *mean)
+        return PixelLine(left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both, *mean)
 
     def split(self, names, footprints):
-        """
-        Means of properties given Z at its nodes, shape (property, node), and the covariance of their remainders.
-
-        Z is the mean of z over the first of the footprints; the last ones are those of the properties.
-        """
+        """Means of properties given the mean of z over the first footprint, and the covariance of their remainders."""
+        # Shape (property, node). The last footprints are those of the properties.
         first, footprints = footprints[0], footprints[-len(names) :]
         a = np.array([self.properties[name] for name in names])
         given = a[:, 1:] * [self.overlap(first, each)[1] for each in footprints]
@@ -101,10 +98,9 @@ class Prepared:
         return a[:, :1] + given @ _POLYNOMIALS[1:], rest
 
     def overlap(self, one, other):
-        """
-        Covariance of the means of two footprints over fields of correlation rho^k, and the mean of the powers of the
-        correlation of the cells of the second with the mean of z in the first, shape (2, order from 1).
-        """
+        """Covariances of footprints over fields of correlation rho^k, shape (2, order from 1)."""
+        # Of the means of both, and the mean of the powers of the correlation of the cells of the second with the mean
+        # of z in the first.
         key = id(one), id(other)
         if key not in self.known:
             n = self.powers.shape[1]
@@ -192,10 +188,10 @@ def polynomials(z, orders=ORDERS):
 
 
 # Nodes and weights over the mean of a footprint.
-NODES = np.linspace(-5.0, 5.0, _PIXEL_NODES)
-SHARES = np.exp(-(NODES**2) / 2)
-SHARES = SHARES / SHARES.sum()
-_POLYNOMIALS = polynomials(NODES)
+FIELD_NODES = np.linspace(-5.0, 5.0, _PIXEL_NODES)
+NODE_SHARES = np.exp(-(FIELD_NODES**2) / 2)
+NODE_SHARES = NODE_SHARES / NODE_SHARES.sum()
+_POLYNOMIALS = polynomials(FIELD_NODES)
 
 
 def tangents_of(function, means, steps):

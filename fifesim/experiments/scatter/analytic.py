@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from fifesim.chain.driver import shared_operators
-from fifesim.experiments.analytic import NODES, Footprint, Pixel, coefficients, prepare, tangents_of
+from fifesim.experiments.analytic import FIELD_NODES, Footprint, Pixel, coefficients, prepare, tangents_of
 from fifesim.experiments.scatter.stages import STEP, VARIABLES, along_tangent, scene_of, working_stages
 from fifesim.grids import grid as grids
 from fifesim.grids.reductions import areas
@@ -241,8 +241,8 @@ class Covariances:
         covariance[[0, 1], [0, 1]] += grains(middle)
         step = gain[:, None] / white
         fine = np.linspace(-4.5, 4.5, 1801)
-        numbers = CubicSpline(NODES, (white * middle - offset[:, None]) / gain[:, None], axis=1)(fine)
-        spread = CubicSpline(NODES, covariance / (step * step.T)[..., None], axis=2)(fine)
+        numbers = CubicSpline(FIELD_NODES, (white * middle - offset[:, None]) / gain[:, None], axis=1)(fine)
+        spread = CubicSpline(FIELD_NODES, covariance / (step * step.T)[..., None], axis=2)(fine)
         share, found = np.exp(-(fine**2) / 2), 0.0
         for k, m in product(range(1, _HARMONICS + 1), repeat=2):
             for sign in (-1, 1):
