@@ -146,11 +146,8 @@ class Prepared:
 
 
 def prepare(arp, functions, *, window=None, widest=96):
-    """
-    Prepared field of an arp with functions of deviates z that return the properties of cells, by name.
-
-    Regressions are of pixels in a window of rows and columns [cell], whose mean they remove; by default unlimited.
-    """
+    """Field of an arp, with functions by name that return properties of cells from its deviates."""
+    # Regressions are of pixels in a window of rows and columns [cell], whose mean they remove; by default unlimited.
     n = fft.next_fast_len(max(192, 2 * widest, margin(arp)), real=True)
     u = 2 * np.pi * fft.fftfreq(n)
     spectrum = response(arp, u[:, None], u[: n // 2 + 1]) ** 2
