@@ -3,8 +3,8 @@ One landscape through five instruments
 ======================================
 
 The figure shows the default landscape of ``fifesim simulate`` as seen by five instruments with pixels from 10 m to 1.1
-km. The landscape is synthetic: the three FIFE treatments as pastures on hills, with denser grass in valleys, bright
-thin soils on ridges, and dead leaves and litter on unburned ground. ``fifesim scenario`` prints all parameters.
+km. The hills are synthetic. Leaf area was learned from Konza Prairie: denser in valleys and along streams, in bands that
+follow contours, and thin on steep slopes. ``fifesim scenario`` prints all parameters.
 """
 
 import matplotlib.pyplot as plt
@@ -30,7 +30,7 @@ runs = {name: seen_by(name) for name in ("MSI", "TM", "MODIS", "VIIRS", "AVHRR")
 figure, axes = plt.subplots(2, 3, figsize=(11, 7.4), layout="constrained")
 truth = runs["TM"][0]
 extent = (0, 6.6, 0, 6.6)
-shown = axes[0, 0].imshow(truth, cmap="YlGn", vmin=0, vmax=3, extent=extent)
+shown = axes[0, 0].imshow(truth, cmap="YlGn", vmin=0, vmax=4, extent=extent)
 axes[0, 0].set_title("true leaf area, 30 m")
 figure.colorbar(shown, ax=axes[0, 0], shrink=0.8, label="leaf area index [m² m⁻²]")
 for axis, (name, (_, ndvi)) in zip(axes.flat[1:], runs.items(), strict=True):
@@ -38,7 +38,7 @@ for axis, (name, (_, ndvi)) in zip(axes.flat[1:], runs.items(), strict=True):
     axis.set(title=f"{name}, {pixel:g} m", facecolor="#eeeeee", xlim=(0, 6.6), ylim=(0, 6.6))
     width, height = (ndvi.sizes[side] * pixel / 1000 for side in ("x", "y"))
     shown = axis.imshow(
-        ndvi, cmap="viridis", vmin=0.15, vmax=0.65, extent=(0, width, 6.6 - height, 6.6)
+        ndvi, cmap="viridis", vmin=0.3, vmax=0.75, extent=(0, width, 6.6 - height, 6.6)
     )
 figure.colorbar(shown, ax=axes[:, 2], label="NDVI at the top of the atmosphere", shrink=0.7)
 for axis in axes.flat:
@@ -50,8 +50,7 @@ for axis in axes[:, 0]:
 # sphinx_gallery_end_ignore
 
 # %%
-# Pastures remain visible up to pixels of several hundred metres. The regression of leaf area on NDVI for each pixel
-# size:
+# Valleys remain visible up to pixels of several hundred metres. The regression of leaf area on NDVI for each pixel size:
 
 for name, (lai, ndvi) in runs.items():
     fit = fifesim.regress(lai, ndvi, pair="index")
