@@ -66,7 +66,11 @@ def test_table_sums_to_the_total_of_the_budget(why):
 def test_statements_of_the_page_on_the_table(why):
     found = why.shares()
     causes = found.loc[list(why.ROWS)]
-    moved, curved, within = "geolocation error", "curved relation between LAI and NDVI", "variation of LAI within pixels"
+    moved, curved, within = (
+        "geolocation error",
+        "curved relation between LAI and NDVI",
+        "variation of LAI within pixels",
+    )
     assert causes["TM"].idxmax() == causes["MODIS"].idxmax() == moved and causes["MSI"].idxmax() == curved
     assert set(causes["TM"].nlargest(2).index) == {moved, curved}
     assert abs(causes.loc[curved, "TM"] - causes.loc[moved, "TM"]) < 1

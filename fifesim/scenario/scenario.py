@@ -471,7 +471,18 @@ class Scenario(Keys):
 
     def _check_fields(self):
         """Check that the standard deviations of drawn fractions are feasible."""
-        for name, drawn in drawn_properties(self).items():
+        varying = drawn_properties(self)
+        if self.ground.model != "sail" and "brown" in varying:
+            raise ValueError(
+                f"ground.model = {self.ground.model!r} needs one share of dead leaves: type for instance brown = 0 in "
+                "[ground], or model = 'sail'"
+            )
+        if self.terrain.slopes == "upright" and varying:
+            raise ValueError(
+                f"terrain.slopes = 'upright' needs uniform {', '.join(varying)}: type for instance "
+                f"{', '.join(f'{name} = 0' for name in varying)} in [ground], or slopes = 'kt'"
+            )
+        for name, drawn in varying.items():
             if name in SHARES:
                 try:
                     drawn.distribution(name)

@@ -192,6 +192,7 @@ def valid_calls(tmp_path_factory):
         "cloud_field": {"cover": 0.3, "length": 100.0},
         "phenology": {"time": ["1987-06-06"]},
         "sensitivity": {"quantity": "lai", "n": 2},
+        "scenario_like": {"image": leafy, "file": folder / "like.json"},
         "dataset": {"folder": folder / "chips.zarr", "n": 1, "overwrite": True},
         "explore": {"path": folder / "page.html", "overwrite": True},
         "reproduce": {"realisations": 1, "cells": 135},

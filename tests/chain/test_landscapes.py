@@ -247,7 +247,7 @@ ALONE = {
 
 @pytest.mark.parametrize("verb", ALONE)
 def test_leaf_area_of_a_landscape_alone_warns_once_of_the_rest(site, verb):
-    land = fifesim.landscape(site, soil=0.1, brown=0.2, seed=7)
+    land = fifesim.landscape(site, cover="pastures", soil=0.1, brown=0.2, seed=7)
     with pytest.warns(UserWarning, match=r"landscape with brown, soil, which.*land\.fifesim\.surface") as found:
         ALONE[verb](land.lai)
     assert sum("landscape with" in str(each.message) for each in found) == 1
@@ -261,7 +261,7 @@ def test_leaf_area_of_a_landscape_may_be_used_alone_where_nothing_is_lost(site, 
     """The paper's treatments differ in leaf area only, and statistics of leaf area need nothing else."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
-        fifesim.landscape(site, seed=7).lai.fifesim.fpar()
+        fifesim.landscape(site, cover="pastures", seed=7).lai.fifesim.fpar()
         truth = land.lai.fifesim.aggregate(30)
         fifesim.regress(truth, 0.5 * truth)
     assert land.lai.attrs["landscape"] == "cover"

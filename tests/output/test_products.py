@@ -19,7 +19,11 @@ def test_each_block_is_listed_once(simulated_tree):
     wanted = products.wanted_blocks(found, lai)
     assert len(wanted) == len(set(wanted)) == sum(raster.data.npartitions for raster in found.values())
     cells = {f"scene-{name}" for name in simulated_tree["scene"].data_vars}
-    assert {name for name, _ in wanted} == set(found) == {"image", "lai", "fpar", "detail"} | cells
+    assert (
+        {name for name, _ in wanted}
+        == set(found)
+        == {"image", "lai", "fpar", "green_fpar", "soil", "brown", "moisture", "detail"} | cells
+    )
 
 
 def test_blocks_of_a_raster_have_one_size_and_all_bands(simulated_tree):
