@@ -3,7 +3,7 @@ One landscape through five instruments
 ======================================
 
 The figure shows the default landscape of ``fifesim simulate`` as seen by five instruments with pixels from 10 m to 1.1
-km. The hills are synthetic. Leaf area was learned from Konza Prairie: denser in valleys and along streams, in bands that
+km. The hills are synthetic. Leaf area was learned from Konza Prairie: dense in valleys and along streams, in bands that
 follow contours, and thin on steep slopes. ``fifesim scenario`` prints all parameters.
 """
 
@@ -50,7 +50,7 @@ for axis in axes[:, 0]:
 # sphinx_gallery_end_ignore
 
 # %%
-# Valleys remain visible up to pixels of several hundred metres. The regression of leaf area on NDVI for each pixel size:
+# Valleys remain visible up to pixels of several hundred metres. The regression of leaf area on NDVI by pixel size:
 
 for name, (lai, ndvi) in runs.items():
     fit = fifesim.regress(lai, ndvi, pair="index")

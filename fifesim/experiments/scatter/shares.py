@@ -16,6 +16,7 @@ from scipy import ndimage
 
 from fifesim.analysis.scaling import by_itself, shapley, taken_away
 from fifesim.base.arguments import FilePath, Kind, WholeNumber
+from fifesim.base.files import reading
 from fifesim.base.geometry import sun_geometry
 from fifesim.base.lattice import check_seed
 from fifesim.base.messages import warn
@@ -476,7 +477,8 @@ def _known_part(grid, heights):
 
 def _map_of(path):
     """Map of a raster file in a projected CRS, named after the file."""
-    cells = rioxarray.open_rasterio(path, masked=True, mask_and_scale=True)
+    with reading("the image", path):
+        cells = rioxarray.open_rasterio(path, masked=True, mask_and_scale=True)
     if cells.sizes["band"] > 1:
         raise ValueError(f"{Path(path).name} has {cells.sizes['band']} bands: give a file with LAI or NDVI alone")
     cells = cells.squeeze("band", drop=True).rename(Path(path).stem)

@@ -12,7 +12,7 @@ SMALL = {"grid": {"width": 180.0, "height": 180.0}, "terrain": {"dem": "flat"}}
 @pytest.fixture(scope="session")
 def small():
     """Function that returns a scenario with other sections."""
-    return lambda **sections: parse_scenario(SMALL | sections)
+    return lambda **sections: parse_scenario(SMALL | sections | {"ground": {"arp": 0.15} | sections.get("ground", {})})
 
 
 @pytest.fixture(scope="session")
