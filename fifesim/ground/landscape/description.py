@@ -15,7 +15,7 @@ _Numbers = tuple[float, ...]
 _Share = Annotated[float, Field(ge=0, le=10)]
 
 
-class _Part(BaseModel, extra="forbid", frozen=True):
+class _Part(BaseModel, extra="forbid", frozen=True, ser_json_inf_nan="constants"):
     """Part of the description of a landscape."""
 
 

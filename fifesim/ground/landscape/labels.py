@@ -212,7 +212,7 @@ def landscape(
     }
     arp = 0.15 if arp is None else arp
     check_arp(arp)
-    table = ()
+    table: tuple[CoverClass, ...] = ()
     if classes is not None or cover is not None or (others and lai is None):
         table = class_table(_default_classes(cover) if classes is None else classes)
         variables["cover"] = _cover(grid, cover, table, seed, chunks, allow_remote)

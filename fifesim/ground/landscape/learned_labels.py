@@ -78,7 +78,8 @@ class Landscape(Described, frozen=True):
         Logarithm by which the response of the spread is reduced, so that the residual has the variance of its fields.
         [1]
     explained : float
-        Share of the variance of scores that the terrain explains in squares that were left out. [1]
+        Share of the variance of scores that the terrain explains in squares that were left out; NaN for a map of fewer
+        than two squares. [1]
     scores, lai : tuple of float
         Nodes of the function from scores to leaf area. [1], [m2 m-2]
     properties : dict of str to DeclaredProperty
@@ -213,7 +214,7 @@ class Landscape(Described, frozen=True):
         whole, first = field_grid(lattice, grid)
         lazy = chunks is not None or any(each is not None and each.chunks for each in (pixels, dem))
         deviation, model = self._cell_model(grids.cell_size(grid)[0], lattice.ratio)
-        (field,) = self._by_place(grid, whole, dem, seed, "auto" if lazy else None, partial(np.multiply, 1 / deviation))
+        (field,) = self._by_place(grid, whole, dem, seed, "auto" if lazy else None, partial(_times, 1 / deviation))
         sizes = windows.chunk_sizes(grid, "auto" if chunks is None else chunks, tile=lattice.tile) if lazy else None
         kernel = partial(cells_within, model, seed, lattice)
         data = chunking.windows(kernel, [reads, FieldReads(field.data, lattice, first)], tuple(grid.shape), sizes)
@@ -379,8 +380,8 @@ class Landscape(Described, frozen=True):
             f"{self.lai[len(self.lai) // 2]:.2f} m2 m-2",
             f"  elevation      {low:.0f} to {high:.0f} m",
             f"  terrain        {self.explained:.0%} of the variance of scores"
-            if self.terrain
-            else "  terrain        none",
+            if self.terrain and np.isfinite(self.explained)
+            else f"  terrain        {'an unknown share of the variance' if self.terrain else 'none'}",
             f"  along contours {shares[0] / shares[1]:.0%} of the variance of the residual" if self.terrain else "",
             "  other fields   of " + ", ".join(f"{each.spacing:g}" for each in self.residual if not each.height) + " m",
             "  gusts          " + ", ".join(f"{name} {value:g}" for name, value in self.gusts.items()),
@@ -413,6 +414,10 @@ class _Cells(NamedTuple):
     def begin(self, at):
         """First cell on the lattice of the window that a cell reads, which begins with a whole square of the forms."""
         return (at // self.ratio // COARSE * COARSE - self.margin) * self.ratio
+
+
+def _times(factor, scores):
+    return factor * scores
 
 
 def _check_covers(dem, grid):

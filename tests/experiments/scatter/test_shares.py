@@ -9,6 +9,7 @@ from elevations import write
 
 import fifesim
 from fifesim.experiments.scatter import shares as scatter
+from fifesim.experiments.scatter.report import BUDGET_FILES, budget_to_folder
 from fifesim.experiments.scatter.stages import IDEAL_PROPERTIES, STAGES, working_stages
 from fifesim.scenario.scenario import parse_scenario
 
@@ -66,3 +67,23 @@ def test_realisations_are_adjacent_and_have_different_seeds(scenario):
     assert [case.ground.seed for case in cases] == [3, 4, 5, 6] and len({case.sensor.seed for case in cases}) == 4
     assert all(case.geobox().shape == (333, 333) for case in cases)
     assert len({case.grid.west for case in scatter.budget_cases(scenario(), realisations=3, cells=333)}) == 1
+
+
+def test_ground_of_an_image_is_learned_for_its_budget(tmp_path):
+    """The scenario covers the largest square with known elevation; the results have a copy of the landscape."""
+    grid = fifesim.fife_site(10.0, window=((0, 60), (0, 60)))
+    dem = fifesim.flint_hills(grid.pad(20), seed=2)
+    dem[:, :35] = np.nan
+    lai = fifesim.landscape(grid, dem=fifesim.flint_hills(grid.pad(120), seed=2), seed=2)["lai"]
+    lai.fifesim.to_geotiff(tmp_path / "lai.tif")
+    dem.fifesim.to_geotiff(tmp_path / "dem.tif")
+    with pytest.raises(ValueError, match="needs its time"):
+        scatter.scenario_like(tmp_path / "lai.tif", file=tmp_path / "land.json", instrument="MSI")
+    case = scatter.scenario_like(tmp_path / "lai.tif", tmp_path / "dem.tif", file=tmp_path / "land.json")
+    box, whole = case.geobox().boundingbox, grid.boundingbox
+    assert whole.left + 150 < box.left < whole.left + 250 and box.right <= whole.right and box.top <= whole.top
+    assert case.geobox().shape.y == case.geobox().shape.x and case.terrain.dem == str(tmp_path / "dem.tif")
+    files = budget_to_folder(case, tmp_path / "out", realisations=1)
+    assert {path.name for path in files} == {*BUDGET_FILES, "landscape.json"}
+    again = fifesim.scenario.read_scenario(tmp_path / "out" / "scenario.toml")
+    assert again.learned == str(tmp_path / "out" / "landscape.json") and again.geobox() == case.geobox()
