@@ -277,8 +277,8 @@ def explore(scenario: Scenario | None = None, path: FilePath = "explore.html", *
     Parameters
     ----------
     scenario : fifesim.scenario.scenario.Scenario, optional
-        Initial values of the sliders; the page shows the centre of its grid. By default the case of the paper with
-        patches of 32 m, on level ground.
+        Initial values of the sliders; the page shows the centre of its grid. By default the
+        scenario of ``fifesim simulate``.
     path : str or path, optional
         Path of the HTML file.
     overwrite : bool, optional

@@ -165,7 +165,8 @@ def _learned(scenario, grid, chunks):
         dem = known_dem(terrain.dem, wide, chunks, fill, units)
     scene = land.model_copy(update={"properties": properties}).simulate(grid, dem, seed=seed, chunks=chunks)
     if others:
-        scene |= landscape(grid, lai=scene["lai"], seed=seed, chunks=chunks, **others)[list(others)]
+        found = landscape(grid, lai=scene["lai"], seed=seed, chunks=chunks, **others)
+        scene = scene.assign({name: found[name] for name in others})
     return scene
 
 

@@ -292,3 +292,26 @@ def test_whole_land_is_read_where_slopes_may_hide_the_sun(sza, alone):
     hills = parse_scenario({"grid": GRID, "terrain": {"seed": 7}, "geometry": {"sza": sza, "saa": 95.0}})
     light = scenario_light_on_hills(hills, hills.geobox(), hills.sun_and_view())
     assert (light is not None) is alone
+
+
+def test_learned_landscape_draws_the_properties_of_the_scenario(tmp_path):
+    """A property is uniform if [ground] has a value and no deviation is given; others are described or drawn."""
+    deviations = {"crown_cover": 0.05, "soil": 0.1}
+    own = {"ground": {"brown": 0.3, "crown_cover": 0.8}, "landscape": {"deviations": deviations}}
+    case = parse_scenario(SMALL | own)
+    konza = fifesim.ground.Landscape.read("konza")
+    land = ground_scene(case, case.geobox())
+    assert set(land.data_vars) == {"lai", "soil", "moisture", "crown_cover"}
+    assert float(land["crown_cover"].mean()) == pytest.approx(0.8, abs=0.02)
+    described = konza.simulate(case.geobox(), seed=7)
+    np.testing.assert_array_equal(land["lai"], described["lai"])
+    np.testing.assert_array_equal(land["moisture"], described["moisture"])
+    np.testing.assert_allclose(land["soil"] * konza.properties["soil"].sd / 0.1, described["soil"], rtol=1e-12)
+    assert drawn_properties(case.complete()) == drawn_properties(case) and case.complete().ground.moisture == 0.1
+    with pytest.raises(ValueError, match="one share of dead leaves: type for instance brown = 0"):
+        parse_scenario(SMALL | {"ground": {"model": "discrete-ordinates"}}).complete()
+    with pytest.raises(ValueError, match="needs uniform soil, brown, moisture: type"):
+        parse_scenario({"grid": SMALL["grid"], "terrain": {"slopes": "upright"}}).complete()
+    konza.save(tmp_path / "mine.json")
+    mine = parse_scenario(SMALL | {"landscape": {"learned": str(tmp_path / "mine.json")}})
+    np.testing.assert_array_equal(ground_scene(mine, mine.geobox())["lai"], described["lai"])
