@@ -61,13 +61,29 @@ def draw(dn, ndvi, truth, cells_shown):
         )
     )
     extent = (0, WIDTH / 1000, 0, HEIGHT / 1000)
+    # The western half in false colour, the eastern half as NDVI.
+    colours, half = image_map(dn, "", stretch).pixels, dn.sizes["x"] // 2
     land.imshow(
-        image_map(dn, "", stretch).pixels, extent=extent, interpolation="nearest", aspect="auto"
+        colours[:, :half],
+        extent=(0, extent[1] / 2, *extent[2:]),
+        interpolation="nearest",
+        aspect="auto",
     )
+    land.imshow(
+        ndvi[:, half:],
+        extent=(extent[1] / 2, *extent[1:]),
+        cmap="YlGn",
+        vmin=0.35,
+        vmax=0.75,
+        interpolation="nearest",
+        aspect="auto",
+    )
+    land.axvline(extent[1] / 2, color="white", linewidth=2)
+    land.set(xlim=extent[:2], ylim=extent[2:])
     corner = LEFT / 1000, (HEIGHT - TOP - SIDE) / 1000
     land.add_patch(
         Rectangle(
-            corner, SIDE / 1000, SIDE / 1000, fill=False, edgecolor="white", linewidth=2.2
+            corner, SIDE / 1000, SIDE / 1000, fill=False, edgecolor="black", linewidth=2.2
         )
     )
     land.plot([0.5, 2.5], [0.42, 0.42], color="white", linewidth=3)
@@ -100,6 +116,7 @@ def _titles(land, cells, pixels, cells_title, pixels_title):
     land.set_title(
         "What Landsat 5 would have seen: near infrared, red, green", loc="left", fontsize=15
     )
+    land.set_title("NDVI, in green", loc="right", fontsize=15)
     cells.set_title(cells_title, loc="left", fontsize=13)
     pixels.set_title(pixels_title, loc="left", fontsize=13)
     for axis in (land, cells, pixels):
