@@ -325,7 +325,7 @@ def ground_in_words(scenario):
     """Classes and leaf area of the ground of a scenario."""
     ground = scenario.ground
     if scenario.learned:
-        return f"landscape learned from {Path(scenario.learned).name}"
+        return f"Landscape learned from {Path(scenario.learned).name}"
     if scenario.landscape.cover != "none":
         return f"{', '.join(scenario.class_table())} in {Path(scenario.landscape.cover).name}"
     return Path(ground.lai_file).name if ground.lai_file else f"{ground.distribution}, arp {ground.arp:g}"

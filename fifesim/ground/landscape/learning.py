@@ -231,6 +231,8 @@ def explained(values, elevation, cell):
     row, column = (place // max(1, round(_SQUARE / cell)) for place in np.nonzero(known))
     _, square = np.unique(np.stack([row, column]), axis=1, return_inverse=True)
     group = np.random.default_rng(0).permutation(square.max() + 1)[square.ravel()] % _GROUPS
+    if square.max() == 0:
+        return np.nan
     left = 0.0
     for k in range(_GROUPS):
         out, mean = group == k, score[group != k].mean()
