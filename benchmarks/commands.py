@@ -20,6 +20,7 @@ from timing import seconds
 COMMAND = "from fifesim.cli import app; app()"
 SIDE = 4500
 WIDE = """
+base = "paper"
 [grid]
 crs = "EPSG:26914"
 west = 500000.0

@@ -250,6 +250,7 @@ def budget_command(
     ] = None,
     dem: Annotated[Path | None, typer.Option(help="Elevation file that covers the raster of --like.")] = None,
     when: Annotated[str | None, typer.Option("--time", help="Its time, such as 2022-06-03T17:15Z.")] = None,
+    noise: Annotated[float, typer.Option(help="Standard deviation of its noise, in its unit.")] = 0.0,
     paper: _Paper = False,
     overwrite: _Overwrite = False,
     allow_remote: _AllowRemote = False,
@@ -261,8 +262,8 @@ def budget_command(
     _check_spelling(scenario)
     if (sensor or like) and (scenario or paper):
         raise ValueError("--sensor and --like cannot be combined with a scenario file or --paper: give one of them")
-    if (dem or when) and not like:
-        raise ValueError("--dem and --time belong to --like: give the raster from which the ground is learned")
+    if (dem or when or noise) and not like:
+        raise ValueError("--dem, --time and --noise belong to --like: give the raster from which the ground is learned")
 
     with importing():
         from fifesim.experiments.scatter.report import budget_to_folder
@@ -270,7 +271,8 @@ def budget_command(
 
     with TemporaryDirectory() as folder:
         if like:
-            found = scenario_like(like, dem, file=Path(folder) / "landscape.json", instrument=sensor, time=when)
+            file = Path(folder) / "landscape.json"
+            found = scenario_like(like, dem, file=file, instrument=sensor, time=when, noise=noise)
         else:
             found = instrument_scenario(sensor) if sensor else _scenario(scenario, paper)
         if cells is None:

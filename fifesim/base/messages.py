@@ -27,9 +27,9 @@ _ELSEWHERE = {
 }  # fmt: skip
 
 
-# Removed names of arguments and keys, and what replaces them.
+# Removed names of arguments and keys, and their replacement.
 _REMOVED = {
-    "covary": "it was removed, a learned landscape follows the terrain: remove covary, and give learned. ",
+    "covary": "it was removed, because learned landscapes follow the terrain: remove covary. ",
     "coarser": "it was removed: remove coarser, and give a larger arp. ",
     "arps": "it was removed: remove arps, fields have the arp of [ground]. ",
 }

@@ -21,11 +21,19 @@ from scipy import fft
 
 from fifesim.ground.landscape.autoregression import margin, response
 
-# Orders of the Hermite expansion, nodes of the quadratures over cells and over pixels.
-ORDERS, _NODES, _PIXEL_NODES = 24, 4001, 41
+# Orders of the Hermite expansion.
+ORDERS = 24
+
+DEVIATES = np.linspace(-8.0, 8.0, 4001)
+"""Standard normal deviates of cells at which properties are given."""
+
+# Nodes of the quadrature over pixels.
+_PIXEL_NODES = 41
 
 
-class Footprint(NamedTuple):
+# Compared by identity, because pixels share footprints.
+@dataclass(frozen=True, eq=False)
+class Footprint:
     """Weights of rows and columns of cells in a pixel, each with sum 1, and the position of the first ones. [cell]"""
 
     rows: np.ndarray
@@ -38,10 +46,15 @@ class Pixel(NamedTuple):
 
     names: tuple[str, ...]
     footprints: tuple[Footprint, ...]
-    function: Callable[..., np.ndarray]
-    """Of an array of means, shape (property, ...)."""
-    noise: Callable[..., np.ndarray | float] = lambda means: 0.0
+    function: Callable[[np.ndarray], np.ndarray]
+    """Function of an array of means, shape (property, ...)."""
+    noise: Callable[[np.ndarray], np.ndarray] | None = None
     """Variance of the noise of the quantity, a function of the same means."""
+
+
+def mean_of_cells(means):
+    """Quantity of a pixel that is the mean of its only property."""
+    return means[0]
 
 
 class PixelLine(NamedTuple):
@@ -71,38 +84,42 @@ class Prepared:
     """Transfer functions and overlaps of footprints."""
 
     def regression(self, truth, image):
-        """Line of the pixels of a truth on those of an image, without noise in the truth."""
-        means, rest = self.split(truth.names + image.names, (*image.footprints, *truth.footprints, *image.footprints))
-        split = len(truth.names)
-        steps = np.sqrt(np.maximum(np.diag(rest), 0.0)) / 3 + 1e-4 * np.abs(means).max(axis=1)
-        values, tangents = [], np.zeros((2, len(means), FIELD_NODES.size))
-        for number, (pixel, own) in enumerate(((truth, slice(0, split)), (image, slice(split, None)))):
-            values.append(pixel.function(means[own]))
-            tangents[number, own] = tangents_of(pixel.function, means[own], steps[own])
-        mean = np.array(values) @ NODE_SHARES
-        apart = np.array(values) - mean[:, None]
-        moments = (apart * NODE_SHARES) @ apart.T + np.einsum("piz,qjz,ij,z->pq", tangents, tangents, rest, NODE_SHARES)
-        (of_truth, both), (_, of_image) = moments
-        of_image = of_image + np.sum(image.noise(means[split:]) * NODE_SHARES)
+        """Regression of a truth on an image; the truth has no noise."""
+        means, values, rest = self.given(image.footprints[0], (truth, image))
+        (truth_mean, image_mean), ((of_truth, both), (_, of_image)) = moments(values, rest)
+        if image.noise is not None:
+            of_image = of_image + np.sum(image.noise(means[1]) * NODE_SHARES)
         left = of_truth - both**2 / of_image
-        return PixelLine(left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both, *mean)
+        return PixelLine(
+            left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both, truth_mean, image_mean
+        )
 
-    def split(self, names, footprints):
-        """Means of properties given the mean of z over the first footprint, and the covariance of their remainders."""
-        # Shape (property, node). The last footprints are those of the properties.
-        first, footprints = footprints[0], footprints[-len(names) :]
+    def given(self, first, pixels):
+        """Properties and quantities of pixels given the mean of z over a footprint, and covariances of the rest."""
+        # A list of means by pixel, shape (property, node); quantities, shape (pixel, node); and the covariances of the
+        # remainders of quantities along their tangents, shape (pixel, pixel, node).
+        names = [name for pixel in pixels for name in pixel.names]
+        footprints = [each for pixel in pixels for each in pixel.footprints]
         a = np.array([self.properties[name] for name in names])
         given = a[:, 1:] * [self.overlap(first, each)[1] for each in footprints]
         overlaps = np.array([[self.overlap(one, other)[0] for other in footprints] for one in footprints])
         rest = np.einsum("ik,jk,ijk->ij", a[:, 1:], a[:, 1:], overlaps - self.window) - given @ given.T
-        return a[:, :1] + given @ _POLYNOMIALS[1:], rest
+        means = a[:, :1] + given @ _POLYNOMIALS[1:]
+        steps = np.sqrt(np.maximum(np.diag(rest), 0.0)) / 3 + 1e-4 * np.abs(means).max(axis=1)
+        ends = np.cumsum([0, *(len(pixel.names) for pixel in pixels)])
+        tangents, parts = np.zeros((len(pixels), *means.shape)), []
+        for number, pixel in enumerate(pixels):
+            own = slice(ends[number], ends[number + 1])
+            tangents[number, own] = tangents_of(pixel.function, means[own], steps[own])
+            parts.append(means[own])
+        values = np.array([pixel.function(part) for pixel, part in zip(pixels, parts, strict=True)])
+        return parts, values, np.einsum("piz,qjz,ij->pqz", tangents, tangents, rest)
 
     def overlap(self, one, other):
         """Covariances of footprints over fields of correlation rho^k, shape (2, order from 1)."""
-        # Of the means of both, and the mean of the powers of the correlation of the cells of the second with the mean
-        # of z in the first.
-        key = id(one), id(other)
-        if key not in self.known:
+        # First the covariance of both means; then, over the cells of the second footprint, the mean of the powers of
+        # their correlation with the mean of z over the first.
+        if (one, other) not in self.known:
             n = self.powers.shape[1]
             shared = self._transfer(one) * self._transfer(other).conj()
             weighted = shared.real.copy()
@@ -114,9 +131,8 @@ class Prepared:
             near /= np.sqrt((self._power(one) * self.powers[0]).sum())
             area, powers = np.multiply.outer(other.rows, other.columns), np.ones_like(near)
             given = [(area * (powers := powers * near)).sum() for _ in range(ORDERS)]
-            # Footprints are kept too, so that their ids stay theirs.
-            self.known[key] = np.array([covariance, given]), one, other
-        return self.known[key][0]
+            self.known[one, other] = np.array([covariance, given])
+        return self.known[one, other]
 
     def _power(self, footprint):
         n = self.powers.shape[1]
@@ -126,16 +142,16 @@ class Prepared:
 
     def _transfer(self, footprint):
         """Transfer function of a footprint, shape (n, n // 2 + 1)."""
-        if id(footprint) not in self.known:
+        if footprint not in self.known:
             n = self.powers.shape[1]
-            widest = max(map(len, footprint[:2]))
+            widest = max(footprint.rows.size, footprint.columns.size)
             if widest > n // 2:
                 raise ValueError(
                     f"a footprint has {widest} cells, at most {n // 2} are allowed: prepare a wider lattice"
                 )
             of_weights = fft.fft(footprint.rows, n)[:, None] * fft.rfft(footprint.columns, n)
-            self.known[id(footprint)] = of_weights * self._shift(footprint.first), footprint
-        return self.known[id(footprint)][0]
+            self.known[footprint] = of_weights * self._shift(footprint.first)
+        return self.known[footprint]
 
     def _shift(self, first):
         """Phase of a displacement of rows and columns. [cell]"""
@@ -145,8 +161,8 @@ class Prepared:
         return down[:, None] * across
 
 
-def prepare(arp, functions, *, window=None, widest=96):
-    """Field of an arp, with functions by name that return properties of cells from its deviates."""
+def prepare(arp, properties, *, window=None, widest=96):
+    """Field of an arp, and properties of its cells by name, each an array of values at the `DEVIATES`."""
     # Regressions are of pixels in a window of rows and columns [cell], whose mean they remove; by default unlimited.
     n = fft.next_fast_len(max(192, 2 * widest, margin(arp)), real=True)
     u = 2 * np.pi * fft.fftfreq(n)
@@ -158,7 +174,7 @@ def prepare(arp, functions, *, window=None, widest=96):
         power = power * rho
         powers[k] = fft.rfft2(power).real / n**2
     lost = 0.0 if window is None else _of_mean(rho, window)
-    return Prepared(powers, {name: coefficients(each) for name, each in functions.items()}, lost)
+    return Prepared(powers, {name: coefficients(each) for name, each in properties.items()}, lost)
 
 
 def _of_mean(rho, window):
@@ -168,12 +184,11 @@ def _of_mean(rho, window):
     return np.array([down @ rho**k @ across for k in range(1, ORDERS + 1)])
 
 
-def coefficients(function):
-    """Coefficients of a function of a standard normal deviate for He_k / sqrt(k!), shape (ORDERS + 1,)."""
+def coefficients(values):
+    """Coefficients of a function of a deviate for He_k / sqrt(k!) from its values at the `DEVIATES`."""
     # Trapezoidal rule, because a quantile function may have kinks.
-    z = np.linspace(-8.0, 8.0, _NODES)
-    weights = np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi) * (z[1] - z[0])
-    return polynomials(z) @ (weights * function(z))
+    weights = np.exp(-(DEVIATES**2) / 2) / np.sqrt(2 * np.pi) * (DEVIATES[1] - DEVIATES[0])
+    return polynomials(DEVIATES) @ (weights * values)
 
 
 def polynomials(z, orders=ORDERS):
@@ -182,6 +197,13 @@ def polynomials(z, orders=ORDERS):
     for k in range(1, orders):
         found.append((z * found[-1] - np.sqrt(k) * found[-2]) / np.sqrt(k + 1))
     return np.array(found)
+
+
+def moments(values, rest):
+    """Mean and covariance of quantities from their values and the covariances of remainders at the nodes."""
+    mean = values @ NODE_SHARES
+    apart = values - mean[:, None]
+    return mean, (apart * NODE_SHARES) @ apart.T + rest @ NODE_SHARES
 
 
 # Nodes and weights over the mean of a footprint.
@@ -197,14 +219,3 @@ def tangents_of(function, means, steps):
     for number, step in enumerate(np.diag(steps)[..., None]):
         found[number] = (function(means + step) - function(means - step)) / (2 * steps[number])
     return found
-
-
-def noise_of_ndvi(variance):
-    """Noise of NDVI of means of red and near infrared with a variance of each, a function of their means."""
-
-    def noise(means):
-        red, nir = means
-        of_red, of_nir = np.broadcast_to(variance, 2)
-        return 4 * (nir**2 * of_red + red**2 * of_nir) / (nir + red) ** 4
-
-    return noise

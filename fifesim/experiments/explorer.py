@@ -99,7 +99,7 @@ def slider_words(sweep):
     haze = {"visibility": "Visibility", "aot": "Haze"}[sweep.haze]
     return [
         _slider("arp", "Ground patches", "distance over which leaf area is correlated", sweep.arps,
-                own.ground.arp, lambda arp: _patches(arp, own.grid.cell)),
+                own.ground.arp, lambda arp: _patches(arp, own)),
         _slider("haze", haze, "visibility, or aerosol optical thickness", sweep.hazes,
                 getattr(own.atmosphere, sweep.haze), lambda amount: _air(sweep.haze, amount)),
         _slider("sza", "Solar zenith", "solar zenith angle", sweep.szas, own.sun_and_view().sza, _sun),
@@ -116,10 +116,10 @@ def _slider(key, name, hint, values, own, mark_and_text):
     return {"key": key, "name": name, "hint": hint, "marks": marks, "texts": texts, "start": start}
 
 
-def _patches(arp, cell):
+def _patches(arp, scenario):
     if arp is None:
-        return "map", "as in the map, or learned from one"
-    length = correlation_length(arp, cell)
+        return ("learned", "as learned from a map") if scenario.learned else ("map", "as in the map")
+    length = correlation_length(arp, scenario.grid.cell)
     return f"{length:.0f} m", f"leaf area is correlated up to {length:.0f} m, arp {arp:g}"
 
 

@@ -196,9 +196,10 @@ _PIECE = 2016
 # two chunks in a row; in a scene more of them wait. Peaks of scenes of n x n chunks relative to the piece, two threads:
 # level ground 1.55 for n = 5 and 1.71 for n = 12, hills 1.28 to 1.63 for n = 5 and 1.57 to 1.99 for n = 9, three
 # classes of cover on hills 1.47 for n = 5. So chunks wait up to the fifth column, and their rims beyond it. Chunks of a
-# learned landscape do not wait for others: 0.6 on level ground and 1.05 on hills for n = 5. [1]
+# learned landscape do not wait for others on level ground, 0.6 for n = 5 and 0.9 for n = 17. On hills the elevation
+# within 1 km of two rows of chunks waits: 1.05 for n = 5 and 3.3 for n = 18. [1]
 _COLUMNS, _WAITING_COLUMNS = 2, 5
-_WAITING, _RIM = 0.25, 0.03
+_WAITING, _RIM, _ELEVATION = 0.25, 0.03, 0.18
 
 # Twice the variation between equal processes: 424 to 431 MiB in a run of 90 x 90 cells. [byte]
 _SPREAD = 16 * 2**20
@@ -221,7 +222,7 @@ def estimate(scenario, folder=".", *, threads=None, scene=False, start=0.0):
         "pixels": image.shape[-2] * image.shape[-1],
         "tasks": len(graph),
         "threads": threads,
-        "memory": round(_SPREAD + before + (peak - before) * _growth(len(lai.chunks[-1]), complete.learned)),
+        "memory": round(_SPREAD + before + (peak - before) * _growth(len(lai.chunks[-1]), complete)),
         "disk": round(workers.disk_space(complete, scene)[1]),
         "seconds": start + once + _SLACK * (lai.size - cells) / rate,
     }
@@ -248,10 +249,12 @@ def estimate_in_words(found, as_json=False):
     )
 
 
-def _growth(columns, learned):
+def _growth(columns, scenario):
     """Memory of active and waiting chunks of a scene, relative to the piece."""
-    waiting = max(min(columns, _WAITING_COLUMNS) - _COLUMNS, 0)
-    return 1 + (_RIM if learned else _WAITING) * waiting + _RIM * max(columns - _WAITING_COLUMNS, 0)
+    waiting = _RIM if scenario.learned else _WAITING
+    rim = _ELEVATION if scenario.learned and scenario.terrain.dem != "flat" else _RIM
+    few = max(min(columns, _WAITING_COLUMNS) - _COLUMNS, 0)
+    return 1 + waiting * few + rim * max(columns - _WAITING_COLUMNS, 0)
 
 
 def _calibrate(scenario, threads):

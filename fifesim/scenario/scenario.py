@@ -22,8 +22,7 @@ from fifesim.grids.opening import covering_grid
 from fifesim.grids.sites import on_fife_site
 from fifesim.ground.landscape.classes import SHARES, CoverClass, fife_classes
 from fifesim.ground.landscape.distribution import treatments
-from fifesim.ground.landscape.learned_labels import Landscape
-from fifesim.scenario.ground import check_leaf_area, drawn_properties
+from fifesim.scenario.ground import check_leaf_area, drawn_properties, learned_landscape
 from fifesim.scenario.keys import EXTENT, OFFSET_PARTS, STAND, ByName, GridKeys, Keys
 from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
 from fifesim.scenario.toml import full_path, load_values, mistakes
@@ -124,7 +123,7 @@ def _landscape(synthetic, given):
 def _learned_from(scenario):
     """Source of the learned landscape that belongs to fifesim, or the name of its file."""
     name = scenario.learned
-    return Landscape.read(name).source if name == "konza" else Path(name).name
+    return learned_landscape(name).source if name == "konza" else Path(name).name
 
 
 def _of_fife(scenario):

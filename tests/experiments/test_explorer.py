@@ -251,7 +251,7 @@ def test_sliders_start_at_the_scenario_and_show_its_values(sweep):
 def test_slider_texts_follow_the_varied_quantity(sweep, small):
     assert set(explorer.STAGE_WORDS) == {CURVATURE, *STAGES}
     arp, haze, *_ = explorer.slider_words(replace(sweep, arps=(None,), hazes=(None,)))
-    assert arp["texts"] == ["as in the map, or learned from one"] and haze["texts"] == ["without haze"]
+    assert arp["texts"] == ["as in the map"] and haze["texts"] == ["without haze"]
     values = small.model_dump(exclude_unset=True) | {"atmosphere": {"aot": 0.15}}
     haze = explorer.slider_words(sweep_of(parse_scenario(values)))[1]
     assert haze["name"] == "Haze" and haze["texts"][haze["start"]] == "aerosol optical thickness 0.15"

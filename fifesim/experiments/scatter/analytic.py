@@ -1,12 +1,25 @@
 """Scatter budget of a scenario without simulation, from the covariances of its pixels."""
 
+from __future__ import annotations
+
+from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from fifesim.chain.driver import shared_operators
-from fifesim.experiments.analytic import FIELD_NODES, Footprint, Pixel, coefficients, prepare, tangents_of
+from fifesim.experiments.analytic import (
+    DEVIATES,
+    FIELD_NODES,
+    Footprint,
+    Pixel,
+    coefficients,
+    mean_of_cells,
+    moments,
+    prepare,
+)
 from fifesim.experiments.scatter.stages import STEP, VARIABLES, along_tangent, scene_of, working_stages
 from fifesim.grids import grid as grids
 from fifesim.grids.reductions import areas
@@ -19,7 +32,10 @@ from fifesim.sensor.response.noise import radiance_std
 _HARMONICS = 6
 # Variance of the phase beyond which a harmonic is below 1e-8. [turn2]
 _SMOOTH = 1.0
-_DEVIATES = np.linspace(-6.0, 6.0, 1201)
+# Standard normal deviates of a signal, over which its rounding is averaged.
+_SIGNALS = np.linspace(-6.0, 6.0, 1201)
+# Names of the bands and of their index.
+_SEEN = ("red", "nir", "ndvi")
 
 
 def obstacles(scenario):
@@ -47,198 +63,151 @@ def obstacles(scenario):
     return [reason for reason, holds in found.items() if holds]
 
 
+class _Table(NamedTuple):
+    """Quantity of a pixel by the mean leaf area of its cells."""
+
+    areas: np.ndarray
+    values: np.ndarray
+
+    def __call__(self, means):
+        return np.interp(means[0], self.areas, self.values)
+
+
+class _Recording(NamedTuple):
+    """Line from the reflectance of both bands to the recorded one, each (2, 1), and covariances of its remainders."""
+
+    gain: np.ndarray | float = 1.0
+    shift: np.ndarray | float = 0.0
+    rest: np.ndarray | float = 0.0
+    """Variance by rounding to digital numbers of each band."""
+    shared: float = 0.0
+    """Covariance of the rounding errors of both bands."""
+
+
 class Covariances:
     """Prepared covariances of a scenario: the line of a truth on NDVI for any set of stages."""
 
     def __init__(self, scenario):
-        self.stages, self.known = working_stages(scenario), {}
-        self.scene = scene_of(scenario)
-        self.driver, self.scenario = self.scene.driver, scenario
-        self.table = quantile_table(lai_distribution(scenario.ground.distribution))
-        setup, driver = self.scene.setup, self.driver
-        self.noisy = (
-            noise_models(driver.instrument, driver.bands, setup.noise, setup.noise_models) if setup.noise else []
-        )
-        self.areas = np.linspace(0.0, self.table[-1], 2001)
-        self.mean = coefficients(self.leaf_area)[0]
+        self.stages, self.scene = working_stages(scenario), scene_of(scenario)
+        self.driver, setup = self.scene.driver, self.scene.setup
+        given = self.driver.instrument, self.driver.bands, setup.noise, setup.noise_models
+        self.noisy = noise_models(*given) if setup.noise else []
+        quantiles = quantile_table(lai_distribution(scenario.ground.distribution))
+        lai = quantile_map(DEVIATES, quantiles)
+        self.areas, self.mean = np.linspace(0.0, quantiles[-1], 2001), coefficients(lai)[0]
+        absorbed = self.driver.fpar(self.areas, scenario.ground.fpar_inf)
+        # Properties by leaf area, and in the air and without it (1 and 0): reflectance of both bands and NDVI.
+        self.by_area = {"lai": _Table(self.areas, self.areas), "fpar": _Table(self.areas, absorbed)}
+        properties = {"lai": lai}
+        for hazy in (0, 1):
+            seen = self._seen(self.driver.reflectance(self.areas[None]), hazy)[:, 0]
+            self.by_area |= {f"{name}{hazy}": _Table(self.areas, row) for name, row in zip(_SEEN, seen, strict=True)}
+            properties[f"tangent{hazy}"] = self._along_tangent(lai, hazy, self.mean)
+        properties |= {name: table(lai[None]) for name, table in self.by_area.items() if name != "lai"}
         self.square = self._footprints(False, False)[0]
         self.seen = {state: self._footprints(*state) for state in product((False, True), repeat=2)}
-        widest = max(len(line) for pair in self.seen.values() for each in pair for line in each[:2])
-        self.prepared = prepare(
-            scenario.ground.arp,
-            {
-                "lai": self.leaf_area,
-                **{
-                    f"tangent{hazy:d}": lambda z, hazy=hazy: self.along_tangent(self.leaf_area(z), hazy)
-                    for hazy in (0, 1)
-                },
-                "fpar": lambda z: self.fpar(self.leaf_area(z)),
-                **{
-                    f"{name}{hazy:d}": lambda z, layer=layer, hazy=hazy: self.cells(self.leaf_area(z), hazy)[layer]
-                    for layer, name in enumerate(("red", "nir", "ndvi"))
-                    for hazy in (False, True)
-                },
-            },
-            window=self.scene.grid.shape,
-            widest=widest,
+        widest = max(each.rows.size for pair in self.seen.values() for each in pair)
+        widest = max(widest, *(each.columns.size for pair in self.seen.values() for each in pair))
+        self.prepared = prepare(scenario.ground.arp, properties, window=self.scene.grid.shape, widest=widest)
+        self.recordings, self.tangents = {}, {}
+
+    def line(self, variable, at_work):
+        """Regression of a variable on NDVI with some stages active."""
+        truth = Pixel((variable,), (self.square,), mean_of_cells)
+        if "non-linearity" not in at_work:
+            truth = self._uniform(variable)
+        seen = self.seen["point spread" in at_work, "registration" in at_work]
+        return self.prepared.regression(truth, self._image(seen, at_work))
+
+    def uniform_line(self, variable):
+        """Regression with all stages active over ground that is uniform within each pixel."""
+        at_work = {*self.stages, "NDVI scaling"} - {"non-linearity"}
+        seen = self._footprints("point spread" in at_work, "registration" in at_work, even=True)
+        return self.prepared.regression(self._uniform(variable), self._image(seen, at_work))
+
+    def _uniform(self, variable):
+        """Quantity of a pixel whose cells have the mean leaf area."""
+        return Pixel(("lai",), (self.square,), self.by_area[variable])
+
+    def _image(self, seen, at_work):
+        """NDVI of pixels with some stages active."""
+        hazy, curved = int("atmosphere" in at_work), "non-linearity" in at_work
+        bands = tuple(
+            Pixel((f"{name}{hazy}",), (footprint,), mean_of_cells)
+            if curved
+            else Pixel(("lai",), (footprint,), self.by_area[f"{name}{hazy}"])
+            for name, footprint in zip(_SEEN, seen, strict=False)
         )
+        key = seen, hazy, curved, "quantisation" in at_work, "noise" in at_work
+        if key not in self.recordings:
+            self.recordings[key] = self._recording(bands, at_work)
+        image = _Image(self, hazy, bands, self.recordings[key], "noise" in at_work)
+        if "NDVI scaling" in at_work:
+            return Pixel(sum((each.names for each in bands), ()), seen, image.ndvi, image.noise)
+        names = f"ndvi{hazy}" if curved else f"tangent{hazy}", *(each.names[0] for each in bands)
+        scaled = image.plus_cells if curved else image.plus_tangent
+        return Pixel(names, (seen[0], *seen), scaled, image.noise)
 
-    def leaf_area(self, z):
-        """Leaf area of deviates of the field, shape as z."""
-        return quantile_map(z, self.table)
+    def grains(self, reflectance):
+        """Variance of the noise of the detector for the reflectance of each band."""
+        white = self.white
+        radiance = zip(white * reflectance, self.noisy, strict=True)
+        return np.array([radiance_std(each, *own) ** 2 for each, own in radiance]) / white**2
 
-    def fpar(self, lai):
-        """FPAR of leaf area, shape as lai."""
-        return self._interpolated(
-            "fpar", lai, lambda area: self.driver.fpar(area, self.scenario.ground.fpar_inf)[None]
-        )[0]
-
-    def cells(self, lai, hazy):
-        """Red and near infrared reflectance and NDVI of cells, shape (3, ...)."""
-        return self._interpolated(
-            f"cells{hazy:d}", lai, lambda area: self._seen(self.driver.reflectance(area[None]), hazy)[:, 0]
-        )
-
-    def _interpolated(self, name, lai, function):
-        """Rows of a function of leaf area, interpolated between areas of a table, shape (row, ...)."""
-        if name not in self.known:
-            self.known[name] = function(self.areas)
-        return np.array([np.interp(lai, self.areas, row) for row in self.known[name]])
-
-    def along_tangent(self, lai, hazy, middle=None):
-        """NDVI of cells whose reflectance is linear in leaf area, along the tangent at a middle or the field's mean."""
-        area = np.atleast_2d(lai)
-        at = np.full_like(area, self.mean) if middle is None else np.atleast_2d(np.clip(middle, 0.0, self.table[-1]))
-        return self._seen(along_tangent(self.driver.reflectance, area, at), hazy)[2].reshape(np.shape(lai))
-
-    def _of_tangent(self, mean, area, hazy):
-        """Mean NDVI of cells along the tangent at their mean area less NDVI there, from that along one tangent."""
-
-        def both(area):
-            def curvature(middle):
-                sides = [self.along_tangent(area + step, hazy, middle) for step in (-STEP, 0.0, STEP)]
-                return sides[0] - 2 * sides[1] + sides[2]
-
-            return np.array([self.along_tangent(area, hazy), curvature(area) / curvature(None)])
-
-        along, ratio = self._interpolated(f"tangent{hazy:d}", area, both)
-        return (mean - along) * ratio
+    @property
+    def white(self):
+        """Radiance of a reflectance of one, shape (2, 1)."""
+        return self.driver.radiance(np.ones((2, 1, 1)))[:, 0]
 
     def _seen(self, reflectance, hazy):
         seen = self.driver.toa(reflectance) if hazy else reflectance
         return np.concatenate([seen, self.driver.ndvi(seen, linear=True)[None]])
 
-    def line(self, variable, at_work):
-        """Regression of a variable on NDVI with some stages active."""
-        hazy, curved = "atmosphere" in at_work, "non-linearity" in at_work
-        seen = self.seen["point spread" in at_work, "registration" in at_work]
-        if curved:
-            truth = Pixel((variable,), (self.square,), lambda means: means[0])
-        else:
-            truth = self._of_leaf_area(variable, self.square)
-        return self.prepared.regression(truth, self._image(seen, at_work, hazy, curved))
+    def _along_tangent(self, lai, hazy, middle):
+        """NDVI of cells whose reflectance is linear in leaf area, along the tangent at a middle."""
+        at = np.clip(np.broadcast_to(middle, lai.shape), 0.0, self.areas[-1])[None]
+        return self._seen(along_tangent(self.driver.reflectance, lai[None], at), hazy)[2, 0]
 
-    def uniform_line(self, variable):
-        """Regression with all stages active over ground that is uniform within each pixel."""
-        at_work = set(self.stages)
-        seen = self._footprints("point spread" in at_work, "registration" in at_work, even=True)
-        truth = self._of_leaf_area(variable, self.square)
-        return self.prepared.regression(truth, self._image(seen, at_work, "atmosphere" in at_work, False, even=True))
+    def of_tangent(self, mean, area, hazy):
+        """Mean NDVI of cells along the tangent at their mean area less NDVI there, from that along one tangent."""
+        if hazy not in self.tangents:
+            along = self._along_tangent(self.areas, hazy, self.mean)
+            ratio = self._curvature(self.areas, hazy, self.areas) / self._curvature(self.areas, hazy, self.mean)
+            self.tangents[hazy] = _Table(self.areas, along), _Table(self.areas, ratio)
+        along, ratio = (table(area[None]) for table in self.tangents[hazy])
+        return (mean - along) * ratio
 
-    def _of_leaf_area(self, variable, footprint):
-        function = {"lai": lambda means: means[0], "fpar": lambda means: self.fpar(means)[0]}[variable]
-        return Pixel(("lai",), (footprint,), function)
+    def _curvature(self, area, hazy, middle):
+        """Second difference of NDVI along the tangent at a middle."""
+        low, here, high = (self._along_tangent(area + step, hazy, middle) for step in (-STEP, 0.0, STEP))
+        return low - 2 * here + high
 
-    def _image(self, seen, at_work, hazy, curved, even=False):
-        """NDVI of pixels, from the reflectance of their cells or from that of the mean leaf area of each footprint."""
-        scaled = "NDVI scaling" not in at_work and not even
-        names = (f"red{hazy:d}", f"nir{hazy:d}") if curved else ("lai", "lai")
-
-        def bands(means):
-            own = means[scaled:]
-            return (
-                np.asarray(own)
-                if curved
-                else np.array([self.cells(area, hazy)[layer] for layer, area in enumerate(own)])
-            )
-
-        # Footprints are kept too, so that their ids stay theirs.
-        key = names, id(seen), hazy, "quantisation" in at_work, "noise" in at_work
-        if key not in self.known:
-            self.known[key] = (
-                self._recorded(names, seen, lambda means: bands([0.0, *means] if scaled else means), at_work),
-                seen,
-            )
-        gain, shift, noise, shared = self.known[key][0]
-
-        def recorded(means):
-            return gain * bands(means) + shift
-
-        def value(means):
-            found = self.driver.ndvi(recorded(means), linear=True)
-            if not scaled:
-                return found
-            if curved:
-                return found + means[0] - self.driver.ndvi(bands(means), linear=True)
-            return found + self._of_tangent(means[0], means[1], hazy)
-
-        def variance(means):
-            red, nir = recorded(means)
-            of_red, of_nir = noise(bands(means))
-            return 4 * (nir**2 * of_red + red**2 * of_nir - 2 * red * nir * shared) / (nir + red) ** 4
-
-        if scaled:
-            names, seen = (f"{'ndvi' if curved else 'tangent'}{hazy:d}", *names), (seen[0], *seen)
-        return Pixel(names, seen, value, variance)
-
-    def _recorded(self, names, seen, bands, at_work):
-        """
-        Gain, shift, shape (2, 1), variance of the recorded reflectance of each band, a function of reflectance, and the
-        covariance of both.
-
-        Rounding to digital numbers of a normal signal is a line and an uncorrelated remainder.
-        """
-        driver, of_truth = self.driver, self._of_leaf_area("lai", self.square)
-        white = driver.radiance(np.ones((2, 1, 1)))[:, 0]
-
-        def grains(means):
-            if "noise" not in at_work:
-                return np.zeros_like(means)
-            radiance = white * means
-            return (
-                np.array([radiance_std(each, *own) ** 2 for each, own in zip(radiance, self.noisy, strict=True)])
-                / white**2
-            )
-
+    def _recording(self, bands, at_work):
+        """Rounding of a normal signal to digital numbers, which is a line and an uncorrelated remainder."""
         if "quantisation" not in at_work:
-            return 1.0, 0.0, grains, 0.0
-        lines = [
-            self.prepared.regression(of_truth, Pixel(names, seen, lambda means, k=k: bands(means)[k])) for k in (0, 1)
-        ]
-        mean = np.array([[line.image_mean] for line in lines])
-        spread = np.sqrt(np.array([[line.image_variance] for line in lines]) + grains(mean))
-        signal = mean + spread * _DEVIATES
+            return _Recording()
+        driver = self.driver
+        _, values, rest = self.prepared.given(bands[0].footprints[0], bands)
+        mean, covariance = (each[..., None] for each in moments(values, rest))
+        variance = np.diagonal(covariance[..., 0])[:, None]
+        if "noise" in at_work:
+            variance = variance + self.grains(mean)
+            rest[[0, 1], [0, 1]] += self.grains(values)
+        spread = np.sqrt(variance)
+        signal = mean + spread * _SIGNALS
         counted = driver.planetary(driver.recorded(driver.radiance(signal[:, None])))[:, 0]
         if np.isnan(counted).any():
             raise ValueError("pixels are saturated: give method='simulate'")
-        share = np.exp(-(_DEVIATES**2) / 2)
+        share = np.exp(-(_SIGNALS**2) / 2)
         share = share / share.sum()
-        center = counted @ share
-        gain = ((counted * _DEVIATES) @ share / spread[:, 0])[:, None]
-        rest = ((counted**2) @ share - center**2)[:, None] - (gain * spread) ** 2
-        shared = self._shared_rounding(names, seen, bands, grains)
-        return gain, center[:, None] - gain * mean, lambda means: gain**2 * grains(means) + rest, shared
+        center = (counted @ share)[:, None]
+        gain = ((counted * _SIGNALS) @ share)[:, None] / spread
+        left = ((counted**2) @ share)[:, None] - center**2 - (gain * spread) ** 2
+        return _Recording(gain, center - gain * mean, left, self._shared_rounding(values, rest))
 
-    def _shared_rounding(self, names, seen, bands, grains):
+    def _shared_rounding(self, middle, covariance):
         """Covariance of the rounding errors of both bands, from the Fourier series of rounding."""
-        driver, (gain, offset, _) = self.driver, self.driver.scale
-        white = driver.radiance(np.ones((2, 1, 1)))[:, 0]
-        means, rest = self.prepared.split(names, seen)
-        steps = np.sqrt(np.maximum(np.diag(rest), 0.0)) / 3 + 1e-4 * np.abs(means).max(axis=1)
-        slopes = np.array([tangents_of(lambda m, k=k: bands(m)[k], means, steps) for k in (0, 1)])
-        covariance = np.einsum("piz,qjz,ij->pqz", slopes, slopes, rest)
-        middle = bands(means)
-        covariance[[0, 1], [0, 1]] += grains(middle)
+        white, (gain, offset, _) = self.white, self.driver.scale
         step = gain[:, None] / white
         fine = np.linspace(-4.5, 4.5, 1801)
         numbers = CubicSpline(FIELD_NODES, (white * middle - offset[:, None]) / gain[:, None], axis=1)(fine)
@@ -276,6 +245,45 @@ class Covariances:
                 first.append(start)
             found.append(Footprint(*lines, tuple(first)))
         return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Image:
+    """NDVI of pixels as functions of the means of properties of their cells, the last two of which are of the bands."""
+
+    of: Covariances
+    hazy: int
+    bands: tuple[Pixel, Pixel]
+    recording: _Recording
+    noisy: bool
+
+    def reflectance(self, means):
+        """Reflectance of both bands before recording."""
+        return np.array([band.function(each[None]) for band, each in zip(self.bands, means[-2:], strict=True)])
+
+    def recorded(self, means):
+        """Recorded reflectance of both bands."""
+        return self.recording.gain * self.reflectance(means) + self.recording.shift
+
+    def ndvi(self, means):
+        """NDVI of the recorded reflectance."""
+        return self.of.driver.ndvi(self.recorded(means), linear=True)
+
+    def plus_cells(self, means):
+        """Mean NDVI of the cells, the first of the means, and the change of NDVI by recording."""
+        return self.ndvi(means) + means[0] - self.of.driver.ndvi(self.reflectance(means), linear=True)
+
+    def plus_tangent(self, means):
+        """As `plus_cells`, for cells along the tangent at the mean leaf area."""
+        return self.ndvi(means) + self.of.of_tangent(means[0], means[1], self.hazy)
+
+    def noise(self, means):
+        """Variance of NDVI by noise and rounding."""
+        red, nir = self.recorded(means)
+        grains = self.of.grains(self.reflectance(means)) if self.noisy else 0.0
+        of_red, of_nir = np.broadcast_to(self.recording.gain**2 * grains + self.recording.rest, (2, *red.shape))
+        shared = self.recording.shared
+        return 4 * (nir**2 * of_red + red**2 * of_nir - 2 * red * nir * shared) / (nir + red) ** 4
 
 
 def _even(line, start, cells):

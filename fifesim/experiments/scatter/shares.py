@@ -165,12 +165,9 @@ def budget(
         check_retrieval(retrieval, scenario)
     elif retrieval != "line" or weather is not None:
         raise ValueError("retrieval and weather have an effect only with a quantity: give quantity='gpp' too")
-    if method not in ("simulate", "analytic"):
-        raise ValueError(f"method must be 'simulate' or 'analytic', got {method!r}")
-    if method == "analytic":
-        if quantity is not None:
-            raise ValueError("method='analytic' has no errors of a quantity: give method='simulate'")
-        realisations = 1
+    if method == "analytic" and quantity is not None:
+        raise ValueError("method='analytic' has no errors of a quantity: give method='simulate'")
+    realisations = 1 if method == "analytic" else realisations
     cases = budget_cases(scenario, realisations=realisations, cells=cells, seed=seed)
     if quantity is not None:
         shown = steps(cases, "stage by stage") if each is None else each(cases)
@@ -393,6 +390,7 @@ def scenario_like(
     quantity: Literal["lai", "ndvi"] | None = None,
     instrument: str | None = None,
     time: str | None = None,
+    noise: float = 0.0,
 ) -> Scenario:
     """
     Scenario whose ground is a landscape learned from an image, on the terrain of the image.
@@ -406,12 +404,14 @@ def scenario_like(
     file : str or path
         JSON file to which the landscape is written; the scenario reads it.
     quantity : {"lai", "ndvi"}, optional
-        Quantity of the image; by default its name, or that of its file.
+        Quantity of the image; by default from its name or the name of its file.
     instrument : str, optional
         Instrument of the image and of the scenario, with its blur, noise and geolocation error; required for NDVI. By
         default the scenario has TM, and cells of the image are means of the ground.
     time : str, optional
         Date and time of the image, UTC unless it has an offset; required for NDVI and outside of the FIFE site.
+    noise : float, optional
+        Standard deviation of the noise of the image, which is not learned, in its unit.
 
     Returns
     -------
@@ -441,24 +441,27 @@ def scenario_like(
     """
     cells = image if isinstance(image, xr.DataArray) else _map_of(image)
     grid, seen = grids.geobox(cells), instrument_scenario(instrument or "TM")
-    longitude, latitude = projection.middle(grid)
     if instrument is not None and time is None:
         raise ValueError("the image of an instrument needs its time: type for instance time='2022-06-03T17:15Z'")
+    longitude, latitude = projection.middle(grid)
     geometry = None if time is None else sun_geometry(time, latitude, longitude)
-    source = f"{cells.name or 'a map'}, {time}" if time else str(cells.name or "a map")
-    own = {"quantity": quantity, "instrument": instrument, "geometry": geometry, "source": source}
-    learn_landscape(cells, dem, **own).save(file)
+    source = ", ".join(filter(None, [str(cells.name or "a map"), time]))
+    learn_landscape(
+        cells, dem, quantity=quantity, instrument=instrument, geometry=geometry, noise=noise, source=source
+    ).save(file)
     heights = None if dem is None else onto_grid(open_source(dem, "dem"), grid)
     pixel, box = seen.sensor.size, _known_part(grid, heights).boundingbox
     west, north = math.ceil(box.left / pixel) * pixel, math.floor(box.top / pixel) * pixel
-    width, height = ((math.floor(end / pixel) * pixel) for end in (box.right - west, north - box.bottom))
-    ground = {"crs": grid.crs.to_wkt(), "west": west, "north": north, "width": width, "height": height}
-    keys = {"grid": ground | {"cell": min(_CELL, pixel / 3)}, "sensor": seen.sensor.model_dump(exclude_unset=True)}
-    keys |= {"landscape": {"learned": str(file)}, "geometry": {} if time is None else {"time": time}}
-    keys["terrain"] = {"dem": "flat" if dem is None else str(dem)}
-    if heights is not None:
-        keys["atmosphere"] = {"altitude": round(max(float(heights.mean()) / 1000, 0.0), 3)}
-    return Scenario(**keys)
+    width, height = (math.floor(length / pixel) * pixel for length in (box.right - west, north - box.bottom))
+    altitude = {} if heights is None else {"altitude": round(max(float(heights.mean()) / 1000, 0.0), 3)}
+    return Scenario(
+        grid=grid_keys(grids.grid_at(grid.crs.to_wkt(), west, north, width, height, min(_CELL, pixel / 3))),
+        landscape={"learned": str(file)},
+        terrain={"dem": "flat" if dem is None else str(dem)},
+        geometry={} if time is None else {"time": time},
+        atmosphere=altitude,
+        sensor=seen.sensor,
+    )
 
 
 # Cells of a map around a part with known elevation, so that its spline is known too.
@@ -487,7 +490,7 @@ def _map_of(path):
     # Nearest cells, because interpolation would blur the map once more.
     crs = cells.rio.estimate_utm_crs()
     size = np.sqrt(np.prod(np.abs(cells.rio.reproject(crs).rio.resolution())))
-    return cells.rio.reproject(crs, resolution=float(f"{size:.1g}"), nodata=np.nan)
+    return cells.rio.reproject(crs, resolution=float(f"{size:.2g}"), nodata=np.nan)
 
 
 def window_cells(scenario):

@@ -21,11 +21,11 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import fft, ndimage
-from scipy.interpolate import BSpline
 
 from fifesim.base.caches import cached
 from fifesim.ground.landscape.autoregression import field_variance, pair_correlations, periodic_field, response
 from fifesim.ground.landscape.distribution import quantile_map, quantile_table
+from fifesim.ground.landscape.learned import spline_correlation
 
 # Offset of the squared frequency, so that the spectral density of the trend is finite at zero. [radian2 per pixel2]
 _SLOWEST = 1e-5
@@ -39,12 +39,10 @@ class SplineFields(NamedTuple):
 
     def density(self, u, v):
         """Spectral density at angular frequencies of rows and columns, shape (u, v), for a variance of one. [1]"""
-        # The autocorrelation of cubic splines is the spline of degree seven.
-        spline = BSpline.basis_element(np.arange(9.0) - 4, extrapolate=False)
         total = np.zeros((u.size, v.size))
         for spacing, share in zip(self.spacings, self.shares, strict=True):
             lags = np.arange(1, int(np.ceil(4 * spacing)))
-            weights = 2.0 * spline(lags / spacing) / float(spline(0.0))
+            weights = 2.0 * spline_correlation(lags / spacing)
             down, across = (1.0 + np.cos(each[:, None] * lags) @ weights for each in (u, v))
             total += share * down[:, None] * across
         return total

@@ -121,8 +121,8 @@ def landscape(
     """
     Create a landscape: leaf area, land cover classes and other ground properties on one grid.
 
-    By default, leaf area is that of a landscape learned from Konza Prairie; ``cover``, ``classes``, ``lai`` or ``arp``
-    replace it.
+    By default, leaf area is simulated by a landscape learned from Konza Prairie; ``cover``, ``classes``, ``lai`` or
+    ``arp`` replace it.
 
     Parameters
     ----------
@@ -145,9 +145,8 @@ def landscape(
         Dead fraction of the leaf area, crown cover, soil brightness and soil moisture, as in `surface_reflectance`: a
         number, a `Field` for a random field, or a map. They replace the values of the classes. [1]
     dem : xarray.DataArray, dims (y, x), optional
-        Elevation on the grid. A learned landscape follows it, and that of `Landscape.around` if it extends so far;
-        without it, by default the landscape follows `flint_hills` of the same seed on the FIFE site, and lies on level
-        ground elsewhere. [m]
+        Elevation on the grid, or on the grid `Landscape.around`, which a learned landscape follows. By default
+        `flint_hills` of the same seed on the FIFE site, and level ground elsewhere. [m]
     seed : int, optional
         Seed of the random fields, in [0, 2**63).
     chunks : mapping or int or "auto", optional
@@ -196,6 +195,7 @@ def landscape(
     """
     grid = grids.check_grid(grid)
     seed = check_seed(seed)
+    cover = FIFE_PASTURES if isinstance(cover, str) and cover == "pastures" else cover
     others = {"cover": cover, "classes": classes, "lai": lai, "arp": arp}
     others = [name for name, each in others.items() if each is not None]
     if learned is not None and others:
@@ -244,7 +244,7 @@ def _learned(grid, learned, dem, seed, chunks):
 
 def _default_classes(cover):
     """Default classes of a cover: from its attributes, or the classes of FIFE for patches."""
-    if cover is None or isinstance(cover, Patches) or (isinstance(cover, str) and cover == "pastures"):
+    if cover is None or isinstance(cover, Patches):
         return fife_classes()
     if isinstance(cover, xr.DataArray) and "classes" in cover.attrs:
         return classes_of(cover)
@@ -259,8 +259,6 @@ def _cover(grid, cover, table, seed, chunks, allow_remote):
                 f"the layout of the {len(table)} classes is unknown: give cover= a map of their codes, or for instance "
                 'fifesim.ground.Patches("voronoi", size=300)'
             )
-        cover = FIFE_PASTURES
-    if isinstance(cover, str) and cover == "pastures":
         cover = FIFE_PASTURES
     if isinstance(cover, Patches):
         return drawn_cover(grid, cover, table, seed, chunks)
@@ -307,16 +305,14 @@ def _leaf_area(codes, tables, arps, seed, lattice, cover, starts):
     """Leaf area of a block of codes that begins at a row and column of the grid."""
     row, column = (first + start for first, start in zip(lattice, starts, strict=True))
 
-    def field_of(arp):
-        return streaming_field(seed, arp, row, column, cover.shape)
-
     numbers, present = numbers_of(cover, codes)
     varies = (tables[:-1, 0] != tables[:-1, -1]) & present[:-1]
     needed = list(dict.fromkeys(arp for arp, each in zip(arps, varies, strict=True) if each))
-    field = field_of(needed[0]) if needed else np.zeros(cover.shape)
+    place = row, column, cover.shape
+    field = streaming_field(seed, needed[0], *place) if needed else np.zeros(cover.shape)
     for other in needed[1:]:
         mine = np.array([*(arp == other for arp in arps), False])
-        field = np.where(mine[numbers], field_of(other), field)
+        field = np.where(mine[numbers], streaming_field(seed, other, *place), field)
     return distribution.quantile_map_of_classes(field, numbers, tables)
 
 

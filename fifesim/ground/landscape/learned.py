@@ -101,10 +101,7 @@ def scores(landscape, northing, easting, seed, elevation=None, mean=0.0, spread=
     fine, coarse, benches = (np.zeros(shape) for _ in range(3))
     broad = np.full(shape, spread)
 
-    def blow(name):
-        if gusts[name]:
-            spline_noise(field_seed(seed, f"gust {name}"), GUST_LENGTHS[name], northing, easting, gusts[name], broad)
-
+    place = northing, easting
     for k, field in enumerate(landscape.level if elevation is None else landscape.residual):
         stream = field_seed(seed, f"residual {k}")
         deviation = np.sqrt(field.variance * variance_kept(field.spacing, cell))
@@ -112,18 +109,24 @@ def scores(landscape, northing, easting, seed, elevation=None, mean=0.0, spread=
             bench_noise(stream, field.spacing, field.height, northing, easting, elevation, deviation, benches)
         else:
             spline_noise(stream, field.spacing, northing, easting, deviation, fine if field.spacing <= FINE else coarse)
-    blow("broad")
-    blow("medium")
+    _add_gusts("broad", gusts, seed, place, broad)
+    _add_gusts("medium", gusts, seed, place, broad)
     # The mean of exp(2 g) for a normal g of variance s**2 is exp(2 s**2): the variance of the residual stays the same.
     scale = (0.0 if elevation is None else landscape.log_scale) + gusts["broad"] ** 2 + gusts["medium"] ** 2
     coarse *= np.exp(broad - scale)
-    blow("fine")
+    _add_gusts("fine", gusts, seed, place, broad)
     scale += gusts["fine"] ** 2
     fine *= np.exp(broad - scale)
-    blow("benches")
+    _add_gusts("benches", gusts, seed, place, broad)
     benches *= np.exp(broad - (scale + gusts["benches"] ** 2))
     total = coarse + fine + mean + benches
     return total if elevation is None else np.where(np.isnan(elevation), np.nan, total)
+
+
+def _add_gusts(name, gusts, seed, place, out):
+    """Add the logarithm by which the residual is stronger or weaker in places."""
+    if gusts[name]:
+        spline_noise(field_seed(seed, f"gust {name}"), GUST_LENGTHS[name], *place, gusts[name], out)
 
 
 def leaf_area(landscape, scores):
@@ -162,10 +165,14 @@ def variance_kept(spacing, cell):
     if not cell:
         return 1.0
     lags = (np.arange(200) + 0.5) / 200
-    # The autocorrelation of cubic splines with random coefficients is the spline of degree seven.
+    return np.mean(2 * (1 - lags) * spline_correlation(lags * cell / spacing)) ** 2
+
+
+def spline_correlation(lags):
+    """Autocorrelation of `spline_noise` along an axis at lags over its spacing. [1]"""
+    # Of cubic splines with random coefficients, it is the spline of degree seven.
     spline = BSpline.basis_element(np.arange(9.0) - 4, extrapolate=False)
-    along = np.mean(2 * (1 - lags) * np.nan_to_num(spline(lags * cell / spacing))) / float(spline(0.0))
-    return along**2
+    return np.nan_to_num(spline(lags)) / float(spline(0.0))
 
 
 def spline_noise(seed, spacing, northing, easting, deviation=1.0, out=None):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -138,7 +137,7 @@ class Landscape(Described, frozen=True):
         Warns
         -----
         UserWarning
-            If ``beyond_learned`` is above 0.1, or cells are more than twice as large as those of the learned map.
+            If ``beyond_learned`` is above 0.1, or cells are more than twice as large as the cells of the learned map.
 
         Notes
         -----
@@ -150,7 +149,7 @@ class Landscape(Described, frozen=True):
         """
         grid, seed = grids.check_grid(grid), check_seed(seed)
         history = f"landscape: learned from {in_a_line(self.source, 100)}, seed {seed}"
-        made = self._by_place(grid, grid, dem, seed, chunks, partial(leaf_area, self), tuple(self.properties))
+        made = self._by_place(grid, grid, dem, seed, chunks, names=tuple(self.properties))
         return self._labelled(made, grid, dem, history, seed, "learned")
 
     def condition(
@@ -214,7 +213,7 @@ class Landscape(Described, frozen=True):
         whole, first = field_grid(lattice, grid)
         lazy = chunks is not None or any(each is not None and each.chunks for each in (pixels, dem))
         deviation, model = self._cell_model(grids.cell_size(grid)[0], lattice.ratio)
-        (field,) = self._by_place(grid, whole, dem, seed, "auto" if lazy else None, partial(_times, 1 / deviation))
+        (field,) = self._by_place(grid, whole, dem, seed, "auto" if lazy else None, deviation)
         sizes = windows.chunk_sizes(grid, "auto" if chunks is None else chunks, tile=lattice.tile) if lazy else None
         kernel = partial(cells_within, model, seed, lattice)
         data = chunking.windows(kernel, [reads, FieldReads(field.data, lattice, first)], tuple(grid.shape), sizes)
@@ -234,8 +233,9 @@ class Landscape(Described, frozen=True):
         transform = Marginal.of_table(table, of_means, cure)
         return np.sqrt(total), CellModel(fields, transform, None, None, (1.0, 1.0), "learned")
 
-    def _by_place(self, asked, grid, dem, seed, chunks, mapped, names=()):
-        """Rasters of mapped scores and properties of a grid that contains the grid that was asked for."""
+    def _by_place(self, inner, grid, dem, seed, chunks, deviation=None, names=()):
+        """Rasters of leaf area, or of scores over a deviation, and of properties."""
+        # The elevation covers the inner grid.
         cell, across = grids.cell_size(grid)
         if abs(cell - across) > 1e-6 * cell:
             raise ValueError(f"the cells of the grid are {cell:g} x {across:g} m: give a grid of square cells")
@@ -247,11 +247,11 @@ class Landscape(Described, frozen=True):
                 f"the land are lost: simulate cells of {self.cell:g} m and use .fifesim.aggregate({cell:g})"
             )
         northing, easting = (grids.coordinates(grid)[axis].values for axis in ("y", "x"))
-        cells = _Cells(self, seed, northing, easting, cell, grids.lattice_position(grid), mapped, names)
+        cells = _Cells(self, seed, northing, easting, cell, grids.lattice_position(grid), deviation, names)
         reads, kernel, shape = [], partial(_simulated, cells), (1 + len(names), *grid.shape)
         if dem is not None:
             dem = grids.north_up(dem.transpose("y", "x"))
-            _check_covers(dem, asked)
+            _check_covers(dem, inner)
             reads = [_window_reads(cells, dem, grid)]
         if chunks is None and (dem is None or dem.chunks is None):
             what = "a landscape of {} x {} x {} values".format(*shape)
@@ -398,7 +398,7 @@ class _Cells(NamedTuple):
     easting: np.ndarray
     cell: float
     first: tuple[int, int]  # place of the first cell on the lattice
-    mapped: Callable[[np.ndarray], np.ndarray]  # values of scores
+    deviation: float | None  # by which scores are divided; None for leaf area
     names: tuple[str, ...]  # of properties
 
     @property
@@ -414,10 +414,6 @@ class _Cells(NamedTuple):
     def begin(self, at):
         """First cell on the lattice of the window that a cell reads, which begins with a whole square of the forms."""
         return (at // self.ratio // COARSE * COARSE - self.margin) * self.ratio
-
-
-def _times(factor, scores):
-    return factor * scores
 
 
 def _check_covers(dem, grid):
@@ -442,7 +438,7 @@ def _window_reads(cells, dem, grid):
 
 
 def _simulated(cells, rows, columns, ground=None):
-    """Mapped scores and properties of cells, from a window of elevation around them or on level ground."""
+    """Leaf area or scores, and properties of cells, from a window of elevation around them or on level ground."""
     landscape, ratio = cells.landscape, cells.ratio
     properties = [(name, landscape.properties[name].field) for name in cells.names]
     # Cells lie between nodes that are at most one outside of the margin.
@@ -468,7 +464,7 @@ def _simulated(cells, rows, columns, ground=None):
             own = ground[down[strip][0] : down[strip][-1] + 1, across[0] : across[-1] + 1]
         place = cells.northing[rows][strip], cells.easting[columns]
         found = scores(landscape, *place, cells.seed, own, mean, spread, cells.cell)
-        out[0, strip] = cells.mapped(found)
+        out[0, strip] = leaf_area(landscape, found) if cells.deviation is None else found / cells.deviation
         for k, (name, field) in enumerate(properties):
             score = property_scores(landscape, name, *place, cells.seed, found - mean, responses[k], cells.cell)
             out[k + 1, strip] = property_values(name, field)(score)

@@ -1,6 +1,7 @@
 """Budgets from covariances: an independent Monte Carlo table, limits of theory, and the simulated budget."""
 
 import warnings
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from scipy import stats
 
 import fifesim
-from fifesim.experiments.analytic import Footprint, Pixel, noise_of_ndvi, prepare
+from fifesim.experiments.analytic import DEVIATES, Footprint, Pixel, mean_of_cells, prepare
 from fifesim.experiments.scatter.shares import standard_error
 
 _BOX = np.full(9, 1 / 9)
@@ -21,6 +22,11 @@ _FIELDS = {
 
 def _ndvi(means):
     return (means[1] - means[0]) / (means[1] + means[0])
+
+
+def _noise(variance, means):
+    """Variance of NDVI if both bands have noise of a variance."""
+    return 4 * variance * (means[1] ** 2 + means[0] ** 2) / (means[1] + means[0]) ** 4
 
 
 def _blurred(sd, down):
@@ -36,27 +42,24 @@ def test_scatter_agrees_with_an_independent_simulation():
     assert len(table) > 150
     for (name, arp), rows in table.groupby(["lai", "arp"]):
         lai = _FIELDS[name]
-        functions = {
-            "lai": lambda z, lai=lai: lai.ppf(stats.norm.cdf(z)),
-            "red": lambda z, lai=lai: 0.03 + 0.12 * np.exp(-0.75 * lai.ppf(stats.norm.cdf(z))),
-            "nir": lambda z, lai=lai: 0.36 - 0.20 * np.exp(-0.55 * lai.ppf(stats.norm.cdf(z))),
-        }
-        field = prepare(arp, functions, window=(1152, 1152), widest=112)
-        truth = Pixel(("lai",), (Footprint(_BOX, _BOX),), lambda means: means[0])
+        area = lai.ppf(stats.norm.cdf(DEVIATES))
+        red, nir = 0.03 + 0.12 * np.exp(-0.75 * area), 0.36 - 0.20 * np.exp(-0.55 * area)
+        field = prepare(arp, {"lai": area, "red": red, "nir": nir}, window=(1152, 1152), widest=112)
+        truth = Pixel(("lai",), (Footprint(_BOX, _BOX),), mean_of_cells)
         for row in rows.itertuples():
             seen = _blurred(row.blur_sd_cells, 9 * row.shift_pixels_down)
-            noise = noise_of_ndvi(row.noise_sd_reflectance**2)
+            noise = partial(_noise, row.noise_sd_reflectance**2)
             found = field.regression(truth, Pixel(("red", "nir"), (seen, seen), _ndvi, noise))
             assert abs(found.scatter - row.scatter) <= max(0.003, 3 * row.se_scatter), row
             assert found.image_variance == pytest.approx(row.var_ndvi, rel=0.02)
 
 
 def test_linear_pixels_with_noise_have_the_scatter_of_their_variances():
-    field = prepare(0.2, {"lai": lambda z: 2 + 0.5 * z, "seen": lambda z: 3 - z})
+    field = prepare(0.2, {"lai": 2 + 0.5 * DEVIATES, "seen": 3 - DEVIATES})
     truth, seen = Footprint(_BOX, _BOX), Footprint(_BOX, _BOX)
     lines = [
         field.regression(
-            Pixel(("lai",), (truth,), lambda means: means[0]),
+            Pixel(("lai",), (truth,), mean_of_cells),
             Pixel(("seen",), (seen,), lambda means: means[0], lambda means, noise=noise: noise),
         )
         for noise in (0.0, 0.1)
@@ -68,11 +71,11 @@ def test_linear_pixels_with_noise_have_the_scatter_of_their_variances():
 
 
 def test_only_the_distance_of_truth_and_image_matters():
-    field = prepare(0.2, {"lai": lambda z: np.exp(0.5 * z)})
+    field = prepare(0.2, {"lai": np.exp(0.5 * DEVIATES)})
 
     def scatter(truth, image, function=lambda means: np.exp(-means[0])):
         truth, image = (Footprint(_BOX, _BOX, place) for place in (truth, image))
-        truth = Pixel(("lai",), (truth,), lambda means: means[0])
+        truth = Pixel(("lai",), (truth,), mean_of_cells)
         return field.regression(truth, Pixel(("lai",), (image,), function)).scatter
 
     near = scatter((0.0, 0.0), (3.0, -1.0))

@@ -124,7 +124,6 @@ def _within(values, ratio):
     return (parts - parts.mean((1, 3), keepdims=True)).reshape(values.shape)
 
 
-@pytest.mark.filterwarnings("ignore:11% of the cells are higher, lower or steeper")
 def test_conditioned_cells_have_the_means_of_the_map_and_the_structure_of_the_landscape():
     ratio, grid = 6, fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 3000.0, 3000.0, 10.0)
     dem = fifesim.flint_hills(fifesim.grid_at("EPSG:32614", 705500.0, 4334000.0, 7200.0, 7200.0, 10.0), seed=3)
