@@ -15,7 +15,6 @@ from fifesim.experiments.analytic import (
     FIELD_NODES,
     Footprint,
     Pixel,
-    coefficients,
     mean_of_cells,
     moments,
     prepare,
@@ -94,22 +93,22 @@ class Covariances:
         self.noisy = noise_models(*given) if setup.noise else []
         quantiles = quantile_table(lai_distribution(scenario.ground.distribution))
         lai = quantile_map(DEVIATES, quantiles)
-        self.areas, self.mean = np.linspace(0.0, quantiles[-1], 2001), coefficients(lai)[0]
+        self.areas = np.linspace(0.0, quantiles[-1], 2001)
         absorbed = self.driver.fpar(self.areas, scenario.ground.fpar_inf)
         # Properties by leaf area, and in the air and without it (1 and 0): reflectance of both bands and NDVI.
         self.by_area = {"lai": _Table(self.areas, self.areas), "fpar": _Table(self.areas, absorbed)}
-        properties = {"lai": lai}
+        properties, self.curvatures = {"lai": lai, "square": lai**2}, []
         for hazy in (0, 1):
             seen = self._seen(self.driver.reflectance(self.areas[None]), hazy)[:, 0]
             self.by_area |= {f"{name}{hazy}": _Table(self.areas, row) for name, row in zip(_SEEN, seen, strict=True)}
-            properties[f"tangent{hazy}"] = self._along_tangent(lai, hazy, self.mean)
+            self.curvatures.append(_Table(self.areas, self._curvature(self.areas, hazy)))
         properties |= {name: table(lai[None]) for name, table in self.by_area.items() if name != "lai"}
         self.square = self._footprints(False, False)[0]
         self.seen = {state: self._footprints(*state) for state in product((False, True), repeat=2)}
         widest = max(each.rows.size for pair in self.seen.values() for each in pair)
         widest = max(widest, *(each.columns.size for pair in self.seen.values() for each in pair))
         self.prepared = prepare(scenario.ground.arp, properties, window=self.scene.grid.shape, widest=widest)
-        self.recordings, self.tangents = {}, {}
+        self.recordings = {}
 
     def line(self, variable, at_work):
         """Regression of a variable on NDVI with some stages active."""
@@ -144,7 +143,7 @@ class Covariances:
         image = _Image(self, hazy, bands, self.recordings[key], "noise" in at_work)
         if "NDVI scaling" in at_work:
             return Pixel(sum((each.names for each in bands), ()), seen, image.ndvi, image.noise)
-        names = f"ndvi{hazy}" if curved else f"tangent{hazy}", *(each.names[0] for each in bands)
+        names = f"ndvi{hazy}" if curved else "square", *(each.names[0] for each in bands)
         scaled = image.plus_cells if curved else image.plus_tangent
         return Pixel(names, (seen[0], *seen), scaled, image.noise)
 
@@ -163,24 +162,13 @@ class Covariances:
         seen = self.driver.toa(reflectance) if hazy else reflectance
         return np.concatenate([seen, self.driver.ndvi(seen, linear=True)[None]])
 
-    def _along_tangent(self, lai, hazy, middle):
-        """NDVI of cells whose reflectance is linear in leaf area, along the tangent at a middle."""
-        at = np.clip(np.broadcast_to(middle, lai.shape), 0.0, self.areas[-1])[None]
-        return self._seen(along_tangent(self.driver.reflectance, lai[None], at), hazy)[2, 0]
-
-    def of_tangent(self, mean, area, hazy):
-        """Mean NDVI of cells along the tangent at their mean area less NDVI there, from that along one tangent."""
-        if hazy not in self.tangents:
-            along = self._along_tangent(self.areas, hazy, self.mean)
-            ratio = self._curvature(self.areas, hazy, self.areas) / self._curvature(self.areas, hazy, self.mean)
-            self.tangents[hazy] = _Table(self.areas, along), _Table(self.areas, ratio)
-        along, ratio = (table(area[None]) for table in self.tangents[hazy])
-        return (mean - along) * ratio
-
-    def _curvature(self, area, hazy, middle):
-        """Second difference of NDVI along the tangent at a middle."""
-        low, here, high = (self._along_tangent(area + step, hazy, middle) for step in (-STEP, 0.0, STEP))
-        return low - 2 * here + high
+    def _curvature(self, middle, hazy):
+        """Second derivative by leaf area of NDVI along the tangent of reflectance at a middle."""
+        sides = []
+        for step in (-STEP, 0.0, STEP):
+            seen = along_tangent(self.driver.reflectance, middle[None] + step, middle[None])
+            sides.append(self._seen(seen, hazy)[2, 0])
+        return (sides[0] - 2 * sides[1] + sides[2]) / STEP**2
 
     def _recording(self, bands, at_work):
         """Rounding of a normal signal to digital numbers, which is a line and an uncorrelated remainder."""
@@ -274,8 +262,8 @@ class _Image:
         return self.ndvi(means) + means[0] - self.of.driver.ndvi(self.reflectance(means), linear=True)
 
     def plus_tangent(self, means):
-        """As `plus_cells`, for cells along the tangent at the mean leaf area."""
-        return self.ndvi(means) + self.of.of_tangent(means[0], means[1], self.hazy)
+        """As `plus_cells` to second order for cells along a tangent, from their mean square, the first of the means."""
+        return self.ndvi(means) + 0.5 * self.of.curvatures[self.hazy](means[1:]) * (means[0] - means[1] ** 2)
 
     def noise(self, means):
         """Variance of NDVI by noise and rounding."""

@@ -112,6 +112,21 @@ def test_analytic_budget_agrees_with_simulation(draw):
     np.testing.assert_allclose(found["share"].sum("stage") + found["curvature"], found["total"], rtol=1e-9)
 
 
+def test_stages_are_right_where_the_curvature_of_ndvi_vanishes():
+    """In haze, NDVI of HRV is a straight function of leaf area near the mean of this field."""
+    scenario = fifesim.Scenario(
+        grid={"width": 1980, "height": 1980, "cell": 20 / 9},
+        terrain={"dem": "flat"},
+        ground={"arp": 0.17},
+        sensor={"instrument": "HRV"},
+        atmosphere={"visibility": 34},
+    )
+    found = fifesim.budget(scenario, method="analytic", cells=297).isel(realisation=0)
+    drawn = fifesim.budget(scenario, realisations=2, cells=297).mean("realisation")
+    for name in ("share", "first"):
+        np.testing.assert_allclose(found[name].sel(stage="atmosphere"), drawn[name].sel(stage="atmosphere"), atol=0.003)
+
+
 @pytest.mark.parametrize(
     ("sections", "reason"),
     [

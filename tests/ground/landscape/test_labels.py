@@ -120,7 +120,11 @@ def test_numbers_and_rasters_replace_fields(grid, make, land):
     [
         ({"brown": Field(mean=0.2, sd=0.5)}, ValueError, "brown lies between 0 and 1: with a mean of 0.2"),
         ({"moisture": Field(sd=0.1)}, ValueError, "moisture lies between 0 and 1"),
-        ({"covary": {"soil": -0.4}}, TypeError, "no argument 'covary': it was removed, because learned landscapes follow"),
+        (
+            {"covary": {"soil": -0.4}},
+            TypeError,
+            "no argument 'covary': it was removed, because learned landscapes follow",
+        ),
         ({"soil": "none.tif"}, ValueError, "cannot read none.tif as a raster"),
         ({"moisture": 1.2}, ValueError, r"moisture must be in \[0, 1\], got 1.2"),
         ({"moisture": [0.2]}, TypeError, "moisture must be a number, .*Field, the path of a raster or an xarray"),
