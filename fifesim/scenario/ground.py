@@ -205,11 +205,10 @@ def drawn_properties(scenario):
     land, own = scenario.ground, scenario.landscape
     described = learned_landscape(scenario.learned).properties if scenario.learned else {}
     # A property of a learned landscape is uniform if [ground] has its value and no deviation is given.
-    deviations = {name: each.sd for name, each in described.items() if name not in land.model_fields_set}
-    means = {name: each.mean for name, each in described.items() if name not in land.model_fields_set}
+    taken = {name: each for name, each in described.items() if name not in land.model_fields_set}
     return {
-        name: Field(mean=means.get(name, getattr(land, name)), sd=deviation, arp=land.arp)
-        for name, deviation in (deviations | own.deviations).items()
+        name: Field(mean=taken[name].mean if name in taken else getattr(land, name), sd=deviation, arp=land.arp)
+        for name, deviation in ({name: each.sd for name, each in taken.items()} | own.deviations).items()
         if deviation
     }
 

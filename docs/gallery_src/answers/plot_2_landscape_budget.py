@@ -60,7 +60,7 @@ axis.invert_yaxis()
 axis.set_xlabel("share of the variance of leaf area not explained by a line on NDVI [%]")
 axis.spines[["top", "right", "left"]].set_visible(False)
 axis.tick_params(axis="y", length=0)
-axis.legend(frameon=False, loc="lower right")
+axis.legend(frameon=False, loc="upper right")
 # sphinx_gallery_end_ignore
 
 # %%

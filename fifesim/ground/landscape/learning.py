@@ -90,11 +90,11 @@ def learn(lai, values, elevation, cell, origin, blur, noise, source):
     """
     known = np.isfinite(lai) if elevation is None else np.isfinite(lai) & np.isfinite(elevation)
     check_enough(known)
-    image = _Image(cell, origin, blur, known, elevation, noise / values[known].std())
+    image = _Image(cell, origin, blur, known, elevation, pair_orders(known, elevation), noise / values[known].std())
     still, forms = dict.fromkeys(GUST_LENGTHS, 0.0), None
     found = Described(source=source, cell=cell, gusts=still, level_gusts=still, scores=(-9.0, 9.0), lai=(0.0, 1.0))
     isotropic = [(float(spacing * cell), 0.0) for spacing in _SPACINGS]
-    level, gusts = _residual(found, image._replace(elevation=None), values, 0.0, isotropic, None)
+    level, gusts = _residual(found, image._replace(elevation=None, orders=None), values, 0.0, isotropic, None)
     found = found.model_copy(update={"level": level, "level_gusts": gusts})
     if elevation is not None:
         forms = land_forms(np.where(known, elevation, np.nan), cell)
@@ -117,20 +117,33 @@ def rank_scores(values, known):
     return out
 
 
-def statistics(values, known, elevation=None):
+def statistics(values, known, orders=None):
     """Half the mean square differences of pairs by distance, and by their step in elevation, and the mean spectrum."""
     found = []
-    for lag in lags_of(values.shape):
-        by_axis = []
+    for number, (front, back) in enumerate(_pairs(values.shape)):
+        squares = (values[front] - values[back])[known[front] & known[back]] ** 2 / 2
+        parts = [squares] if orders is None else np.array_split(squares[orders[number]], _THIRDS)
+        found.append([each.mean() for each in parts])
+    # Both axes of each distance.
+    by_lag = np.reshape(found, (-1, 2, len(found[0]))).mean(axis=1)
+    return np.r_[np.ravel(by_lag), ring_spectrum(values, known)]
+
+
+def pair_orders(known, elevation):
+    """Orders of the pairs of each distance and axis by their step in elevation; None without elevation."""
+    if elevation is None:
+        return None
+    steps = [
+        np.abs(elevation[front] - elevation[back])[known[front] & known[back]] for front, back in _pairs(known.shape)
+    ]
+    return [np.argsort(each, kind="stable") for each in steps]
+
+
+def _pairs(shape):
+    """Slices of both cells of pairs, by distance and axis."""
+    for lag in lags_of(shape):
         for axis in (0, 1):
-            front, back = ((slice(None),) * axis + (part,) for part in (slice(lag, None), slice(None, -lag)))
-            pairs = known[front] & known[back]
-            squares = (values[front] - values[back])[pairs] ** 2 / 2
-            if elevation is not None:
-                squares = squares[np.argsort(np.abs(elevation[front] - elevation[back])[pairs], kind="stable")]
-            by_axis.append([each.mean() for each in np.array_split(squares, 1 if elevation is None else _THIRDS)])
-        found.append(np.mean(by_axis, axis=0))
-    return np.r_[np.ravel(found), ring_spectrum(values, known)]
+            yield tuple((slice(None),) * axis + (part,) for part in (slice(lag, None), slice(None, -lag)))
 
 
 def lags_of(shape):
@@ -161,6 +174,7 @@ class _Image(NamedTuple):
     blur: Any
     known: np.ndarray
     elevation: np.ndarray | None
+    orders: list[np.ndarray] | None  # of pairs by their step in elevation
     noise: float  # standard deviations of the map
 
     def places(self):
@@ -185,17 +199,13 @@ class _Image(NamedTuple):
         blurred = fft.irfft2(fft.rfft2(ground) * transfer, s=ground.shape)
         return blurred[_FINER // 2 :: _FINER, _FINER // 2 :: _FINER]
 
-    def simulated(self, landscape, seed, forms):
+    def terrain(self, landscape, forms):
+        """Elevation, and mean and spread of the response to it, on the ground cells; nothing on level ground."""
+        return () if forms is None else tuple(map(self.ground, (self.elevation, *terrain_response(landscape, forms))))
+
+    def simulated(self, landscape, seed, terrain):
         """Scores of the ground cells of a landscape."""
-        terrain = {}
-        if forms is not None:
-            mean, spread = terrain_response(landscape, forms)
-            terrain = {
-                "elevation": self.ground(self.elevation),
-                "mean": self.ground(mean),
-                "spread": self.ground(spread),
-            }
-        return scores(landscape, *self.places(), seed, **terrain)
+        return scores(landscape, *self.places(), seed, *terrain)
 
 
 def check_enough(known, name="the map"):
@@ -300,25 +310,25 @@ def kurtosis(values, known):
 def _statistics_of(kinds, landscape, image, forms):
     """Statistics of the map of each kind of field with variance 1, shape (statistics, kinds)."""
     plain = landscape.model_copy(update={"terrain": (), "beds": None, "log_scale": 0.0})
-    table = []
+    table, terrain = [], image.terrain(plain, forms)
     for spacing, height in kinds:
         one = (Residual(spacing=spacing, variance=1.0, height=height),)
         field = plain.model_copy(update={"residual": one, "level": one})
-        found = [image.seen(image.simulated(field, seed, forms)) for seed in range(2)]
-        table.append(np.mean([statistics(each, image.known, image.elevation) for each in found], axis=0))
+        found = [image.seen(image.simulated(field, seed, terrain)) for seed in range(2)]
+        table.append(np.mean([statistics(each, image.known, image.orders) for each in found], axis=0))
     return np.array(table).T
 
 
 def _residual(landscape, image, values, mean, kinds, forms):
     """Random fields of the residual, and the standard deviations of their gusts; of level ground without forms."""
     names = ("level", "level_gusts") if forms is None else ("residual", "gusts")
-    known, measured = image.known, lambda each: statistics(each, image.known, image.elevation)
+    known, terrain = image.known, image.terrain(landscape, forms)
     table = _statistics_of(kinds, landscape, image, forms)
     score = rank_scores(values, known)
     rest = np.where(known, score - mean, 0.0)
     ordered = np.sort(values[known])
     white = np.random.default_rng(0).normal(size=values.shape) * image.noise
-    wanted, first, offset = measured(score), measured(rest), measured(white)
+    wanted, first, offset = (statistics(each, known, image.orders) for each in (score, rest, white))
     target = first
     energy, tails = np.var(_log_energy(score, known, _WIDE)), kurtosis(values, known)
     wide = fine = 0.0
@@ -335,9 +345,9 @@ def _residual(landscape, image, values, mean, kinds, forms):
         trial = landscape.model_copy(update=dict(zip(names, (tuple(fields), gusts), strict=True)))
         got, energies, heavy = [], [], []
         for seed in range(2):
-            seen = np.where(known, image.seen(image.simulated(trial, 10 * step + seed, forms)) + white, 0.0)
+            seen = np.where(known, image.seen(image.simulated(trial, 10 * step + seed, terrain)) + white, 0.0)
             drawn = rank_scores(seen, known)
-            got.append(measured(drawn))
+            got.append(statistics(drawn, known, image.orders))
             energies.append(np.var(_log_energy(drawn, known, _WIDE)))
             mapped = np.zeros(values.shape)
             mapped[known] = np.interp(
@@ -360,7 +370,8 @@ def _residual(landscape, image, values, mean, kinds, forms):
 
 def _marginal(landscape, image, lai, forms):
     """Nodes of scores and of leaf area, so that the map of simulated ground has the distribution of the real one."""
-    drawn = [image.simulated(landscape, seed, forms) for seed in (101, 102)]
+    terrain = image.terrain(landscape, forms)
+    drawn = [image.simulated(landscape, seed, terrain) for seed in (101, 102)]
     inside = np.repeat(np.repeat(image.known, _FINER, 0), _FINER, 1)
     nodes = np.quantile(np.concatenate([each[inside] for each in drawn]), _PROBABILITIES)
     wanted = np.quantile(lai[image.known], _PROBABILITIES)
