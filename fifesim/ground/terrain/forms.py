@@ -62,8 +62,8 @@ def land_forms(elevation, cell, margin=0):
     -----
     g is a Gaussian of the elevation that is known, cut at three standard deviations. From 80 m on, it is computed from
     means of squares of `COARSE` cells and interpolated, with a standard deviation that is smaller by both blurs. Cells
-    further than `forms_reach` from the border of a window that begins at a multiple of `COARSE` cells have the same bits as
-    in the whole.
+    further than `forms_reach` from the border of a window that begins at a multiple of `COARSE` cells have the same
+    bits as in the whole.
     """
     elevation = np.ascontiguousarray(elevation, float)
     sums = square_sums(elevation, COARSE)
