@@ -93,6 +93,15 @@ def test_scenario_survives_a_round_trip_through_text(tmp_path, values, complete)
     assert write_scenario(again.complete() if complete else again) == write_scenario(scenario)
 
 
+def test_base_gives_way_to_given_keys():
+    paper = Scenario(base="paper")
+    assert (paper.learned, paper.ground.distribution, paper.sensor.response) == (None, "burned-grazed", "paper")
+    given = Scenario(base="paper", ground={"distribution": "unburned-ungrazed"}, sensor={"response": "detector"})
+    assert (given.ground.distribution, given.sensor.response) == ("unburned-ungrazed", "detector")
+    assert Scenario(base="paper", sensor={"instrument": "OLI"}).sensor.response is None
+    assert Scenario(base="landscape") == Scenario()
+
+
 def test_completing_a_scenario_does_not_change_its_meaning():
     scenario = parse_scenario(SMALL | {"geometry": {"vza": 5}})
     complete = scenario.complete()

@@ -127,6 +127,18 @@ def test_stages_are_right_where_the_curvature_of_ndvi_vanishes():
         np.testing.assert_allclose(found[name].sel(stage="atmosphere"), drawn[name].sel(stage="atmosphere"), atol=0.003)
 
 
+def test_scaling_of_ndvi_has_the_sign_of_its_curvature():
+    """The standard errors of two realisations are 1e-4 to 2e-4."""
+    grid, ground = {"width": 990, "height": 990}, {"arp": 0.24, "distribution": "unburned-ungrazed"}
+    scenario = fifesim.Scenario(grid=grid, ground=ground, terrain={"dem": "flat"})
+    found = fifesim.budget(scenario, method="analytic", cells=297).isel(realisation=0)
+    drawn = fifesim.budget(scenario, realisations=2, cells=297).mean("realisation")
+    for name in ("share", "first"):
+        scaling = drawn[name].sel(variable="lai", stage="NDVI scaling")
+        assert float(found[name].sel(variable="lai", stage="NDVI scaling")) == pytest.approx(float(scaling), abs=6e-4)
+        assert scaling > 1e-3
+
+
 @pytest.mark.parametrize(
     ("sections", "reason"),
     [

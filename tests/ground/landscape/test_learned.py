@@ -347,6 +347,11 @@ def test_terrain_beyond_the_learned_range_warns(hills):
     with pytest.warns(UserWarning, match="of the cells are higher, lower or steeper"):
         land = KONZA.simulate(GRID, hills + 500.0)
     assert land["lai"].attrs["beyond_learned"] == 1.0
+    highest = next(each.nodes[-1] for each in KONZA.terrain if each.form == "elevation")
+    just_above = hills * 0 + highest + 1.0
+    with pytest.warns(UserWarning, match="of the cells are higher, lower or steeper"):
+        KONZA.simulate(GRID, just_above)
+    assert KONZA.simulate(GRID, just_above - 2.0)["lai"].attrs["beyond_learned"] == 0.0
 
 
 def test_elevation_of_a_landscape_that_was_learned_without_one(hills):
