@@ -3,8 +3,7 @@ Moments of pixels over a Gaussian field mapped to leaf area, without simulation.
 
 Cells have properties f(z) of a standard normal field z with correlation rho. In Hermite polynomials,
 f(z) = sum_k a_k He_k(z) / sqrt(k!), so that the covariance of two properties at a lag is sum_k a_k b_k rho^k.
-Pixels are weighted means of cells. Their covariance is the mean over all frequencies of the spectrum times both
-transfer functions.
+Pixels are weighted means of cells: their covariance is the mean over all lags between cells of both.
 
 NDVI is curved. A pixel is divided into its mean given Z, the weighted mean of z over its footprint, and a remainder.
 NDVI is evaluated at the first by quadrature, and along its tangent for the second.
@@ -34,11 +33,18 @@ _PIXEL_NODES = 41
 # Compared by identity, because pixels share footprints.
 @dataclass(frozen=True, eq=False)
 class Footprint:
-    """Weights of rows and columns of cells in a pixel, each with sum 1, and the position of the first ones. [cell]"""
+    """Weights of rows and columns of cells in a pixel, each with sum 1, and the numbers of the first ones."""
 
     rows: np.ndarray
     columns: np.ndarray
-    first: tuple[float, float] = (0.0, 0.0)
+    first: tuple[int, int] = (0, 0)
+
+
+def reach_of(footprints):
+    """Largest distance between the rows or the columns of cells of footprints. [cell]"""
+    firsts = np.array([each.first for each in footprints])
+    lasts = firsts + [(each.rows.size - 1, each.columns.size - 1) for each in footprints]
+    return int((lasts.max(axis=0) - firsts.min(axis=0)).max())
 
 
 class Pixel(NamedTuple):
@@ -49,7 +55,7 @@ class Pixel(NamedTuple):
     function: Callable[[np.ndarray], np.ndarray]
     """Function of an array of means, shape (property, ...)."""
     noise: Callable[[np.ndarray], np.ndarray] | None = None
-    """Variance of the noise of the quantity, a function of the same means."""
+    """Variances of the noise of the quantity, shape (cause, ...), a function of the same means."""
 
 
 def mean_of_cells(means):
@@ -66,33 +72,33 @@ class PixelLine(NamedTuple):
     truth_variance: float
     image_variance: float
     covariance: float
-    truth_mean: float
-    image_mean: float
+    noise: np.ndarray
+    """Variances of the noise of the image by cause, which the variance of the image includes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Spectra of the powers of a field's correlation, and Hermite coefficients of properties of its cells."""
+    """Powers of a field's correlation, and Hermite coefficients of properties of its cells."""
 
     powers: np.ndarray
-    """Spectra of rho^k on a periodic lattice divided by its size, shape (order from 1, n, n // 2 + 1)."""
+    """rho^k at lags of rows and columns, shape (order from 1, lags, lags)."""
     properties: dict[str, np.ndarray]
     """Coefficients by name, shape (order from 0,). The covariance at lag d is sum_k a_k b_k rho(d)^k."""
     window: np.ndarray | float = 0.0
     """Variance of the mean of fields of correlation rho^k over the window of a regression, shape (order from 1,)."""
     known: dict = field(default_factory=dict, repr=False)
-    """Transfer functions and overlaps of footprints."""
+    """Overlaps of footprints."""
 
-    def regression(self, truth, image):
-        """Regression of a truth on an image; the truth has no noise."""
-        means, values, rest = self.given(image.footprints[0], (truth, image))
-        (truth_mean, image_mean), ((of_truth, both), (_, of_image)) = moments(values, rest)
-        if image.noise is not None:
-            of_image = of_image + np.sum(image.noise(means[1]) * NODE_SHARES)
-        left = of_truth - both**2 / of_image
-        return PixelLine(
-            left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both, truth_mean, image_mean
-        )
+    def regressions(self, truths, image):
+        """Regressions of truths, which have no noise, on an image."""
+        means, values, rest = self.given(image.footprints[0], (*truths, image))
+        covariance = moments(values, rest)[1]
+        noise = np.zeros(1) if image.noise is None else np.atleast_2d(image.noise(means[-1])) @ NODE_SHARES
+        of_image, found = covariance[-1, -1] + noise.sum(), []
+        for of_truth, both in zip(np.diag(covariance), covariance[:-1, -1], strict=False):
+            left = of_truth - both**2 / of_image
+            found.append(PixelLine(left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both, noise))
+        return found
 
     def given(self, first, pixels):
         """Properties and quantities of pixels given the mean of z over a footprint, and covariances of the rest."""
@@ -120,59 +126,41 @@ class Prepared:
         # First the covariance of both means; then, over the cells of the second footprint, the mean of the powers of
         # their correlation with the mean of z over the first.
         if (one, other) not in self.known:
-            n = self.powers.shape[1]
-            shared = self._transfer(one) * self._transfer(other).conj()
-            weighted = shared.real.copy()
-            weighted[:, 1 : (n + 1) // 2] *= 2
-            covariance = self.powers.reshape(len(self.powers), -1) @ weighted.reshape(-1)
-            # Cells of the second footprint at whole positions from its first one.
-            seen = self._transfer(one) * self._shift(other.first).conj() * self.powers[0]
-            near = fft.irfft2(seen, (n, n))[: len(other.rows), : len(other.columns)] * n**2
-            near /= np.sqrt((self._power(one) * self.powers[0]).sum())
-            area, powers = np.multiply.outer(other.rows, other.columns), np.ones_like(near)
-            given = [(area * (powers := powers * near)).sum() for _ in range(ORDERS)]
+            down, across = self._by_lag(one, other, 0), self._by_lag(one, other, 1)
+            powers = self.powers[:, : down.shape[1], : across.shape[1]]
+            covariance = (other.rows @ down) @ powers @ (other.columns @ across)
+            variance = covariance[0] if one is other else self.overlap(one, one)[0, 0]
+            near = down @ powers[0] @ across.T / np.sqrt(variance)
+            area, power, given = np.multiply.outer(other.rows, other.columns), 1.0, []
+            for _ in range(ORDERS):
+                power = power * near
+                given.append(np.vdot(area, power))
             self.known[one, other] = np.array([covariance, given])
         return self.known[one, other]
 
-    def _power(self, footprint):
-        n = self.powers.shape[1]
-        power = np.abs(self._transfer(footprint)) ** 2
-        power[:, 1 : (n + 1) // 2] *= 2
-        return power
-
-    def _transfer(self, footprint):
-        """Transfer function of a footprint, shape (n, n // 2 + 1)."""
-        if footprint not in self.known:
-            n = self.powers.shape[1]
-            widest = max(footprint.rows.size, footprint.columns.size)
-            if widest > n // 2:
-                raise ValueError(
-                    f"a footprint has {widest} cells, at most {n // 2} are allowed: prepare a wider lattice"
-                )
-            of_weights = fft.fft(footprint.rows, n)[:, None] * fft.rfft(footprint.columns, n)
-            self.known[footprint] = of_weights * self._shift(footprint.first)
-        return self.known[footprint]
-
-    def _shift(self, first):
-        """Phase of a displacement of rows and columns. [cell]"""
-        n = self.powers.shape[1]
-        frequencies = fft.fftfreq(n), fft.rfftfreq(n)
-        down, across = (np.exp(-2j * np.pi * each * place) for each, place in zip(frequencies, first, strict=True))
-        return down[:, None] * across
+    def _by_lag(self, one, other, axis):
+        """Weights of a footprint by distance from each cell of another along an axis, shape (cell, lag)."""
+        cells = [each.first[axis] + np.arange((each.rows, each.columns)[axis].size) for each in (one, other)]
+        apart = np.abs(cells[0] - cells[1][:, None])
+        if apart.max() >= self.powers.shape[1]:
+            raise ValueError(
+                f"footprints have cells at a distance of {apart.max()}, at most {self.powers.shape[1] - 1} is allowed: "
+                "prepare a larger reach"
+            )
+        found = np.zeros((len(apart), apart.max() + 1))
+        np.add.at(found, (np.arange(len(apart))[:, None], apart), (one.rows, one.columns)[axis])
+        return found
 
 
-def prepare(arp, properties, *, window=None, widest=96):
+def prepare(arp, properties, *, window=None, reach=96):
     """Field of an arp, and properties of its cells by name, each an array of values at the `DEVIATES`."""
     # Regressions are of pixels in a window of rows and columns [cell], whose mean they remove; by default unlimited.
-    n = fft.next_fast_len(max(192, 2 * widest, margin(arp)), real=True)
+    # Cells of two footprints are at most a reach apart. [cell]
+    n = fft.next_fast_len(max(2 * reach, margin(arp)), real=True)
     u = 2 * np.pi * fft.fftfreq(n)
-    spectrum = response(arp, u[:, None], u[: n // 2 + 1]) ** 2
-    rho = fft.irfft2(spectrum, (n, n))
+    rho = fft.irfft2(response(arp, u[:, None], u[: n // 2 + 1]) ** 2, (n, n))
     rho /= rho[0, 0]
-    powers, power = np.empty((ORDERS, n, n // 2 + 1)), np.ones_like(rho)
-    for k in range(ORDERS):
-        power = power * rho
-        powers[k] = fft.rfft2(power).real / n**2
+    powers = rho[: reach + 1, : reach + 1] ** np.arange(1, ORDERS + 1)[:, None, None]
     lost = 0.0 if window is None else _of_mean(rho, window)
     return Prepared(powers, {name: coefficients(each) for name, each in properties.items()}, lost)
 

@@ -18,6 +18,7 @@ from fifesim.experiments.analytic import (
     mean_of_cells,
     moments,
     prepare,
+    reach_of,
 )
 from fifesim.experiments.scatter.stages import STEP, VARIABLES, along_tangent, scene_of, working_stages
 from fifesim.grids import grid as grids
@@ -105,28 +106,27 @@ class Covariances:
         properties |= {name: table(lai[None]) for name, table in self.by_area.items() if name != "lai"}
         self.square = self._footprints(False, False)[0]
         self.seen = {state: self._footprints(*state) for state in product((False, True), repeat=2)}
-        widest = max(each.rows.size for pair in self.seen.values() for each in pair)
-        widest = max(widest, *(each.columns.size for pair in self.seen.values() for each in pair))
-        self.prepared = prepare(scenario.ground.arp, properties, window=self.scene.grid.shape, widest=widest)
+        self.even = self._footprints("point spread" in self.stages, "registration" in self.stages, even=True)
+        reach = reach_of([self.square, *self.even, *(each for pair in self.seen.values() for each in pair)])
+        self.prepared = prepare(scenario.ground.arp, properties, window=self.scene.grid.shape, reach=reach)
         self.recordings = {}
 
-    def line(self, variable, at_work):
-        """Regression of a variable on NDVI with some stages active."""
-        truth = Pixel((variable,), (self.square,), mean_of_cells)
+    def lines(self, at_work):
+        """Regressions of the variables on NDVI with some stages active."""
+        truths = [Pixel((name,), (self.square,), mean_of_cells) for name in VARIABLES]
         if "non-linearity" not in at_work:
-            truth = self._uniform(variable)
+            truths = self._uniform()
         seen = self.seen["point spread" in at_work, "registration" in at_work]
-        return self.prepared.regression(truth, self._image(seen, at_work))
+        return self.prepared.regressions(truths, self._image(seen, at_work))
 
-    def uniform_line(self, variable):
-        """Regression with all stages active over ground that is uniform within each pixel."""
+    def uniform_lines(self):
+        """Regressions with all stages active over ground that is uniform within each pixel."""
         at_work = {*self.stages, "NDVI scaling"} - {"non-linearity"}
-        seen = self._footprints("point spread" in at_work, "registration" in at_work, even=True)
-        return self.prepared.regression(self._uniform(variable), self._image(seen, at_work))
+        return self.prepared.regressions(self._uniform(), self._image(self.even, at_work))
 
-    def _uniform(self, variable):
-        """Quantity of a pixel whose cells have the mean leaf area."""
-        return Pixel(("lai",), (self.square,), self.by_area[variable])
+    def _uniform(self):
+        """Variables of a pixel whose cells have the mean leaf area."""
+        return [Pixel(("lai",), (self.square,), self.by_area[name]) for name in VARIABLES]
 
     def _image(self, seen, at_work):
         """NDVI of pixels with some stages active."""
@@ -266,12 +266,12 @@ class _Image:
         return self.ndvi(means) + 0.5 * self.of.curvatures[self.hazy](means[1:]) * (means[0] - means[1] ** 2)
 
     def noise(self, means):
-        """Variance of NDVI by noise and rounding."""
+        """Variances of NDVI by rounding and by noise."""
         red, nir = self.recorded(means)
-        grains = self.of.grains(self.reflectance(means)) if self.noisy else 0.0
-        of_red, of_nir = np.broadcast_to(self.recording.gain**2 * grains + self.recording.rest, (2, *red.shape))
-        shared = self.recording.shared
-        return 4 * (nir**2 * of_red + red**2 * of_nir - 2 * red * nir * shared) / (nir + red) ** 4
+        own, grains = self.recording, self.of.grains(self.reflectance(means)) if self.noisy else np.zeros((2, 1))
+        of_red, of_nir = np.stack(np.broadcast_arrays(own.rest, own.gain**2 * grains)).swapaxes(0, 1)
+        shared = 2 * red * nir * np.array([[own.shared], [0.0]])
+        return 4 * (nir**2 * of_red + red**2 * of_nir - shared) / (nir + red) ** 4
 
 
 def _even(line, start, cells):
@@ -293,15 +293,15 @@ def scatters(scenario):
     covariances = Covariances(scenario)
     stages = covariances.stages
     if "quantisation" in stages:
-        rounding = covariances.line("lai", {"quantisation"}).scatter - covariances.line("lai", set()).scatter
+        rounding = covariances.lines({"quantisation"})[0].scatter - covariances.lines(set())[0].scatter
         if rounding > _LARGEST_ROUNDING:
             raise ValueError(
                 f"method='analytic' does not hold: digital numbers alone give a scatter of {rounding:.2g}, at most "
                 f"{_LARGEST_ROUNDING} is allowed: give method='simulate'"
             )
-    found = {name: np.empty((2,) * len(stages)) for name in VARIABLES}
-    for variable, values in found.items():
-        for state in np.ndindex(values.shape):
-            at_work = {stage for stage, active in zip(stages, state, strict=True) if active}
-            values[state] = covariances.line(variable, at_work).scatter
-    return stages, found, {name: covariances.uniform_line(name).scatter for name in VARIABLES}
+    found = np.empty((len(VARIABLES), *(2,) * len(stages)))
+    for state in product((0, 1), repeat=len(stages)):
+        at_work = {stage for stage, active in zip(stages, state, strict=True) if active}
+        found[:, *state] = [line.scatter for line in covariances.lines(at_work)]
+    uniform = [line.scatter for line in covariances.uniform_lines()]
+    return stages, dict(zip(VARIABLES, found, strict=True)), dict(zip(VARIABLES, uniform, strict=True))

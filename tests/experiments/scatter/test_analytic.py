@@ -34,7 +34,10 @@ def _blurred(sd, down):
     reach = int(6 * sd)
     kernel = stats.norm.pdf(np.arange(-reach, reach + 1), scale=sd) if sd else np.ones(1)
     line = np.convolve(_BOX, kernel / kernel.sum())
-    return Footprint(line, line, (down - reach, -reach))
+    # Parts of a cell are phases of the frequencies of the weights.
+    padded = np.pad(line, 128)
+    moved = np.fft.irfft(np.fft.rfft(padded) * np.exp(-2j * np.pi * np.fft.rfftfreq(padded.size) * down), padded.size)
+    return Footprint(moved if down % 1 else line, line, (-reach - 128 if down % 1 else int(down) - reach, -reach))
 
 
 def test_scatter_agrees_with_an_independent_simulation():
@@ -44,12 +47,12 @@ def test_scatter_agrees_with_an_independent_simulation():
         lai = _FIELDS[name]
         area = lai.ppf(stats.norm.cdf(DEVIATES))
         red, nir = 0.03 + 0.12 * np.exp(-0.75 * area), 0.36 - 0.20 * np.exp(-0.55 * area)
-        field = prepare(arp, {"lai": area, "red": red, "nir": nir}, window=(1152, 1152), widest=112)
+        field = prepare(arp, {"lai": area, "red": red, "nir": nir}, window=(1152, 1152), reach=420)
         truth = Pixel(("lai",), (Footprint(_BOX, _BOX),), mean_of_cells)
         for row in rows.itertuples():
             seen = _blurred(row.blur_sd_cells, 9 * row.shift_pixels_down)
             noise = partial(_noise, row.noise_sd_reflectance**2)
-            found = field.regression(truth, Pixel(("red", "nir"), (seen, seen), _ndvi, noise))
+            (found,) = field.regressions([truth], Pixel(("red", "nir"), (seen, seen), _ndvi, noise))
             assert abs(found.scatter - row.scatter) <= max(0.003, 3 * row.se_scatter), row
             assert found.image_variance == pytest.approx(row.var_ndvi, rel=0.02)
 
@@ -57,13 +60,10 @@ def test_scatter_agrees_with_an_independent_simulation():
 def test_linear_pixels_with_noise_have_the_scatter_of_their_variances():
     field = prepare(0.2, {"lai": 2 + 0.5 * DEVIATES, "seen": 3 - DEVIATES})
     truth, seen = Footprint(_BOX, _BOX), Footprint(_BOX, _BOX)
-    lines = [
-        field.regression(
-            Pixel(("lai",), (truth,), mean_of_cells),
-            Pixel(("seen",), (seen,), lambda means: means[0], lambda means, noise=noise: noise),
-        )
-        for noise in (0.0, 0.1)
-    ]
+    lines = []
+    for noise in (0.0, 0.1):
+        image = Pixel(("seen",), (seen,), mean_of_cells, lambda means, noise=noise: np.full(means[0].shape, noise))
+        lines += field.regressions([Pixel(("lai",), (truth,), mean_of_cells)], image)
     assert lines[0].scatter == pytest.approx(0, abs=1e-9) and lines[0].slope == pytest.approx(-0.5)
     assert lines[1].scatter == pytest.approx(0.1 / (lines[0].image_variance + 0.1))
     # The variance of the mean of 9 x 9 cells, from the correlation along the lattice.
@@ -76,11 +76,11 @@ def test_only_the_distance_of_truth_and_image_matters():
     def scatter(truth, image, function=lambda means: np.exp(-means[0])):
         truth, image = (Footprint(_BOX, _BOX, place) for place in (truth, image))
         truth = Pixel(("lai",), (truth,), mean_of_cells)
-        return field.regression(truth, Pixel(("lai",), (image,), function)).scatter
+        return field.regressions([truth], Pixel(("lai",), (image,), function))[0].scatter
 
-    near = scatter((0.0, 0.0), (3.0, -1.0))
-    assert scatter((40.0, 7.5), (43.0, 6.5)) == pytest.approx(near, abs=1e-6)
-    assert abs(scatter((0.0, 0.0), (3.0, -2.0)) - near) > 0.01
+    near = scatter((0, 0), (3, -1))
+    assert scatter((40, 7), (43, 6)) == scatter((3, 0), (0, 1)) == pytest.approx(near, abs=1e-12)
+    assert abs(scatter((0, 0), (3, -2)) - near) > 0.01
 
 
 # The last one has no noise, so that the rounding errors of both bands depend on each other.
