@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from fifesim.base.arguments import NAMES, FilePath, Kind, Names
+from fifesim.base.arguments import NAMES, FilePath, Kind, Names, Range, checked
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band, solar_irradiance
 from fifesim.base.footprints import LineSpread
 from fifesim.sensor.description.fields import (
@@ -26,8 +26,8 @@ from fifesim.sensor.description.fields import (
     lookup,
     worded,
 )
-from fifesim.sensor.description.provenance import DescribedQuantity, Origin, Provenance, provenance_of
-from fifesim.sensor.description.spatial_response import SpatialResponse, responses_by_axis
+from fifesim.sensor.description.provenance import NUMBERS, DescribedQuantity, Origin, Provenance, provenance_of
+from fifesim.sensor.description.spatial_response import GaussianResponse, SpatialResponse, responses_by_axis
 from fifesim.sensor.description.spectral_response import SpectralResponse
 from fifesim.sensor.response.noise import NoiseModel
 from fifesim.sensor.response.scan import ScanPattern, Zone
@@ -63,6 +63,11 @@ class Noise:
             raise ValueError(f"high_radiance must be above radiance = {self.radiance:g}, got {self.high_radiance:g}")
         # Raises if the points and the share are inconsistent.
         self.model()
+
+    def with_snr(self, snr):
+        """Noise with another ratio at its radiance, and at the second one by the same factor."""
+        scale = snr * self.equivalent_radiance / self.radiance
+        return replace(self, snr=snr, nedl=None, high_snr=self.high_snr and self.high_snr * scale)
 
     @property
     def equivalent_radiance(self):
@@ -149,6 +154,9 @@ BAND_NUMBERS = ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance"
 OPTIONAL_NUMBERS = (
     "ifov", "detectors", "scan", "product", "noise", "gains", "limits", "geolocation", "compression", "paper_lsf",
 )  # fmt: skip
+
+# Numbers that an argument of `Instrument.replace` changes.
+_OF_DESIGN = {"gsd": ("altitude", "gsd"), "mtf": ("lsf",), "snr": ("noise",), "registration": ("geolocation",)}
 
 # Publications by number.
 Sources = dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str]  # type: ignore[misc, valid-type]
@@ -516,6 +524,95 @@ class Instrument:
             if not chosen:
                 raise ValueError(f"no band of {self.name} has a gain state {gain!r}")
         return replace(self, bands=tuple(band.with_gain(chosen.get(band.name, band.gain)) for band in self.bands))
+
+    @checked
+    def replace(
+        self: "Instrument",
+        *,
+        gsd: Annotated[float, Range("m", 0, np.inf, ends="(]")] | None = None,
+        mtf: Annotated[float, Range("1", 0, 1, ends="()")] | None = None,
+        snr: Annotated[float, Range("1", 0, np.inf, ends="(]")] | None = None,
+        registration: Annotated[float, Range("m", 0, np.inf, ends="(]")] | None = None,
+    ) -> "Instrument":
+        """
+        The instrument with another design, for trade studies.
+
+        Parameters
+        ----------
+        gsd : float, optional
+            Pixel of the gridded product. Blur, sampling interval and the pixels of all bands change by the same factor,
+            because the altitude does: angles stay, and the swath becomes wider or narrower. [m]
+        mtf : float, optional
+            Modulation transfer at the Nyquist frequency of the sampling interval, along both axes, in (0, 1): the blur
+            of each band becomes a Gaussian. [1]
+        snr : float, optional
+            Ratio of signal to noise of the bands that have noise, at the radiance that the instrument's file states; a
+            ratio at a second radiance changes by the same factor. [1]
+        registration : float, optional
+            Error of the place of a pixel, root mean square along each axis. [m]
+
+        Returns
+        -------
+        instrument : Instrument
+            Its name states the changes.
+
+        Raises
+        ------
+        ValueError
+            If a number is out of range, no band has noise, to whose radiance ``snr`` could refer, or samples are summed
+            on board, so that ``mtf`` would not be that of the sums.
+
+        See Also
+        --------
+        fifesim.trade
+
+        Examples
+        --------
+        >>> import fifesim
+        >>> oli = fifesim.instrument("OLI")
+        >>> wide = oli.replace(gsd=60.0, snr=100.0)
+        >>> wide.name, round(wide.line_spread.fwhm / oli.line_spread.fwhm, 6)
+        ('OLI, gsd 60, snr 100', 2.0)
+        """
+        given = {"gsd": gsd, "mtf": mtf, "snr": snr, "registration": registration}
+        given = {name: float(value) for name, value in given.items() if value is not None}
+        if mtf is not None and self._aggregation > 1:
+            raise ValueError(
+                f"mtf: {self.name} sums samples on board: give the lsf of one sample in an instrument file"
+            )
+        if snr is not None and not any(band.noise for band in self.bands):
+            raise ValueError(
+                f"snr: the description of {self.name} states no radiance: give noise = {{ snr = ..., radiance = ... }} "
+                "of its bands in an instrument file"
+            )
+        scale = given.get("gsd", self.gsd) / self.gsd
+        changed = [number for name in given for number in _OF_DESIGN[name]]
+        lsf = self.lsf if mtf is None else GaussianResponse(kind="gaussian", mtf_at_nyquist=float(mtf))
+        bands = tuple(
+            replace(
+                band,
+                gsd=band.gsd and band.gsd * scale,
+                lsf=band.lsf if mtf is None else None,
+                noise=band.noise if snr is None or not band.noise else band.noise.with_snr(float(snr)),
+                sources={number: source for number, source in band.sources.items() if number not in changed},
+                origin={name: origin for name, origin in band.origin.items() if NUMBERS[name] not in changed},
+            )
+            for band in self.bands
+        )
+        return replace(
+            self,
+            name=", ".join([self.name, *(f"{name} {value:g}" for name, value in given.items())]),
+            title=f"{self.title}, changed",
+            aliases=(),
+            altitude=self.altitude * scale,
+            gsd=self.gsd * scale,
+            lsf=lsf,
+            bands=bands,
+            geolocation=given.get("registration", self.geolocation),
+            origin=self.origin | {name: Origin("required") for name, number in NUMBERS.items() if number in changed},
+            sources=self.sources | dict.fromkeys(changed, "design"),
+            references=self.references | {"design": "given to Instrument.replace"},
+        )
 
     def select(self, bands: Names | None = None) -> tuple[InstrumentBand, ...]:
         """
