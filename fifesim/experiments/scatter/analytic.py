@@ -87,7 +87,7 @@ class _Recording(NamedTuple):
 class Covariances:
     """Prepared covariances of a scenario: the line of a truth on NDVI for any set of stages."""
 
-    def __init__(self, scenario):
+    def __init__(self, scenario, reach=0):
         self.stages, self.scene = working_stages(scenario), scene_of(scenario)
         self.driver, setup = self.scene.driver, self.scene.setup
         given = self.driver.instrument, self.driver.bands, setup.noise, setup.noise_models
@@ -107,7 +107,7 @@ class Covariances:
         self.square = self._footprints(False, False)[0]
         self.seen = {state: self._footprints(*state) for state in product((False, True), repeat=2)}
         self.even = self._footprints("point spread" in self.stages, "registration" in self.stages, even=True)
-        reach = reach_of([self.square, *self.even, *(each for pair in self.seen.values() for each in pair)])
+        reach = max(reach, reach_of([self.square, *self.even, *(each for pair in self.seen.values() for each in pair)]))
         self.prepared = prepare(scenario.ground.arp, properties, window=self.scene.grid.shape, reach=reach)
         self.recordings = {}
 
@@ -214,25 +214,27 @@ class Covariances:
     def _footprints(self, blurred, displaced, even=False):
         """Footprints of the red and the near infrared band of a pixel in the middle, from the cells of the scene."""
         scene, setup = self.scene, self.scene.setup
-        size = grids.cell_size(scene.blocks)
-        shifts = tuple(offset * each for offset, each in zip(setup.offset, size, strict=True))
-        found = []
-        for band in self.driver.bands:
-            spreads = setup.instrument.line_spreads(band) if blurred else areas(scene.blocks)
-            along = shared_operators(
-                spreads, scene.grid, scene.blocks, tuple(map(float, shifts)) if displaced else (0.0, 0.0)
-            )
-            lines, first = [], []
-            for axis, each in zip(along, size, strict=True):
-                middle = len(axis) // 2
-                line, start = axis.weights[middle][: axis.count[middle]], int(axis.start[middle])
-                if even:
-                    cells = round(each / grids.cell_size(scene.grid)[0])
-                    line, start = _even(line, start, cells)
-                lines.append(line / line.sum())
-                first.append(start)
-            found.append(Footprint(*lines, tuple(first)))
-        return tuple(found)
+        own = [setup.instrument.line_spreads(band) for band in self.driver.bands]
+        spreads = own if blurred else [areas(scene.blocks)] * 2
+        return footprints(spreads, scene.grid, scene.blocks, setup.offset if displaced else (0.0, 0.0), even)
+
+
+def footprints(spreads, cells, blocks, offset, even=False):
+    """Footprint of the pixel in the middle of blocks for each pair of line spreads, displaced by pixels."""
+    shifts = tuple(float(part * size) for part, size in zip(offset, grids.cell_size(blocks), strict=True))
+    found = {}
+    for pair in spreads:
+        lines, first = [], []
+        along = shared_operators(pair, cells, blocks, shifts)
+        for axis, size, cell in zip(along, grids.cell_size(blocks), grids.cell_size(cells), strict=True):
+            middle = len(axis) // 2
+            line, start = axis.weights[middle][: axis.count[middle]], int(axis.start[middle])
+            if even:
+                line, start = _even(line, start, round(size / cell))
+            lines.append(line / line.sum())
+            first.append(start)
+        found.setdefault(pair, Footprint(*lines, tuple(first)))
+    return tuple(found[pair] for pair in spreads)
 
 
 @dataclass(frozen=True, eq=False)
