@@ -92,6 +92,7 @@ from .grids.files import open_image as open_image
 from .scenario.simulation import simulate as simulate
 from .output.chips.folder import dataset as dataset
 from .experiments.scatter.shares import budget as budget
+from .experiments.designs import trade as trade
 from .scenario.scenario import Scenario as Scenario
 from .scenario.studies import Study as Study
 from .experiments.friedl1995.reproduction import reproduce as reproduce

@@ -6,3 +6,4 @@ from .maps import write_style as write_style
 from .pictures import plot_comparison as plot_comparison  # method of a DataTree
 from .pictures import plot_fit as plot_fit
 from .pictures import plot_score as plot_score
+from .pictures import plot_trade as plot_trade

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -27,6 +27,14 @@ from fifesim.output.maps import Composite, check_composite, composite_bands, rgb
 Scored: TypeAlias = Annotated[
     xr.Dataset,
     Kind("an xarray.Dataset, as fifesim.score gives it", lambda value: isinstance(value, xr.Dataset), numbers=None),
+]
+
+Designs: TypeAlias = Annotated[
+    xr.Dataset,
+    Kind("an xarray.Dataset, as fifesim.trade gives it", lambda value: isinstance(value, xr.Dataset), numbers=None),
+]
+DesignCost: TypeAlias = Annotated[
+    xr.DataArray, Kind("an xarray.DataArray over designs", lambda value: isinstance(value, xr.DataArray))
 ]
 
 # Maximum pixels along the longer side of a picture.
@@ -193,6 +201,67 @@ def plot_fit(
     low = low if y is None or ordinate[both].min() < 0 else max(low, 0)
     axes.set_ylim(low, high + 0.22 * (high - low))
     axes.legend(frameon=False, loc="upper center", ncols=2, fontsize="small")
+    return axes
+
+
+def plot_trade(
+    results: Designs,
+    cost: DesignCost,
+    *,
+    variable: Literal["lai", "fpar", "gpp"] = "lai",
+    axes: Axes | None = None,
+) -> Axes:
+    """
+    Plot R2 of the designs of a trade study by their cost, and the best of them.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        As from `fifesim.trade`.
+    cost : xarray.DataArray
+        Cost of each design, over some or all of its dimensions, such as ``results.snr**2 / results.pixel**2``.
+    variable : {"lai", "fpar", "gpp"}, optional
+    axes : matplotlib.axes.Axes, optional
+        A new figure by default.
+
+    Returns
+    -------
+    axes : matplotlib.axes.Axes
+        One colour for each value of the first dimension of the designs; the line joins the Pareto front, the designs
+        that no cheaper one equals.
+
+    Raises
+    ------
+    ValueError
+        If the cost has other dimensions than the designs, or is not finite.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> found = fifesim.trade("TM", {"pixel": [20, 30, 60], "snr": [20, 50, 100], "registration": [5.0]})
+    >>> axes = fifesim.output.plot_trade(found, found.snr**2 / found.pixel**2)
+    >>> axes.get_ylabel()
+    'R² of LAI on NDVI'
+    """
+    r2 = results["r2"].sel(variable=variable, drop=True)
+    if unknown := [str(dim) for dim in cost.dims if dim not in r2.dims]:
+        raise ValueError(f"cost has dimensions {', '.join(unknown)}, the designs have {', '.join(map(str, r2.dims))}")
+    if not np.isfinite(cost).all():
+        raise ValueError("cost must be finite for each design")
+    if axes is None:
+        _, axes = plt.subplots(figsize=(5.8, 4.4), layout="constrained")
+    r2, cost = xr.broadcast(r2, cost)
+    first = r2.dims[0]
+    for number, value in enumerate(r2[first].values):
+        unit = colours.unit(r2[first]).strip("[]")
+        axes.scatter(cost[number], r2[number], s=12, label=f"{first} {value} {unit}".rstrip())
+    order = np.lexsort((-r2.values.ravel(), cost.values.ravel()))
+    paid, best = cost.values.ravel()[order], np.maximum.accumulate(r2.values.ravel()[order])
+    front = np.concatenate([[True], best[1:] > best[:-1]])
+    axes.plot(paid[front], best[front], color="black", linewidth=1, label="best designs")
+    axes.set(xscale="log", xlabel=cost.attrs.get("long_name", "cost"))
+    axes.set_ylabel(f"R² of {variable.upper()} on NDVI")
+    axes.legend(frameon=False, fontsize="small")
     return axes
 
 

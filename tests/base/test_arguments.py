@@ -152,6 +152,7 @@ def valid_calls(tmp_path_factory):
     chips = fifesim.dataset(many, folder / "training.zarr", 3)
     with pytest.warns(UserWarning, match=r"few landscapes \(train 1, validation 1, test 1\)"):
         retrieval = fifesim.train(chips, "line", path=folder / "line.nc")
+    designs = {"pixel": [30.0], "registration": [0.0]}
     # Arguments shared by name; below, the others by function.
     shared = {
         "grid": grid, "lai": lai, "dem": dem, "reflectance": rho, "toa": rho, "image": image, "ndvi": ndvi,
@@ -189,6 +190,8 @@ def valid_calls(tmp_path_factory):
         "rgb": {"image": rho, "composite": ("TM4", "TM3", "TM3")},
         "plot_fit": {"y": lai, "x": ndvi},
         "budget": {"realisations": 1, "cells": 90},
+        "trade": {"designs": designs, "scenario": None},
+        "plot_trade": {"results": fifesim.trade("TM", designs), "cost": xr.DataArray([1.0], dims="pixel")},
         "cloud_field": {"cover": 0.3, "length": 100.0},
         "phenology": {"time": ["1987-06-06"]},
         "sensitivity": {"quantity": "lai", "n": 2},

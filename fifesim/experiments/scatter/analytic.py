@@ -39,10 +39,9 @@ _SEEN = ("red", "nir", "ndvi")
 
 
 def obstacles(scenario):
-    """Reasons for which the budget of a complete scenario needs simulation, each with what to give instead."""
+    """Reasons for which the scatter of a complete scenario needs simulation, each with what to give instead."""
     own, land, air = scenario.sensor, scenario.ground, scenario.atmosphere
     down, across = grids.cell_size(scenario.geobox())
-    ratio = own.size / down
     found = {
         "ground.lai_file is a map: give ground.distribution and arp": bool(land.lai_file),
         "the landscape is learned: give landscape.learned = 'none'": bool(scenario.learned),
@@ -56,14 +55,12 @@ def obstacles(scenario):
         "atmosphere.coupling is not 'lambert'": air.coupling != "lambert",
         "light comes from adjacent cells: give atmosphere.adjacency = false": bool(air.adjacency),
         "pixels drift along the grid: give sensor.interval = 'product'": own.interval not in ("product", own.size),
-        f"a pixel has {ratio:.4g} cells along an edge: give a grid.cell that divides sensor.pixel": (
-            abs(ratio - round(ratio)) > 1e-6 or down != across
-        ),
+        f"cells are {down:g} x {across:g} m: give a grid of squares": down != across,
     }
     return [reason for reason, holds in found.items() if holds]
 
 
-class _Table(NamedTuple):
+class Table(NamedTuple):
     """Quantity of a pixel by the mean leaf area of its cells."""
 
     areas: np.ndarray
@@ -73,7 +70,7 @@ class _Table(NamedTuple):
         return np.interp(means[0], self.areas, self.values)
 
 
-class _Recording(NamedTuple):
+class Recording(NamedTuple):
     """Line from the reflectance of both bands to the recorded one, each (2, 1), and covariances of its remainders."""
 
     gain: np.ndarray | float = 1.0
@@ -93,16 +90,16 @@ class Covariances:
         given = self.driver.instrument, self.driver.bands, setup.noise, setup.noise_models
         self.noisy = noise_models(*given) if setup.noise else []
         quantiles = quantile_table(lai_distribution(scenario.ground.distribution))
-        lai = quantile_map(DEVIATES, quantiles)
+        self.lai = lai = quantile_map(DEVIATES, quantiles)
         self.areas = np.linspace(0.0, quantiles[-1], 2001)
         absorbed = self.driver.fpar(self.areas, scenario.ground.fpar_inf)
         # Properties by leaf area, and in the air and without it (1 and 0): reflectance of both bands and NDVI.
-        self.by_area = {"lai": _Table(self.areas, self.areas), "fpar": _Table(self.areas, absorbed)}
+        self.by_area = {"lai": Table(self.areas, self.areas), "fpar": Table(self.areas, absorbed)}
         properties, self.curvatures = {"lai": lai, "square": lai**2}, []
         for hazy in (0, 1):
             seen = self._seen(self.driver.reflectance(self.areas[None]), hazy)[:, 0]
-            self.by_area |= {f"{name}{hazy}": _Table(self.areas, row) for name, row in zip(_SEEN, seen, strict=True)}
-            self.curvatures.append(_Table(self.areas, self._curvature(self.areas, hazy)))
+            self.by_area |= {f"{name}{hazy}": Table(self.areas, row) for name, row in zip(_SEEN, seen, strict=True)}
+            self.curvatures.append(Table(self.areas, self._curvature(self.areas, hazy)))
         properties |= {name: table(lai[None]) for name, table in self.by_area.items() if name != "lai"}
         self.square = self._footprints(False, False)[0]
         self.seen = {state: self._footprints(*state) for state in product((False, True), repeat=2)}
@@ -140,7 +137,7 @@ class Covariances:
         key = seen, hazy, curved, "quantisation" in at_work, "noise" in at_work
         if key not in self.recordings:
             self.recordings[key] = self._recording(bands, at_work)
-        image = _Image(self, hazy, bands, self.recordings[key], "noise" in at_work)
+        image = IndexImage(self, hazy, bands, self.recordings[key], "noise" in at_work)
         if "NDVI scaling" in at_work:
             return Pixel(sum((each.names for each in bands), ()), seen, image.ndvi, image.noise)
         names = f"ndvi{hazy}" if curved else "square", *(each.names[0] for each in bands)
@@ -173,7 +170,7 @@ class Covariances:
     def _recording(self, bands, at_work):
         """Rounding of a normal signal to digital numbers, which is a line and an uncorrelated remainder."""
         if "quantisation" not in at_work:
-            return _Recording()
+            return Recording()
         driver = self.driver
         _, values, rest = self.prepared.given(bands[0].footprints[0], bands)
         mean, covariance = (each[..., None] for each in moments(values, rest))
@@ -191,7 +188,7 @@ class Covariances:
         center = (counted @ share)[:, None]
         gain = ((counted * _SIGNALS) @ share)[:, None] / spread
         left = ((counted**2) @ share)[:, None] - center**2 - (gain * spread) ** 2
-        return _Recording(gain, center - gain * mean, left, self._shared_rounding(values, rest))
+        return Recording(gain, center - gain * mean, left, self._shared_rounding(values, rest))
 
     def _shared_rounding(self, middle, covariance):
         """Covariance of the rounding errors of both bands, from the Fourier series of rounding."""
@@ -238,13 +235,13 @@ def footprints(spreads, cells, blocks, offset, even=False):
 
 
 @dataclass(frozen=True, eq=False)
-class _Image:
+class IndexImage:
     """NDVI of pixels as functions of the means of properties of their cells, the last two of which are of the bands."""
 
     of: Covariances
     hazy: int
     bands: tuple[Pixel, Pixel]
-    recording: _Recording
+    recording: Recording
     noisy: bool
 
     def reflectance(self, means):
@@ -268,12 +265,12 @@ class _Image:
         return self.ndvi(means) + 0.5 * self.of.curvatures[self.hazy](means[1:]) * (means[0] - means[1] ** 2)
 
     def noise(self, means):
-        """Variances of NDVI by rounding and by noise."""
+        """Variances of NDVI by rounding and by noise in red and near infrared."""
         red, nir = self.recorded(means)
-        own, grains = self.recording, self.of.grains(self.reflectance(means)) if self.noisy else np.zeros((2, 1))
-        of_red, of_nir = np.stack(np.broadcast_arrays(own.rest, own.gain**2 * grains)).swapaxes(0, 1)
-        shared = 2 * red * nir * np.array([[own.shared], [0.0]])
-        return 4 * (nir**2 * of_red + red**2 * of_nir - shared) / (nir + red) ** 4
+        own, weights = self.recording, 4 * np.stack([nir, red]) ** 2 / (nir + red) ** 4
+        grains = self.of.grains(self.reflectance(means)) if self.noisy else np.zeros((2, 1))
+        rounding = (weights * own.rest).sum(axis=0) - 8 * red * nir * own.shared / (nir + red) ** 4
+        return np.stack([rounding, *(weights * own.gain**2 * grains)])
 
 
 def _even(line, start, cells):
@@ -285,21 +282,24 @@ def _even(line, start, cells):
 
 
 # Largest scatter by digital numbers alone, beyond which they are no small errors of a normal signal.
-_LARGEST_ROUNDING = 0.1
+LARGEST_ROUNDING = 0.1
 
 
 def scatters(scenario):
     """Stages of a complete scenario, the scatter of each variable for all sets of them, and over uniform pixels."""
-    if reasons := obstacles(scenario):
+    reasons, ratio = obstacles(scenario), scenario.sensor.size / scenario.grid.cell
+    if abs(ratio - round(ratio)) > 1e-6:
+        reasons.append(f"a pixel has {ratio:.4g} cells along an edge: give a grid.cell that divides sensor.pixel")
+    if reasons:
         raise ValueError(f"method='analytic' does not hold: {'; '.join(reasons)}. Or give method='simulate'")
     covariances = Covariances(scenario)
     stages = covariances.stages
     if "quantisation" in stages:
         rounding = covariances.lines({"quantisation"})[0].scatter - covariances.lines(set())[0].scatter
-        if rounding > _LARGEST_ROUNDING:
+        if rounding > LARGEST_ROUNDING:
             raise ValueError(
                 f"method='analytic' does not hold: digital numbers alone give a scatter of {rounding:.2g}, at most "
-                f"{_LARGEST_ROUNDING} is allowed: give method='simulate'"
+                f"{LARGEST_ROUNDING} is allowed: give method='simulate'"
             )
     found = np.empty((len(VARIABLES), *(2,) * len(stages)))
     for state in product((0, 1), repeat=len(stages)):

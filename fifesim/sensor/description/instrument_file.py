@@ -26,7 +26,13 @@ from fifesim.sensor.description.fields import (
     lookup,
     worded,
 )
-from fifesim.sensor.description.provenance import NUMBERS, DescribedQuantity, Origin, Provenance, provenance_of
+from fifesim.sensor.description.provenance import (
+    NUMBER_OF,
+    DescribedQuantity,
+    Origin,
+    Provenance,
+    provenance_of,
+)
 from fifesim.sensor.description.spatial_response import GaussianResponse, SpatialResponse, responses_by_axis
 from fifesim.sensor.description.spectral_response import SpectralResponse
 from fifesim.sensor.response.noise import NoiseModel
@@ -595,7 +601,7 @@ class Instrument:
                 lsf=band.lsf if mtf is None else None,
                 noise=band.noise if snr is None or not band.noise else band.noise.with_snr(float(snr)),
                 sources={number: source for number, source in band.sources.items() if number not in changed},
-                origin={name: origin for name, origin in band.origin.items() if NUMBERS[name] not in changed},
+                origin={name: origin for name, origin in band.origin.items() if NUMBER_OF[name] not in changed},
             )
             for band in self.bands
         )
@@ -609,7 +615,7 @@ class Instrument:
             lsf=lsf,
             bands=bands,
             geolocation=given.get("registration", self.geolocation),
-            origin=self.origin | {name: Origin("required") for name, number in NUMBERS.items() if number in changed},
+            origin=self.origin | {name: Origin("required") for name, number in NUMBER_OF.items() if number in changed},
             sources=self.sources | dict.fromkeys(changed, "design"),
             references=self.references | {"design": "given to Instrument.replace"},
         )

@@ -13,7 +13,7 @@ from fifesim.sensor.description.fields import CONFIG, Positive
 from fifesim.sensor.description.spatial_response import knows_blur
 
 # Numbers of an instrument file by the name of the quantity that they describe.
-NUMBERS = {"blur": "lsf", "noise": "noise", "geolocation": "geolocation"}
+NUMBER_OF = {"blur": "lsf", "noise": "noise", "geolocation": "geolocation"}
 
 DescribedQuantity = Literal["blur", "noise", "geolocation"]
 
@@ -53,14 +53,14 @@ def band_provenance(instrument, quantity, band):
     if not known[quantity]:
         return Provenance(quantity, (band.name,), UNKNOWN, None, instrument.not_found.get(quantity, ""))
     origin = band.origin.get(quantity) or instrument.origin.get(quantity) or Origin("assumed")
-    source = instrument.source(NUMBERS[quantity], band)
+    source = instrument.source(NUMBER_OF[quantity], band)
     return Provenance(quantity, (band.name,), origin.kind, origin.uncertainty, source)
 
 
 def provenance_of(instrument, bands=None):
     """Origins of blur, noise and geolocation in some bands of an instrument, one row for the bands that share one."""
     groups: dict[Provenance, list[str]] = {}
-    for quantity in NUMBERS:
+    for quantity in NUMBER_OF:
         for band in instrument.select(bands):
             groups.setdefault(band_provenance(instrument, quantity, band)._replace(bands=()), []).append(band.name)
     return tuple(row._replace(bands=tuple(names)) for row, names in groups.items())
@@ -98,7 +98,7 @@ def origin_text(instrument, quantity, bands=None):
 
 def origins_in_words(instrument, bands=None):
     """Origins of blur, noise and geolocation of some bands, in one line."""
-    return "; ".join(f"{quantity} {origin_text(instrument, quantity, bands)}" for quantity in NUMBERS)
+    return "; ".join(f"{quantity} {origin_text(instrument, quantity, bands)}" for quantity in NUMBER_OF)
 
 
 def mixed_origins(selected, quantities):
