@@ -31,7 +31,11 @@ Scored: TypeAlias = Annotated[
 
 Designs: TypeAlias = Annotated[
     xr.Dataset,
-    Kind("an xarray.Dataset, as fifesim.trade gives it", lambda value: isinstance(value, xr.Dataset), numbers=None),
+    Kind(
+        "an xarray.Dataset, as fifesim.trade gives it",
+        lambda value: isinstance(value, xr.Dataset) and "r2" in value,
+        numbers=None,
+    ),
 ]
 DesignCost: TypeAlias = Annotated[
     xr.DataArray, Kind("an xarray.DataArray over designs", lambda value: isinstance(value, xr.DataArray))
@@ -216,9 +220,9 @@ def plot_trade(
 
     Parameters
     ----------
-    results : xarray.Dataset
-        As from `fifesim.trade`.
-    cost : xarray.DataArray
+    results : dataset
+        Result of `fifesim.trade`.
+    cost : array
         Cost of each design, over some or all of its dimensions, such as ``results.snr**2 / results.pixel**2``.
     variable : {"lai", "fpar", "gpp"}, optional
     axes : matplotlib.axes.Axes, optional
