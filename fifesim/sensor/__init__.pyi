@@ -11,6 +11,7 @@ from ..grids.swaths import grid_swath as grid_swath  # method
 from .band_labels import to_bands as to_bands  # method
 from .description.instruments import instrument_names as instrument_names
 from .description.instruments import read_instrument as read_instrument
+from .description.instruments import read_responses as read_responses
 from .instrument_labels import mtf as mtf
 from .instrument_labels import noise_equivalent_radiance as noise_equivalent_radiance
 from .instrument_labels import psf as psf

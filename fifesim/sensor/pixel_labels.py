@@ -103,8 +103,7 @@ def warn_of_pixels(instrument, bands, sizes):
         warn(
             f"pixels of {', '.join(f'{size:g}' for size in others)} m have the blur of {instrument.name}, made for "
             f"pixels of {pixels} m: smaller ones overlap and larger ones leave gaps, which changes R2. To compare "
-            "pixel sizes, write an instrument file for each, with gsd and the angles of interval, ifov and lsf scaled "
-            "alike (fifesim.sensor.read_instrument)"
+            f"pixel sizes, give fifesim.instrument({instrument.name!r}).replace(gsd=...), or see fifesim.trade"
         )
 
 

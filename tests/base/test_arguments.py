@@ -153,6 +153,8 @@ def valid_calls(tmp_path_factory):
     with pytest.warns(UserWarning, match=r"few landscapes \(train 1, validation 1, test 1\)"):
         retrieval = fifesim.train(chips, "line", path=folder / "line.nc")
     designs = {"pixel": [30.0], "registration": [0.0]}
+    responses = folder / "responses.csv"
+    responses.write_text("wavelength,red\n0.6,0\n0.65,1\n0.7,0\n", encoding="utf-8")
     # Arguments shared by name; below, the others by function.
     shared = {
         "grid": grid, "lai": lai, "dem": dem, "reflectance": rho, "toa": rho, "image": image, "ndvi": ndvi,
@@ -191,6 +193,7 @@ def valid_calls(tmp_path_factory):
         "plot_fit": {"y": lai, "x": ndvi},
         "budget": {"realisations": 1, "cells": 90},
         "trade": {"designs": designs, "scenario": None},
+        "read_responses": {"path": responses, "altitude": 5e5, "gsd": 10.0},
         "plot_trade": {"results": fifesim.trade("TM", designs), "cost": xr.DataArray([1.0], dims="pixel")},
         "cloud_field": {"cover": 0.3, "length": 100.0},
         "phenology": {"time": ["1987-06-06"]},

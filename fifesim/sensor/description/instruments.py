@@ -7,6 +7,7 @@ The descriptions are the files ``data/instruments/*.toml``; a new instrument is 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 
@@ -34,7 +35,7 @@ from fifesim.sensor.description.instrument_file import (
 )
 from fifesim.sensor.description.plausibility import check_instrument_units, check_sampling
 from fifesim.sensor.description.spatial_response import ResponseName, with_response
-from fifesim.sensor.description.spectral_response import SpectralResponse
+from fifesim.sensor.description.spectral_response import LONGEST, SpectralResponse
 
 # Keys of a band in a short file that belong to its noise, with their names there, and those that make its response.
 _NOISE_KEYS = {
@@ -160,11 +161,73 @@ def read_instrument(path: FilePath) -> Instrument:
     """
     # Tables are found relative to the file, even if the working directory changes.
     path = Path(path).absolute()
-    found = _parse(path)
+    return _in_right_units(_parse(path), path)
+
+
+def read_responses(
+    path: FilePath,
+    *,
+    name: str,
+    altitude: float,
+    gsd: float,
+    bits: int = 12,
+    mtf_at_nyquist: float | None = None,
+    snr: Mapping[str, tuple[float, float]] | None = None,
+) -> Instrument:
+    """
+    Description of an instrument from a table of measured spectral responses.
+
+    Parameters
+    ----------
+    path : str or path
+        CSV file with a column ``wavelength`` [um] and a column for each band, whose empty cells are left out;
+        responses below 0 are noise, and become 0.
+    name : str
+    altitude : float
+        Above the ground. [m]
+    gsd : float
+        Pixel of the gridded product. [m]
+    bits : int, optional
+        Number of radiometric bits.
+    mtf_at_nyquist : float, optional
+        Modulation transfer at the Nyquist frequency of the sampling interval; by default only the detector is
+        known, which is as wide as a pixel. [1]
+    snr : mapping, optional
+        Ratio of signal to noise [1] and the radiance at which it holds [W m-2 sr-1 um-1], by band.
+
+    Returns
+    -------
+    instrument : Instrument
+        Other numbers are those of a short instrument file.
+
+    Raises
+    ------
+    ValueError
+        If the table is not right, wavelengths are not in um, or a number cannot be in its unit.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> import fifesim
+    >>> path = Path(mkdtemp()) / "srf.csv"
+    >>> text = "wavelength,red,nir\\n.62,0,\\n.66,1,\\n.7,0,0\\n.8,,1\\n.9,,0\\n"
+    >>> _ = path.write_text(text, encoding="utf-8")
+    >>> camera = fifesim.sensor.read_responses(path, name="Camera", altitude=5e5, gsd=10.0)
+    >>> [(band.name, round(band.wavelength, 3)) for band in camera.bands]
+    [('red', 0.66), ('nir', 0.8)]
+    """
+    keys = {"name": name, "altitude": altitude, "gsd": gsd, "mtf_at_nyquist": mtf_at_nyquist}
+    given = {key: float(value) if key != "name" else value for key, value in keys.items() if value is not None}
+    given |= {"bits": bits, "bands": Path(path).name, "snr": dict(snr or {})}
+    return _in_right_units(_validated(given, Path(path).absolute()), path)
+
+
+def _in_right_units(found, path):
     try:
         check_instrument_units(found)
     except ValueError as error:
-        raise ValueError(f"{path.name}: {error}") from None
+        raise ValueError(f"{Path(path).name}: {error}") from None
     return found
 
 
@@ -183,6 +246,10 @@ def _parse(path):
         content = read_toml(path)
     except FileNotFoundError:
         raise FileNotFoundError(f"there is no instrument file {in_a_line(str(path))}") from None
+    return _validated(content, path)
+
+
+def _validated(content, path):
     try:
         return TypeAdapter(Instrument).validate_python(_completed(content, path))
     except ValidationError as error:
@@ -252,6 +319,7 @@ def _completed(content, path):
     references = content.get("references", {})
     if isinstance(content.get("bands"), str):
         content["bands"] = _table(path.parent, content["bands"])
+        _add_noise(content["bands"], content.pop("snr", {}))
     if "sources" not in content:
         numbers = (*INSTRUMENT_NUMBERS, *BAND_NUMBERS, *OPTIONAL_NUMBERS)
         content["sources"] = dict.fromkeys(numbers, _FILE)
@@ -271,6 +339,18 @@ def _completed(content, path):
     if isinstance(references, dict):
         content["references"] = references | {key: _REFERENCES[key] for key in _used(content) if key in _REFERENCES}
     return content
+
+
+def _add_noise(bands, ratios):
+    """Add the noise of bands of a table by name, each a ratio of signal to noise and the radiance where it holds."""
+    if unknown := set(ratios) - {band["name"] for band in bands}:
+        known = ", ".join(band["name"] for band in bands)
+        raise ValueError(f"snr: there is no band {', '.join(sorted(unknown))}, the table has {known}")
+    for band in bands:
+        if band["name"] in ratios:
+            if np.shape(pair := ratios[band["name"]]) != (2,):
+                raise ValueError(f"snr: {band['name']} needs a ratio and the radiance where it holds, got {pair}")
+            band["snr"], band["snr_radiance"] = map(float, pair)
 
 
 def _used(content):
@@ -353,11 +433,32 @@ def _table(folder, name):
         raise ValueError(f"bands = {shown(name)}: {reason}; type a CSV file of bands, or [[bands]]") from None
     missing = {"name", "center", "width"} - set(table.columns)
     if missing and "wavelength" in table.columns:
-        raise ValueError(
-            f"bands = {shown(name)}: it has responses by wavelength; a table of bands has one row for each band, with "
-            "name, center and width [um]. Write measured responses as [[bands]] with srf = { wavelength = [...], "
-            "response = [...] }"
-        )
+        return _measured(table, f"bands = {shown(name)}")
     if missing:
         raise ValueError(f"bands = {shown(name)}: it lacks the columns {', '.join(sorted(missing))} [um]")
     return [{name: cell for name, cell in row.items() if not pd.isna(cell)} for row in table.to_dict("records")]
+
+
+def _measured(table, what):
+    """Bands of a table of responses by wavelength, each from the rows where it has one."""
+    names = [column for column in table.columns if column != "wavelength"]
+    if not names:
+        raise ValueError(f"{what}: it has no column beside wavelength: type one column of responses for each band")
+    for column in table.columns:
+        if (first := column.rpartition(".")[0]) in names:
+            raise ValueError(f"{what}: the column {first} occurs twice: type another name for one of them")
+        numbers = pd.to_numeric(table[column], errors="coerce")
+        if (wrong := numbers.isna() & table[column].notna()).any():
+            raise ValueError(f"{what}: the column {column} must have numbers, got {table[column][wrong].iloc[0]!r}")
+    if table["wavelength"].max() > LONGEST:
+        largest = table["wavelength"].max()
+        raise ValueError(f"{what}: wavelength {largest:g}: it is in um, this looks like nm: divide by 1000")
+    found, table = [], table.sort_values("wavelength")
+    for name in names:
+        own = table[table[name].notna()]
+        # Measured responses scatter around zero outside of the band.
+        response = np.maximum(own[name].to_numpy(float), 0.0)
+        if len(own) < 2 or not response.max() > 0:
+            raise ValueError(f"{what}: the column {name} has no response above 0 at two wavelengths or more")
+        found.append({"name": name, "srf": {"wavelength": own["wavelength"].tolist(), "response": response.tolist()}})
+    return found

@@ -17,7 +17,7 @@ from fifesim.base.files import check_regular, shown
 from fifesim.sensor.description.fields import CONFIG, Name, Number, Positive
 
 # All bands lie between 100 nm and 100 um.
-_LONGEST = 100.0
+LONGEST = 100.0
 
 # A Gaussian ends 1.5 of its widths from its centre, where it is 0.2 % of its maximum; it has so many wavelengths.
 _REACH, _NODES = 1.5, 121
@@ -49,7 +49,7 @@ class PyrsrResponse(NamedResponse):
                 "srf = { wavelength = [...], response = [...] } or name a table"
             ) from None
         # pyrsr holds some sensors in nanometres and others in micrometres.
-        wavelength = table[:, 0] / 1000 if table[-1, 0] > _LONGEST else table[:, 0]
+        wavelength = table[:, 0] / 1000 if table[-1, 0] > LONGEST else table[:, 0]
         # Measured responses scatter around zero outside of the band.
         return Band(name, wavelength, np.maximum(table[:, 1], 0))
 
@@ -94,7 +94,7 @@ class ResponseList(NamedResponse):
     response: Annotated[tuple[Number, ...], Field(min_length=2)]  # [1]
 
     def _read(self, name):
-        if max(self.wavelength) > _LONGEST:
+        if max(self.wavelength) > LONGEST:
             raise ValueError(
                 f"srf.wavelength = {max(self.wavelength):g}: wavelengths are in um, these look like nm: divide by 1000"
             )
@@ -110,7 +110,7 @@ class CenteredResponse(NamedResponse):
     shape: Literal["gaussian", "boxcar"] = "gaussian"
 
     def __post_init__(self):
-        if self.center > _LONGEST:
+        if self.center > LONGEST:
             raise ValueError(f"center = {self.center:g}: wavelengths are in um, this looks like nm: divide by 1000")
         if self.width >= self.center / _REACH:
             raise ValueError(

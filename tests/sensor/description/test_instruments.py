@@ -10,7 +10,7 @@ from paper_file import paper_text
 import fifesim
 from fifesim.base import files
 from fifesim.base.bands import solar_irradiance
-from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.instruments import instrument, read_responses
 
 TM_FILE = files.path("instruments/tm.toml")
 
@@ -290,10 +290,115 @@ def test_blur_from_mtf_at_nyquist(changed):
         ("bands.csv/", TABLE, "no such file beside it"),
         ("other.csv", TABLE, "bands = 'other.csv': no such file beside it"),
         ("bands.csv", "name,center\nred,0.6\n", "lacks the columns width"),
-        ("bands.csv", "wavelength,red,nir\n0.6,1,0\n", r"it has responses by wavelength; .* srf = \{ wavelength"),
+        ("bands.csv", "wavelength,red\n0.6,1\n", "the column red has no response above 0 at two wavelengths"),
+        ("bands.csv", "wavelength,red\n0.6,0\n0.7,-1\n", "the column red has no response above 0"),
+        ("bands.csv", "wavelength,red\n600,0\n700,1\n", "wavelength 700: it is in um, this looks like nm"),
+        ("bands.csv", "wavelength,red\n0.6,low\n0.7,1\n", "the column red must have numbers, got 'low'"),
+        ("bands.csv", "wavelength,red,red\n0.6,0,1\n0.7,1,0\n", "the column red occurs twice"),
+        ("bands.csv", "wavelength\n0.6\n0.7\n", "no column beside wavelength"),
+        ("bands.csv", "wavelength,red\n0.6,0\n0.6,1\n0.7,0\n", "wavelengths must increase"),
     ],
 )
 def test_invalid_band_table_raises(changed, tmp_path, name, table, said):
     (tmp_path / "bands.csv").write_text(table)
     with pytest.raises(ValueError, match=f"mine.toml: .*{said}"):
         changed(text=f'{HEAD}bands = "{name.format(tmp_path.name)}"\n')
+
+
+MEASURED = """# calibration of the laboratory
+wavelength, nir, red
+0.72, 0.0, 0.0
+0.66, -0.003, 1.0
+0.62,, 0.0
+0.80, 1.0,
+0.88, 0.0,
+"""
+
+
+def test_measured_responses_are_bands(tmp_path):
+    """Rows in any order, empty cells, and noise around zero."""
+    (tmp_path / "srf.csv").write_text(MEASURED, encoding="utf-8")
+    noise = {"red": (120.0, 22.0)}
+    made = read_responses(
+        tmp_path / "srf.csv", name="Camera", altitude=5e5, gsd=10.0, bits=10, mtf_at_nyquist=0.25, snr=noise
+    )
+    nir, red = made.bands
+    assert (red.name, red.response.wavelength, red.response.response) == ("red", (0.62, 0.66, 0.72), (0.0, 1.0, 0.0))
+    assert nir.response.wavelength == (0.66, 0.72, 0.8, 0.88) and min(nir.response.response) == 0
+    assert (red.noise.snr, red.noise.radiance, nir.noise, made.bits) == (120.0, 22.0, None, 10)
+    assert made.line_spreads(red).along.mtf(0.5 / 10.0) == pytest.approx(0.25)
+    assert made.source("srf", red) == "as srf.csv says"
+    text = 'name = "Camera"\naltitude = 5e5\ngsd = 10.0\nbits = 10\nmtf_at_nyquist = 0.25\nbands = "srf.csv"\n'
+    path = tmp_path / "camera.toml"
+    path.write_text(text + "snr = { red = [120, 22] }\n", encoding="utf-8")
+    again = instrument(path)
+    assert again.bands == made.bands and again.lsf == made.lsf
+    # The table is read again when it changes.
+    (tmp_path / "srf.csv").write_text(MEASURED.replace("0.80", "0.82"), encoding="utf-8")
+    assert instrument(path).bands[0].response.wavelength[2] == 0.82
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"snr": {"blue": (1.0, 2.0)}}, "there is no band blue, the table has nir, red"),
+        ({"snr": {"red": 100.0}}, "red needs a ratio and the radiance where it holds"),
+        ({"altitude": 400.0}, "interval = 0.025: angles are in radians"),
+        ({"mtf_at_nyquist": 1.5}, "mtf_at_nyquist = 1.5: must be below 1"),
+    ],
+)
+def test_wrong_numbers_beside_measured_responses_are_refused(tmp_path, keys, words):
+    (tmp_path / "srf.csv").write_text(MEASURED, encoding="utf-8")
+    given = {"name": "Camera", "altitude": 5e5, "gsd": 10.0} | keys
+    with pytest.raises(ValueError, match=words):
+        read_responses(tmp_path / "srf.csv", **given)
+
+
+@pytest.mark.parametrize("name", ["TM", "OLI", "MSI", "MODIS", "VIIRS", "AVHRR", "HRV"])
+def test_blur_and_interval_follow_the_pixel_of_a_design(name):
+    own = instrument(name)
+    wide = own.replace(gsd=2.5 * own.gsd, registration=3.0)
+    for band, other in zip(own.bands, wide.bands, strict=True):
+        assert wide.pixel(other) == pytest.approx(2.5 * own.pixel(band))
+        for one, two in zip(own.line_spreads(band), wide.line_spreads(other), strict=True):
+            assert two.mtf(0.3 / own.gsd / 2.5) == pytest.approx(one.mtf(0.3 / own.gsd), abs=1e-9)
+        np.testing.assert_allclose(wide.ground_intervals(other), 2.5 * np.array(own.ground_intervals(band)))
+    assert (wide.geolocation, wide.interval, wide.max_angle) == (3.0, own.interval, own.max_angle)
+    assert wide.source("gsd") == wide.source("geolocation") == "given to Instrument.replace"
+    assert wide.name == f"{own.name}, gsd {2.5 * own.gsd:g}, registration 3" and not wide.aliases
+
+
+def test_a_design_has_the_transfer_and_the_noise_that_are_given():
+    own = instrument("MSI")
+    made = own.replace(mtf=0.2, snr=50)
+    for band, other in zip(own.bands, made.bands, strict=True):
+        for spread, interval in zip(made.line_spreads(other), made.ground_intervals(other), strict=True):
+            assert spread.mtf(0.5 / interval) == pytest.approx(0.2)
+        assert other.noise.radiance / other.noise.equivalent_radiance == pytest.approx(50)
+        # The noise at any radiance changes by the factor of the ratio.
+        factor = band.noise.radiance / band.noise.equivalent_radiance / 50
+        stated = np.array([0.5, 1.0, 3.0]) * band.noise.radiance
+        one, two = (model.noise_model(each) for model, each in ((own, band), (made, other)))
+        np.testing.assert_allclose(two.thermal**2 + two.shot * stated, factor**2 * (one.thermal**2 + one.shot * stated))
+    origins = {row.quantity: row.origin for row in made.provenance}
+    assert origins == {row.quantity: row.origin for row in own.provenance} | {"blur": "required", "noise": "required"}
+    two_points = instrument("OLI").replace(snr=60.0).bands[3].noise
+    stated = instrument("OLI").bands[3].noise
+    assert two_points.high_snr / stated.high_snr == pytest.approx(60.0 / stated.snr)
+
+
+@pytest.mark.parametrize(
+    ("name", "keys", "error", "words"),
+    [
+        ("TM", {"gsd": 0.0}, ValueError, "gsd must be above 0 m, got 0"),
+        ("TM", {"mtf": 1.0}, ValueError, r"mtf must be in \(0, 1\), got 1"),
+        ("TM", {"snr": np.nan}, ValueError, "snr must be above 0, got nan"),
+        ("TM", {"gsd": "30 m"}, TypeError, "gsd must be a number in m"),
+        ("TM", {"mft": 0.2}, TypeError, "did you mean 'mtf'"),
+        ("MSS", {"snr": 50.0}, ValueError, "the description of MSS states no radiance"),
+        ("VIIRS", {"mtf": 0.2}, ValueError, "VIIRS sums samples on board"),
+    ],
+)
+def test_designs_that_are_not_possible_are_refused(name, keys, error, words):
+    with pytest.raises(error, match=words):
+        instrument(name).replace(**keys)
