@@ -152,24 +152,36 @@ class Prepared:
         return found
 
 
-def prepare(arp, properties, *, window=None, reach=96):
-    """Field of an arp, and properties of its cells by name, each an array of values at the `DEVIATES`."""
-    # Regressions are of pixels in a window of rows and columns [cell], whose mean they remove; by default unlimited.
-    # Cells of two footprints are at most a reach apart. [cell]
-    n = fft.next_fast_len(max(2 * reach, margin(arp)), real=True)
-    u = 2 * np.pi * fft.fftfreq(n)
-    rho = fft.irfft2(response(arp, u[:, None], u[: n // 2 + 1]) ** 2, (n, n))
-    rho /= rho[0, 0]
-    powers = rho[: reach + 1, : reach + 1] ** np.arange(1, ORDERS + 1)[:, None, None]
+def prepare(rho, properties, *, window=None, reach=96):
+    """Field of a correlation, and properties of its cells by name, each an array of values at the `DEVIATES`."""
+    # The correlation at lags of rows and columns from 0 is zero beyond them. Regressions are of pixels in a window of
+    # rows and columns [cell], whose mean they remove; by default unlimited. Cells of two footprints are at most a
+    # reach apart. [cell]
+    missing = [(0, max(reach + 1 - size, 0)) for size in rho.shape]
+    near = np.pad(rho, missing)[: reach + 1, : reach + 1]
+    powers = near ** np.arange(1, ORDERS + 1)[:, None, None]
     lost = 0.0 if window is None else _of_mean(rho, window)
     return Prepared(powers, {name: coefficients(each) for name, each in properties.items()}, lost)
 
 
+def correlation_of(arp):
+    """Correlation of the field of an arp at lags of rows and columns from 0."""
+    n = fft.next_fast_len(max(192, margin(arp)), real=True)
+    u = 2 * np.pi * fft.fftfreq(n)
+    rho = fft.irfft2(response(arp, u[:, None], u[: n // 2 + 1]) ** 2, (n, n))
+    return rho[: n // 2 + 1, : n // 2 + 1] / rho[0, 0]
+
+
 def _of_mean(rho, window):
     """Variance of the mean over a window of fields of correlation rho^k, shape (order from 1,)."""
-    lags = np.abs(fft.fftfreq(len(rho), 1 / len(rho)))
-    down, across = (np.maximum(1 - lags / cells, 0) / cells for cells in window)
-    return np.array([down @ rho**k @ across for k in range(1, ORDERS + 1)])
+    lags = [np.arange(min(cells, size)) for cells, size in zip(window, rho.shape, strict=True)]
+    rows, columns = (np.where(lag, 2, 1) * (1 - lag / cells) / cells for lag, cells in zip(lags, window, strict=True))
+    inside = rho[: rows.size, : columns.size]
+    power, found = np.ones_like(inside), []
+    for _ in range(ORDERS):
+        power *= inside
+        found.append(rows @ power @ columns)
+    return np.array(found)
 
 
 def coefficients(values):

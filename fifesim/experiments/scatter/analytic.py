@@ -15,6 +15,7 @@ from fifesim.experiments.analytic import (
     FIELD_NODES,
     Footprint,
     Pixel,
+    correlation_of,
     mean_of_cells,
     moments,
     prepare,
@@ -25,6 +26,8 @@ from fifesim.grids import grid as grids
 from fifesim.grids.reductions import areas
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
+from fifesim.ground.landscape.learned import correlation_of_scores, leaf_area, scores_of
+from fifesim.scenario.ground import drawn_properties, learned_landscape
 from fifesim.sensor.labels import noise_models
 from fifesim.sensor.response.noise import radiance_std
 
@@ -42,13 +45,16 @@ def obstacles(scenario):
     """Reasons for which the scatter of a complete scenario needs simulation, each with what to give instead."""
     own, land, air = scenario.sensor, scenario.ground, scenario.atmosphere
     down, across = grids.cell_size(scenario.geobox())
+    varying = list(drawn_properties(scenario))
     found = {
         "ground.lai_file is a map: give ground.distribution and arp": bool(land.lai_file),
-        "the landscape is learned: give landscape.learned = 'none'": bool(scenario.learned),
         "the ground has classes or other varying properties: give landscape.cover = 'none' without deviations": (
             not scenario.learned and not scenario.is_one()
         ),
-        f"ground.arp is {land.arp:g}: give at most {LARGEST_STREAMING_ARP}": land.arp > LARGEST_STREAMING_ARP,
+        f"{' and '.join(varying)} vary: give ground.{' and ground.'.join(varying)}": bool(scenario.learned and varying),
+        f"ground.arp is {land.arp:g}: give at most {LARGEST_STREAMING_ARP}": (
+            not scenario.learned and land.arp > LARGEST_STREAMING_ARP
+        ),
         "ground.method is 'periodic': give 'streaming'": land.method == "periodic",
         "the ground is not level: give terrain.dem = 'flat'": scenario.terrain.dem != "flat",
         "there are clouds: give clouds.cloud_cover = 0": scenario.clouds.cloud_cover > 0,
@@ -89,9 +95,8 @@ class Covariances:
         self.driver, setup = self.scene.driver, self.scene.setup
         given = self.driver.instrument, self.driver.bands, setup.noise, setup.noise_models
         self.noisy = noise_models(*given) if setup.noise else []
-        quantiles = quantile_table(lai_distribution(scenario.ground.distribution))
-        self.lai = lai = quantile_map(DEVIATES, quantiles)
-        self.areas = np.linspace(0.0, quantiles[-1], 2001)
+        self.lai, correlation = _field(scenario)
+        lai, self.areas = self.lai, np.linspace(0.0, self.lai.max(), 2001)
         absorbed = self.driver.fpar(self.areas, scenario.ground.fpar_inf)
         # Properties by leaf area, and in the air and without it (1 and 0): reflectance of both bands and NDVI.
         self.by_area = {"lai": Table(self.areas, self.areas), "fpar": Table(self.areas, absorbed)}
@@ -105,7 +110,7 @@ class Covariances:
         self.seen = {state: self._footprints(*state) for state in product((False, True), repeat=2)}
         self.even = self._footprints("point spread" in self.stages, "registration" in self.stages, even=True)
         reach = max(reach, reach_of([self.square, *self.even, *(each for pair in self.seen.values() for each in pair)]))
-        self.prepared = prepare(scenario.ground.arp, properties, window=self.scene.grid.shape, reach=reach)
+        self.prepared = prepare(correlation, properties, window=self.scene.grid.shape, reach=reach)
         self.recordings = {}
 
     def lines(self, at_work):
@@ -214,6 +219,15 @@ class Covariances:
         own = [setup.instrument.line_spreads(band) for band in self.driver.bands]
         spreads = own if blurred else [areas(scene.blocks)] * 2
         return footprints(spreads, scene.grid, scene.blocks, setup.offset if displaced else (0.0, 0.0), even)
+
+
+def _field(scenario):
+    """Leaf area at the deviates of a field, and the correlation of the field."""
+    if scenario.learned:
+        land, cell = learned_landscape(scenario.learned), scenario.grid.cell
+        return leaf_area(land, scores_of(land, DEVIATES, cell)), correlation_of_scores(land, cell)
+    quantiles = quantile_table(lai_distribution(scenario.ground.distribution))
+    return quantile_map(DEVIATES, quantiles), correlation_of(scenario.ground.arp)
 
 
 def footprints(spreads, cells, blocks, offset, even=False):

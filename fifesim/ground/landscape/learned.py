@@ -123,6 +123,43 @@ def scores(landscape, northing, easting, seed, elevation=None, mean=0.0, spread=
     return total if elevation is None else np.where(np.isnan(elevation), np.nan, total)
 
 
+def correlation_of_scores(landscape, cell):
+    """Correlation of the scores of level ground at lags of rows and columns of cells from 0."""
+    gusts, count = landscape.level_gusts, int(np.ceil(4 * max(each.spacing for each in landscape.level) / cell)) + 1
+    lags = np.arange(count) * cell
+
+    def kept(names):
+        """Correlation of the amplitudes, exp(-s**2 (1 - r)) for each normal gust of standard deviation s."""
+        found = 0.0
+        for name in names:
+            along = spline_correlation(lags / GUST_LENGTHS[name])
+            found = found + gusts[name] ** 2 * (1 - along[:, None] * along)
+        return np.exp(-found)
+
+    coarse, fine, total = kept(("broad", "medium")), kept(("broad", "medium", "fine")), np.zeros((count, count))
+    for each in landscape.level:
+        along = spline_correlation(lags / each.spacing)
+        variance = each.variance * variance_kept(each.spacing, cell)
+        total += variance * along[:, None] * along * (fine if each.spacing <= FINE else coarse)
+    return total / total[0, 0]
+
+
+def scores_of(landscape, deviates, cell):
+    """Scores of cells of level ground at standard normal deviates, by their distribution: a mixture of normals."""
+    gusts = landscape.level_gusts
+    nodes, weights = np.polynomial.hermite_e.hermegauss(40)
+    both = np.hypot(gusts["broad"], gusts["medium"])
+    coarse, fine = (np.exp(2 * (s * nodes - s**2)) for s in (both, gusts["fine"]))
+    kept = {each.spacing: each.variance * variance_kept(each.spacing, cell) for each in landscape.level}
+    smooth = sum(variance for spacing, variance in kept.items() if spacing > FINE)
+    deviation = np.sqrt(coarse[:, None] * (smooth + (sum(kept.values()) - smooth) * fine))
+    below = np.linspace(-60.0, 0.0, 6001)
+    share = (weights[:, None] * weights)[..., None] * special.ndtr(below / deviation[..., None])
+    normal = special.ndtri(share.sum(axis=(0, 1)) / weights.sum() ** 2)
+    known = normal > -8.5
+    return np.sign(deviates) * -np.interp(-np.abs(deviates), normal[known], below[known])
+
+
 def _add_gusts(name, gusts, seed, place, out):
     """Add the logarithm by which the residual is stronger or weaker in places."""
     if gusts[name]:

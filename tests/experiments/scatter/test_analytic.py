@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 import fifesim
-from fifesim.experiments.analytic import DEVIATES, Footprint, Pixel, mean_of_cells, prepare
+from fifesim.experiments.analytic import DEVIATES, Footprint, Pixel, correlation_of, mean_of_cells, prepare
 from fifesim.experiments.scatter.shares import standard_error
 
 _BOX = np.full(9, 1 / 9)
@@ -47,7 +47,7 @@ def test_scatter_agrees_with_an_independent_simulation():
         lai = _FIELDS[name]
         area = lai.ppf(stats.norm.cdf(DEVIATES))
         red, nir = 0.03 + 0.12 * np.exp(-0.75 * area), 0.36 - 0.20 * np.exp(-0.55 * area)
-        field = prepare(arp, {"lai": area, "red": red, "nir": nir}, window=(1152, 1152), reach=420)
+        field = prepare(correlation_of(arp), {"lai": area, "red": red, "nir": nir}, window=(1152, 1152), reach=420)
         truth = Pixel(("lai",), (Footprint(_BOX, _BOX),), mean_of_cells)
         for row in rows.itertuples():
             seen = _blurred(row.blur_sd_cells, 9 * row.shift_pixels_down)
@@ -58,7 +58,7 @@ def test_scatter_agrees_with_an_independent_simulation():
 
 
 def test_linear_pixels_with_noise_have_the_scatter_of_their_variances():
-    field = prepare(0.2, {"lai": 2 + 0.5 * DEVIATES, "seen": 3 - DEVIATES})
+    field = prepare(correlation_of(0.2), {"lai": 2 + 0.5 * DEVIATES, "seen": 3 - DEVIATES})
     truth, seen = Footprint(_BOX, _BOX), Footprint(_BOX, _BOX)
     lines = []
     for noise in (0.0, 0.1):
@@ -71,7 +71,7 @@ def test_linear_pixels_with_noise_have_the_scatter_of_their_variances():
 
 
 def test_only_the_distance_of_truth_and_image_matters():
-    field = prepare(0.2, {"lai": np.exp(0.5 * DEVIATES)})
+    field = prepare(correlation_of(0.2), {"lai": np.exp(0.5 * DEVIATES)})
 
     def scatter(truth, image, function=lambda means: np.exp(-means[0])):
         truth, image = (Footprint(_BOX, _BOX, place) for place in (truth, image))
