@@ -95,10 +95,19 @@ class Prepared:
         covariance = moments(values, rest)[1]
         noise = np.zeros(1) if image.noise is None else np.atleast_2d(image.noise(means[-1])) @ NODE_SHARES
         of_image, found = covariance[-1, -1] + noise.sum(), []
-        for of_truth, both in zip(np.diag(covariance), covariance[:-1, -1], strict=False):
+        for truth, both in zip(truths, covariance[:-1, -1], strict=True):
+            of_truth = self._variance(truth)
             left = of_truth - both**2 / of_image
             found.append(PixelLine(left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both, noise))
         return found
+
+    def _variance(self, truth):
+        """Variance of a truth, given its own footprint, which leaves the smallest remainder."""
+        key = truth.names, truth.footprints, id(truth.function)
+        if key not in self.known:
+            _, values, rest = self.given(truth.footprints[0], (truth,))
+            self.known[key] = moments(values, rest)[1][0, 0]
+        return self.known[key]
 
     def given(self, first, pixels):
         """Properties and quantities of pixels given the mean of z over a footprint, and covariances of the rest."""

@@ -60,7 +60,8 @@ def trade(
         [1]: ratio at the radiance that the instrument's file states. "registration" [m]: displacement of pixels along
         both axes. "bands": pairs of names for red and near infrared. What is left out is that of the instrument.
     scenario : Scenario, optional
-        Ground, light and air: one level stand without clouds. By default level, with the largest patches of the paper.
+        Ground, light and air: leaf area of one stand or a learned landscape on level ground, without clouds. By default
+        the learned landscape of ``fifesim.Scenario()`` with uniform soil and dead leaves.
     weather : Weather, optional
         Numbers for the production; by default `fife_weather`, which is assumed.
 
@@ -97,7 +98,8 @@ def trade(
     """
     own = description_of(instrument)
     if scenario is None:
-        scenario = Scenario(ground={"arp": 0.24}, terrain={"dem": "flat"})  # type: ignore[arg-type]
+        ground = {"soil": 0.0, "brown": 0.05, "moisture": 0.1}
+        scenario = Scenario(ground=ground, terrain={"dem": "flat"})  # type: ignore[arg-type]
     axes = _axes(own, designs)
     blurs = [own.replace(mtf=float(each)) for each in axes["mtf"]] if "mtf" in designs else [own, *_ends(own)]
     parts = [_scatter(own, pair, blurs, axes, scenario, weather) for pair in axes["bands"]]

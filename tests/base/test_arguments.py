@@ -59,7 +59,8 @@ LISTS = {
 ACCEPTED = {
     **{(function, name): {"list"} for function, names in LISTS.items() for name in names},
     # Any text is a valid label; None and other types are rejected.
-    ("Band", "name"): {"str"}, ("read_responses", "name"): {"str"}, ("CoverClass", "name"): {"str"}, ("to_geotiff", "path"): {"str"},
+    ("read_responses", "name"): {"str"},
+    ("Band", "name"): {"str"}, ("CoverClass", "name"): {"str"}, ("to_geotiff", "path"): {"str"},
     ("dataset", "folder"): {"str"}, ("write_style", "path"): {"str"}, ("train", "path"): {"str"},
     ("learn_landscape", "source"): {"str"},
     # Descriptions without a grid check rasters and spectra when they are used; see the test of canopy fields.

@@ -45,13 +45,15 @@ def obstacles(scenario):
     """Reasons for which the scatter of a complete scenario needs simulation, each with what to give instead."""
     own, land, air = scenario.sensor, scenario.ground, scenario.atmosphere
     down, across = grids.cell_size(scenario.geobox())
-    varying = list(drawn_properties(scenario))
+    varying = list(drawn_properties(scenario)) if scenario.learned else []
     found = {
         "ground.lai_file is a map: give ground.distribution and arp": bool(land.lai_file),
         "the ground has classes or other varying properties: give landscape.cover = 'none' without deviations": (
             not scenario.learned and not scenario.is_one()
         ),
-        f"{' and '.join(varying)} vary: give ground.{' and ground.'.join(varying)}": bool(scenario.learned and varying),
+        f"{', '.join(varying)} vary: give numbers for ground.{', ground.'.join(varying)}": bool(
+            scenario.learned and varying
+        ),
         f"ground.arp is {land.arp:g}: give at most {LARGEST_STREAMING_ARP}": (
             not scenario.learned and land.arp > LARGEST_STREAMING_ARP
         ),

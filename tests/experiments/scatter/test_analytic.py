@@ -12,6 +12,8 @@ from scipy import stats
 import fifesim
 from fifesim.experiments.analytic import DEVIATES, Footprint, Pixel, correlation_of, mean_of_cells, prepare
 from fifesim.experiments.scatter.shares import standard_error
+from fifesim.ground.landscape.learned import correlation_of_scores, scores, scores_of
+from fifesim.scenario.ground import learned_landscape
 
 _BOX = np.full(9, 1 / 9)
 _FIELDS = {
@@ -144,7 +146,7 @@ def test_scaling_of_ndvi_has_the_sign_of_its_curvature():
     [
         ({"clouds": {"cloud_cover": 0.2}}, "clouds.cloud_cover = 0"),
         ({"terrain": {"dem": "flint-hills"}}, "terrain.dem = 'flat'"),
-        ({"landscape": {"learned": "konza"}, "ground": {}}, "landscape.learned = 'none'"),
+        ({"landscape": {"learned": "konza"}, "ground": {"soil": 0.0}}, "numbers for ground.brown, ground.moisture"),
         ({"sensor": {"interval": 31.0}}, "sensor.interval = 'product'"),
         ({"grid": {"width": 990, "height": 990, "cell": 4.0}}, "a grid.cell that divides"),
         ({"atmosphere": {"adjacency": True}}, "atmosphere.adjacency = false"),
@@ -163,3 +165,37 @@ def test_scenarios_beyond_the_analytic_budget_are_refused(sections, reason):
             fifesim.budget(fifesim.Scenario(**(plain | sections)), method="analytic", cells=240)
     with pytest.raises(ValueError, match="has no errors of a quantity"):
         fifesim.budget(fifesim.Scenario(**plain), quantity="lai", method="analytic")
+
+
+def test_scores_of_a_learned_landscape_have_their_distribution_and_correlation():
+    """Brute force: 2000 fields of 80 x 80 cells, far apart."""
+    land, cell = learned_landscape("konza"), 5.0
+    place = np.arange(80) * cell
+    drawn = np.stack([scores(land, -place, place, seed, cell=cell) for seed in range(2000)])
+    lags = np.array([1, 2, 5, 10, 30, 60])
+    along = [np.mean(drawn[:, :, lag:] * drawn[:, :, :-lag]) for lag in lags]
+    down = [np.mean(drawn[:, lag:, lag:] * drawn[:, :-lag, :-lag]) for lag in lags]
+    rho = correlation_of_scores(land, cell)
+    np.testing.assert_allclose(np.array(along) / drawn.var(), rho[0, lags], atol=0.01)
+    np.testing.assert_allclose(np.array(down) / drawn.var(), rho[lags, lags], atol=0.01)
+    deviates = np.array([-3.0, -2.0, -1.0, 0.5, 2.0, 3.0])
+    # The distribution is symmetric.
+    quantiles = (np.quantile(drawn, stats.norm.cdf(deviates)) - np.quantile(drawn, stats.norm.cdf(-deviates))) / 2
+    np.testing.assert_allclose(scores_of(land, deviates, cell), quantiles, rtol=0.02)
+    # Mixed normals have wider tails than a normal of the same variance.
+    assert scores_of(land, 3.0, cell) > 1.2 * 3.0 * drawn.std()
+
+
+@pytest.mark.parametrize("name", ["TM", "MSI"])
+def test_budget_of_a_learned_landscape_agrees_with_simulation(name):
+    scenario = fifesim.Scenario(
+        grid={"width": 8100, "height": 8100},
+        terrain={"dem": "flat"},
+        ground={"soil": 0.0, "brown": 0.05, "moisture": 0.1},
+        sensor={"instrument": name, "offset": [0.2, 0.1], "noise": ["all"]},
+    )
+    found = fifesim.budget(scenario, method="analytic", cells=1215).isel(realisation=0)
+    drawn = fifesim.budget(scenario, realisations=4, cells=1215)
+    for key in ("total", "curvature", "share", "first"):
+        allowed = np.maximum(0.008, 3 * standard_error(drawn[key]))
+        assert (abs(found[key] - drawn[key].mean("realisation")) <= allowed).all(), key
