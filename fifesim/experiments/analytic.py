@@ -83,17 +83,30 @@ class Prepared:
     powers: np.ndarray
     """rho^k at lags of rows and columns, shape (order from 1, lags, lags)."""
     properties: dict[str, np.ndarray]
-    """Coefficients by name, shape (order from 0,). The covariance at lag d is sum_k a_k b_k rho(d)^k."""
+    """Coefficients by name, shape (stratum, order from 0). The covariance at lag d is sum_k a_k b_k rho(d)^k."""
     window: np.ndarray | float = 0.0
     """Variance of the mean of fields of correlation rho^k over the window of a regression, shape (order from 1,)."""
+    strata: np.ndarray = field(default_factory=lambda: np.ones(1))
+    """Shares of the strata, which have properties of their own and are larger than pixels."""
     known: dict = field(default_factory=dict, repr=False)
-    """Overlaps of footprints."""
+    """Overlaps of footprints, and variances of truths."""
+
+    @property
+    def node_shares(self):
+        """Shares of the nodes of all strata."""
+        return np.multiply.outer(self.strata, NODE_SHARES).ravel()
+
+    def moments(self, values, rest):
+        """Mean and covariance of quantities from their values and the covariances of remainders at the nodes."""
+        mean = values @ self.node_shares
+        apart = values - mean[:, None]
+        return mean, (apart * self.node_shares) @ apart.T + rest @ self.node_shares
 
     def regressions(self, truths, image):
         """Regressions of truths, which have no noise, on an image."""
         means, values, rest = self.given(image.footprints[0], (*truths, image))
-        covariance = moments(values, rest)[1]
-        noise = np.zeros(1) if image.noise is None else np.atleast_2d(image.noise(means[-1])) @ NODE_SHARES
+        covariance = self.moments(values, rest)[1]
+        noise = np.zeros(1) if image.noise is None else np.atleast_2d(image.noise(means[-1])) @ self.node_shares
         of_image, found = covariance[-1, -1] + noise.sum(), []
         for truth, both in zip(truths, covariance[:-1, -1], strict=True):
             of_truth = self._variance(truth)
@@ -106,21 +119,22 @@ class Prepared:
         key = truth.names, truth.footprints, id(truth.function)
         if key not in self.known:
             _, values, rest = self.given(truth.footprints[0], (truth,))
-            self.known[key] = moments(values, rest)[1][0, 0]
+            self.known[key] = self.moments(values, rest)[1][0, 0]
         return self.known[key]
 
     def given(self, first, pixels):
         """Properties and quantities of pixels given the mean of z over a footprint, and covariances of the rest."""
         # A list of means by pixel, shape (property, node); quantities, shape (pixel, node); and the covariances of the
-        # remainders of quantities along their tangents, shape (pixel, pixel, node).
+        # remainders of quantities along their tangents, shape (pixel, pixel, node). Nodes are those of all strata.
         names = [name for pixel in pixels for name in pixel.names]
         footprints = [each for pixel in pixels for each in pixel.footprints]
         a = np.array([self.properties[name] for name in names])
-        given = a[:, 1:] * [self.overlap(first, each)[1] for each in footprints]
+        given = a[..., 1:] * np.array([self.overlap(first, each)[1] for each in footprints])[:, None]
         overlaps = np.array([[self.overlap(one, other)[0] for other in footprints] for one in footprints])
-        rest = np.einsum("ik,jk,ijk->ij", a[:, 1:], a[:, 1:], overlaps - self.window) - given @ given.T
-        means = a[:, :1] + given @ _POLYNOMIALS[1:]
-        steps = np.sqrt(np.maximum(np.diag(rest), 0.0)) / 3 + 1e-4 * np.abs(means).max(axis=1)
+        rest = np.einsum("isk,jsk,ijk->ijs", a[..., 1:], a[..., 1:], overlaps - self.window)
+        rest = np.repeat(rest - np.einsum("isk,jsk->ijs", given, given), FIELD_NODES.size, axis=-1)
+        means = (a[..., :1] + given @ _POLYNOMIALS[1:]).reshape(len(a), -1)
+        steps = np.sqrt(np.maximum(np.einsum("iiz->iz", rest), 0.0)) / 3 + 1e-4 * np.abs(means).max(1, keepdims=True)
         ends = np.cumsum([0, *(len(pixel.names) for pixel in pixels)])
         tangents, parts = np.zeros((len(pixels), *means.shape)), []
         for number, pixel in enumerate(pixels):
@@ -128,7 +142,7 @@ class Prepared:
             tangents[number, own] = tangents_of(pixel.function, means[own], steps[own])
             parts.append(means[own])
         values = np.array([pixel.function(part) for pixel, part in zip(pixels, parts, strict=True)])
-        return parts, values, np.einsum("piz,qjz,ij->pqz", tangents, tangents, rest)
+        return parts, values, np.einsum("piz,qjz,ijz->pqz", tangents, tangents, rest)
 
     def overlap(self, one, other):
         """Covariances of footprints over fields of correlation rho^k, shape (2, order from 1)."""
@@ -161,8 +175,9 @@ class Prepared:
         return found
 
 
-def prepare(rho, properties, *, window=None, reach=96):
+def prepare(rho, properties, *, strata=(1.0,), window=None, reach=96):
     """Field of a correlation, and properties of its cells by name, each an array of values at the `DEVIATES`."""
+    # Strata with properties of their own have shares; their values have shape (stratum, deviate).
     # The correlation at lags of rows and columns from 0 is zero beyond them. Regressions are of pixels in a window of
     # rows and columns [cell], whose mean they remove; by default unlimited. Cells of two footprints are at most a
     # reach apart. [cell]
@@ -170,7 +185,7 @@ def prepare(rho, properties, *, window=None, reach=96):
     near = np.pad(rho, missing)[: reach + 1, : reach + 1]
     powers = near ** np.arange(1, ORDERS + 1)[:, None, None]
     lost = 0.0 if window is None else _of_mean(rho, window)
-    return Prepared(powers, {name: coefficients(each) for name, each in properties.items()}, lost)
+    return Prepared(powers, {name: coefficients(each) for name, each in properties.items()}, lost, np.array(strata))
 
 
 def correlation_of(arp):
@@ -194,10 +209,10 @@ def _of_mean(rho, window):
 
 
 def coefficients(values):
-    """Coefficients of a function of a deviate for He_k / sqrt(k!) from its values at the `DEVIATES`."""
+    """Coefficients for He_k / sqrt(k!) of functions of a deviate, shape (stratum, order), from values at `DEVIATES`."""
     # Trapezoidal rule, because a quantile function may have kinks.
     weights = np.exp(-(DEVIATES**2) / 2) / np.sqrt(2 * np.pi) * (DEVIATES[1] - DEVIATES[0])
-    return polynomials(DEVIATES) @ (weights * values)
+    return np.atleast_2d(weights * values) @ polynomials(DEVIATES).T
 
 
 def polynomials(z, orders=ORDERS):
@@ -206,13 +221,6 @@ def polynomials(z, orders=ORDERS):
     for k in range(1, orders):
         found.append((z * found[-1] - np.sqrt(k) * found[-2]) / np.sqrt(k + 1))
     return np.array(found)
-
-
-def moments(values, rest):
-    """Mean and covariance of quantities from their values and the covariances of remainders at the nodes."""
-    mean = values @ NODE_SHARES
-    apart = values - mean[:, None]
-    return mean, (apart * NODE_SHARES) @ apart.T + rest @ NODE_SHARES
 
 
 # Nodes and weights over the mean of a footprint.
@@ -225,6 +233,6 @@ _POLYNOMIALS = polynomials(FIELD_NODES)
 def tangents_of(function, means, steps):
     """Derivatives of a function of means over steps of them, shape as the means."""
     found = np.empty_like(means)
-    for number, step in enumerate(np.diag(steps)[..., None]):
+    for number, step in enumerate(np.eye(len(steps))[..., None] * steps):
         found[number] = (function(means + step) - function(means - step)) / (2 * steps[number])
     return found

@@ -228,7 +228,8 @@ def _lines(covariances, square, seen):
 
 def _check_rounding(covariances, share, scale):
     """Raise ValueError if rounding errors depend on the signal: pixels and noise vary by less than digital numbers."""
-    seen = np.array([covariances.prepared.properties[f"{name}1"][:1] for name in ("red", "nir")])
+    prepared = covariances.prepared
+    seen = np.array([prepared.properties[f"{name}1"][:, :1].T @ prepared.strata for name in ("red", "nir")])
     spread = np.sqrt(covariances.grains(seen) * scale / (12 * _rounding(covariances))).min()
     if share > LARGEST_ROUNDING and spread < _SMALLEST_NOISE:
         raise ValueError(

@@ -17,7 +17,6 @@ from fifesim.experiments.analytic import (
     Pixel,
     correlation_of,
     mean_of_cells,
-    moments,
     prepare,
     reach_of,
 )
@@ -97,7 +96,7 @@ class Covariances:
         self.driver, setup = self.scene.driver, self.scene.setup
         given = self.driver.instrument, self.driver.bands, setup.noise, setup.noise_models
         self.noisy = noise_models(*given) if setup.noise else []
-        self.lai, correlation = _field(scenario)
+        self.lai, strata, correlation = _field(scenario)
         lai, self.areas = self.lai, np.linspace(0.0, self.lai.max(), 2001)
         absorbed = self.driver.fpar(self.areas, scenario.ground.fpar_inf)
         # Properties by leaf area, and in the air and without it (1 and 0): reflectance of both bands and NDVI.
@@ -112,7 +111,8 @@ class Covariances:
         self.seen = {state: self._footprints(*state) for state in product((False, True), repeat=2)}
         self.even = self._footprints("point spread" in self.stages, "registration" in self.stages, even=True)
         reach = max(reach, reach_of([self.square, *self.even, *(each for pair in self.seen.values() for each in pair)]))
-        self.prepared = prepare(correlation, properties, window=self.scene.grid.shape, reach=reach)
+        window = self.scene.grid.shape
+        self.prepared = prepare(correlation, properties, strata=strata, window=window, reach=reach)
         self.recordings = {}
 
     def lines(self, at_work):
@@ -180,7 +180,7 @@ class Covariances:
             return Recording()
         driver = self.driver
         _, values, rest = self.prepared.given(bands[0].footprints[0], bands)
-        mean, covariance = (each[..., None] for each in moments(values, rest))
+        mean, covariance = (each[..., None] for each in self.prepared.moments(values, rest))
         variance = np.diagonal(covariance[..., 0])[:, None]
         if "noise" in at_work:
             variance = variance + self.grains(mean)
@@ -202,9 +202,13 @@ class Covariances:
         white, (gain, offset, _) = self.white, self.driver.scale
         step = gain[:, None] / white
         fine = np.linspace(-4.5, 4.5, 1801)
-        numbers = CubicSpline(FIELD_NODES, (white * middle - offset[:, None]) / gain[:, None], axis=1)(fine)
-        spread = CubicSpline(FIELD_NODES, covariance / (step * step.T)[..., None], axis=2)(fine)
-        share, found = np.exp(-(fine**2) / 2), 0.0
+        numbers = (white * middle - offset[:, None]) / gain[:, None]
+        both = [numbers, (covariance / (step * step.T)[..., None]).reshape(4, -1)]
+        # Nodes of each stratum.
+        both = [each.reshape(len(each), -1, FIELD_NODES.size) for each in both]
+        numbers, spread = (CubicSpline(FIELD_NODES, each, axis=-1)(fine).reshape(len(each), -1) for each in both)
+        spread = spread.reshape(2, 2, -1)
+        share, found = np.multiply.outer(self.prepared.strata, np.exp(-(fine**2) / 2)).ravel(), 0.0
         for k, m in product(range(1, _HARMONICS + 1), repeat=2):
             for sign in (-1, 1):
                 power = k**2 * spread[0, 0] + m**2 * spread[1, 1] + 2 * sign * k * m * spread[0, 1]
@@ -224,12 +228,13 @@ class Covariances:
 
 
 def _field(scenario):
-    """Leaf area at the deviates of a field, and the correlation of the field."""
+    """Leaf area at the deviates of a field by stratum, shares of the strata, and the correlation of the field."""
     if scenario.learned:
         land, cell = learned_landscape(scenario.learned), scenario.grid.cell
-        return leaf_area(land, scores_of(land, DEVIATES, cell)), correlation_of_scores(land, cell)
+        scores, strata = scores_of(land, DEVIATES, cell)
+        return leaf_area(land, scores), strata, correlation_of_scores(land, cell)
     quantiles = quantile_table(lai_distribution(scenario.ground.distribution))
-    return quantile_map(DEVIATES, quantiles), correlation_of(scenario.ground.arp)
+    return quantile_map(DEVIATES, quantiles)[None], (1.0,), correlation_of(scenario.ground.arp)
 
 
 def footprints(spreads, cells, blocks, offset, even=False):

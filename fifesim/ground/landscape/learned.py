@@ -16,6 +16,8 @@ GUST_LENGTHS = {"broad": 300.0, "medium": 100.0, "fine": 25.0, "benches": 200.0}
 FINE = 40.0
 """Spacing up to which the fields of the residual follow the fine gusts. [m]"""
 
+_STRATA = 5  # of places with equal broad gusts, in covariances
+
 _TAPS = 4  # of a cubic spline
 
 _BINS = 2048  # of a table, for the search of nodes
@@ -124,40 +126,35 @@ def scores(landscape, northing, easting, seed, elevation=None, mean=0.0, spread=
 
 
 def correlation_of_scores(landscape, cell):
-    """Correlation of the scores of level ground at lags of rows and columns of cells from 0."""
-    gusts, count = landscape.level_gusts, int(np.ceil(4 * max(each.spacing for each in landscape.level) / cell)) + 1
-    lags = np.arange(count) * cell
-
-    def kept(names):
-        """Correlation of the amplitudes, exp(-s**2 (1 - r)) for each normal gust of standard deviation s."""
-        found = 0.0
-        for name in names:
-            along = spline_correlation(lags / GUST_LENGTHS[name])
-            found = found + gusts[name] ** 2 * (1 - along[:, None] * along)
-        return np.exp(-found)
-
-    coarse, fine, total = kept(("broad", "medium")), kept(("broad", "medium", "fine")), np.zeros((count, count))
+    """Correlation of scores of level ground at lags of rows and columns of cells, where broad gusts are equal."""
+    count = int(np.ceil(4 * max(each.spacing for each in landscape.level) / cell)) + 1
+    lags, total = np.arange(count) * cell, np.zeros((count, count))
+    gust = spline_correlation(lags / GUST_LENGTHS["fine"])
+    # The correlation of exp(g) for a normal gust g of standard deviation s is exp(-s**2 (1 - r)).
+    fine = np.exp(-(landscape.level_gusts["fine"] ** 2) * (1 - gust[:, None] * gust))
     for each in landscape.level:
         along = spline_correlation(lags / each.spacing)
         variance = each.variance * variance_kept(each.spacing, cell)
-        total += variance * along[:, None] * along * (fine if each.spacing <= FINE else coarse)
+        total += variance * along[:, None] * along * (fine if each.spacing <= FINE else 1.0)
     return total / total[0, 0]
 
 
 def scores_of(landscape, deviates, cell):
-    """Scores of cells of level ground at standard normal deviates, by their distribution: a mixture of normals."""
+    """Scores of level ground at normal deviates, shape (stratum, deviate), and shares of strata."""
+    # Broad gusts are equal in a stratum. In each stratum, fine gusts make scores a mixture of normals.
     gusts = landscape.level_gusts
     nodes, weights = np.polynomial.hermite_e.hermegauss(40)
-    both = np.hypot(gusts["broad"], gusts["medium"])
-    coarse, fine = (np.exp(2 * (s * nodes - s**2)) for s in (both, gusts["fine"]))
     kept = {each.spacing: each.variance * variance_kept(each.spacing, cell) for each in landscape.level}
     smooth = sum(variance for spacing, variance in kept.items() if spacing > FINE)
-    deviation = np.sqrt(coarse[:, None] * (smooth + (sum(kept.values()) - smooth) * fine))
+    fine = np.exp(2 * (gusts["fine"] * nodes - gusts["fine"] ** 2))
+    deviation = np.sqrt(smooth + (sum(kept.values()) - smooth) * fine)
     below = np.linspace(-60.0, 0.0, 6001)
-    share = (weights[:, None] * weights)[..., None] * special.ndtr(below / deviation[..., None])
-    normal = special.ndtri(share.sum(axis=(0, 1)) / weights.sum() ** 2)
+    normal = special.ndtri(weights @ special.ndtr(below / deviation[:, None]) / weights.sum())
     known = normal > -8.5
-    return np.sign(deviates) * -np.interp(-np.abs(deviates), normal[known], below[known])
+    scores = np.sign(deviates) * -np.interp(-np.abs(deviates), normal[known], below[known])
+    broad = np.hypot(gusts["broad"], gusts["medium"])
+    nodes, weights = np.polynomial.hermite_e.hermegauss(_STRATA)
+    return np.exp(broad * nodes - broad**2)[:, None] * scores, weights / weights.sum()
 
 
 def _add_gusts(name, gusts, seed, place, out):

@@ -168,7 +168,7 @@ def test_scenarios_beyond_the_analytic_budget_are_refused(sections, reason):
 
 
 def test_scores_of_a_learned_landscape_have_their_distribution_and_correlation():
-    """Brute force: 2000 fields of 80 x 80 cells, far apart."""
+    """Brute force: 2000 fields of 80 x 80 cells, far apart; broad gusts change correlations by less than 0.03."""
     land, cell = learned_landscape("konza"), 5.0
     place = np.arange(80) * cell
     drawn = np.stack([scores(land, -place, place, seed, cell=cell) for seed in range(2000)])
@@ -176,14 +176,14 @@ def test_scores_of_a_learned_landscape_have_their_distribution_and_correlation()
     along = [np.mean(drawn[:, :, lag:] * drawn[:, :, :-lag]) for lag in lags]
     down = [np.mean(drawn[:, lag:, lag:] * drawn[:, :-lag, :-lag]) for lag in lags]
     rho = correlation_of_scores(land, cell)
-    np.testing.assert_allclose(np.array(along) / drawn.var(), rho[0, lags], atol=0.01)
-    np.testing.assert_allclose(np.array(down) / drawn.var(), rho[lags, lags], atol=0.01)
-    deviates = np.array([-3.0, -2.0, -1.0, 0.5, 2.0, 3.0])
-    # The distribution is symmetric.
-    quantiles = (np.quantile(drawn, stats.norm.cdf(deviates)) - np.quantile(drawn, stats.norm.cdf(-deviates))) / 2
-    np.testing.assert_allclose(scores_of(land, deviates, cell), quantiles, rtol=0.02)
-    # Mixed normals have wider tails than a normal of the same variance.
-    assert scores_of(land, 3.0, cell) > 1.2 * 3.0 * drawn.std()
+    np.testing.assert_allclose(np.array(along) / drawn.var(), rho[0, lags], atol=0.03)
+    np.testing.assert_allclose(np.array(down) / drawn.var(), rho[lags, lags], atol=0.03)
+    # Quantiles of the strata together; the distribution is symmetric.
+    strata, shares = scores_of(land, DEVIATES, cell)
+    below = [1.0, 2.0, 3.0]
+    normal = stats.norm.pdf(DEVIATES) / stats.norm.pdf(DEVIATES).sum()
+    found = [shares @ ((abs(strata) > each) @ normal) for each in below]
+    np.testing.assert_allclose(found, [(abs(drawn) > each).mean() for each in below], rtol=0.03)
 
 
 @pytest.mark.parametrize("name", ["TM", "MSI"])
@@ -197,5 +197,5 @@ def test_budget_of_a_learned_landscape_agrees_with_simulation(name):
     found = fifesim.budget(scenario, method="analytic", cells=1215).isel(realisation=0)
     drawn = fifesim.budget(scenario, realisations=4, cells=1215)
     for key in ("total", "curvature", "share", "first"):
-        allowed = np.maximum(0.008, 3 * standard_error(drawn[key]))
+        allowed = np.maximum(0.005, 3 * standard_error(drawn[key]))
         assert (abs(found[key] - drawn[key].mean("realisation")) <= allowed).all(), key
