@@ -1,10 +1,11 @@
-"""Scenes per second: one setup by size, and chips that each have another sun, atmosphere, canopy and sensor."""
+"""Scenes per second: one setup by size, and chips with all drawn; budgets and designs without simulation."""
 
 import time
 
 import numpy as np
 from chain import floor
 
+import fifesim
 from fifesim.ground.landscape.autoregression import FIELD_TILE
 from fifesim.scenario.ensemble import realise
 from fifesim.scenario.scenario import Scenario
@@ -61,6 +62,28 @@ def seconds(scenario_of, numbers, times=3):
     return min(spent)
 
 
+def without_simulation():
+    """Print processor times of a budget by both methods, and of a thousand designs, after a first call of each."""
+    ground = {"soil": 0.0, "brown": 0.05, "moisture": 0.1}
+    scenario = Scenario(ground=ground, terrain={"dem": "flat"}, sensor={"noise": ["all"], "offset": [0.2, 0.0]})
+    designs = {"pixel": [10, 20, 30, 60], "mtf": [0.1, 0.2, 0.3, 0.4, 0.5]}
+    designs |= {"registration": [0, 3, 6, 9, 12], "snr": np.geomspace(20, 500, 10)}
+    cases = {
+        "budget, 20 realisations": lambda: fifesim.budget(scenario),
+        "budget, analytic": lambda: fifesim.budget(scenario, method="analytic"),
+        "trade, 1,000 designs": lambda: fifesim.trade("OLI", designs, scenario),
+    }
+    print("\n| without simulation | processor time [s] | in budgets of 20 realisations |\n|---|---|---|")
+    whole = None
+    for name, case in cases.items():
+        case()
+        start = time.process_time()
+        case()
+        spent = time.process_time() - start
+        whole = whole or spent
+        print(f"| {name} | {spent:.2g} | {spent / whole:.2g} |", flush=True)
+
+
 def main():
     """Print a table; a floor is drawing and filtering as many normals."""
     print("| scenes | a second of one processor | floors |\n|---|---|---|")
@@ -76,6 +99,7 @@ def main():
         start = time.process_time()
         floor(side)
         print(f"| {name} | {1 / spent:.0f} | {spent / (time.process_time() - start):.2g} |", flush=True)
+    without_simulation()
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
+from threadpoolctl import threadpool_limits
 
 from fifesim.analysis.scaling import shapley
 from fifesim.base.arguments import PLAIN, Array
@@ -102,7 +103,9 @@ def trade(
         scenario = Scenario(ground=ground, terrain={"dem": "flat"})  # type: ignore[arg-type]
     axes = _axes(own, designs)
     blurs = [own.replace(mtf=float(each)) for each in axes["mtf"]] if "mtf" in designs else [own, *_ends(own)]
-    parts = [_scatter(own, pair, blurs, axes, scenario, weather) for pair in axes["bands"]]
+    # Threads of BLAS take 50 times as long for matrices of this size if a core is busy.
+    with threadpool_limits(1, user_api="blas"):
+        parts = [_scatter(own, pair, blurs, axes, scenario, weather) for pair in axes["bands"]]
     slope, rmse, scatter = (np.stack(each) for each in zip(*parts, strict=True))
     # Of all instruments, the last two are the ends of an uncertain blur.
     count = len(axes["mtf"])

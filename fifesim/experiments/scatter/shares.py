@@ -13,6 +13,7 @@ import rioxarray
 import xarray as xr
 from odc.geo.geobox import GeoBox
 from scipy import ndimage
+from threadpoolctl import threadpool_limits
 
 from fifesim.analysis.scaling import by_itself, shapley, taken_away
 from fifesim.base.arguments import FilePath, Kind, WholeNumber
@@ -318,7 +319,8 @@ def _one(scenario):
 
 def _analytic(scenario):
     """Mean results of all realisations, over (variable, stage) or variable."""
-    return _rows(*scatters(scenario))
+    with threadpool_limits(1, user_api="blas"):
+        return _rows(*scatters(scenario))
 
 
 def _rows(stages, scatter, uniform):
