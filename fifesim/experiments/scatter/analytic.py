@@ -203,20 +203,17 @@ class Covariances:
         step = gain[:, None] / white
         fine = np.linspace(-4.5, 4.5, 1801)
         numbers = (white * middle - offset[:, None]) / gain[:, None]
-        both = [numbers, (covariance / (step * step.T)[..., None]).reshape(4, -1)]
+        waves = [(k, sign * m) for k, m in product(range(1, _HARMONICS + 1), repeat=2) for sign in (-1, 1)]
+        at_nodes = (covariance / (step * step.T)[..., None]).reshape(4, -1)
+        waves = [wave for wave in waves if (_phase(wave) @ at_nodes).min() <= _SMOOTH]
         # Nodes of each stratum.
-        both = [each.reshape(len(each), -1, FIELD_NODES.size) for each in both]
+        both = [each.reshape(len(each), -1, FIELD_NODES.size) for each in (numbers, at_nodes)]
         numbers, spread = (CubicSpline(FIELD_NODES, each, axis=-1)(fine).reshape(len(each), -1) for each in both)
-        spread = spread.reshape(2, 2, -1)
         share, found = np.multiply.outer(self.prepared.strata, np.exp(-(fine**2) / 2)).ravel(), 0.0
-        for k, m in product(range(1, _HARMONICS + 1), repeat=2):
-            for sign in (-1, 1):
-                power = k**2 * spread[0, 0] + m**2 * spread[1, 1] + 2 * sign * k * m * spread[0, 1]
-                if power.min() > _SMOOTH:
-                    continue
-                wave = np.cos(2 * np.pi * (k * numbers[0] + sign * m * numbers[1]))
-                seen_wave = wave * np.exp(-2 * np.pi**2 * np.maximum(power, 0.0))
-                found -= sign * (-1) ** (k + m) / (2 * np.pi**2 * k * m) * (share @ seen_wave)
+        for k, m in waves:
+            wave = np.cos(2 * np.pi * (k * numbers[0] + m * numbers[1]))
+            seen_wave = wave * np.exp(-2 * np.pi**2 * np.maximum(_phase((k, m)) @ spread, 0.0))
+            found -= (-1) ** (k + m) / (2 * np.pi**2 * k * m) * (share @ seen_wave)
         return found / share.sum() * step[0, 0] * step[1, 0]
 
     def _footprints(self, blurred, displaced, even=False):
@@ -225,6 +222,11 @@ class Covariances:
         own = [setup.instrument.line_spreads(band) for band in self.driver.bands]
         spreads = own if blurred else [areas(scene.blocks)] * 2
         return footprints(spreads, scene.grid, scene.blocks, setup.offset if displaced else (0.0, 0.0), even)
+
+
+def _phase(wave):
+    """Factors of the four covariances of both bands in the variance of the phase of a wave."""
+    return np.multiply.outer(wave, wave).ravel()
 
 
 def _field(scenario):
