@@ -49,8 +49,8 @@ def trade(
     """
     Compare designs of an instrument by the scatter of LAI, FPAR and production on its NDVI.
 
-    The covariances of pixels are computed from those of the cells, as in ``fifesim.budget(method="analytic")``, so that
-    a thousand designs take about a second.
+    The covariances of pixels are computed from the covariances of cells, as in ``budget(method="analytic")``, so that a
+    thousand designs take less than a second.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def trade(
         Values by name; designs are all combinations. "pixel" [m]: blur and interval change by the same factor, as in
         `Instrument.replace`. "mtf" [1]: modulation transfer at the Nyquist frequency of the sampling interval. "snr"
         [1]: ratio at the radiance that the instrument's file states. "registration" [m]: displacement of pixels along
-        both axes. "bands": pairs of names for red and near infrared. What is left out is that of the instrument.
+        both axes. "bands": pairs of names for red and near infrared. The instrument gives the parts that are left out.
     scenario : Scenario, optional
         Ground, light and air: leaf area of one stand or a learned landscape on level ground, without clouds. By default
         the learned landscape of ``fifesim.Scenario()`` with uniform soil and dead leaves.
@@ -84,7 +84,7 @@ def trade(
     Warns
     -----
     UserWarning
-        If registration is left out and that of the instrument is unknown: it is taken as 0.
+        If registration is left out and the instrument has none: it is taken as 0.
 
     See Also
     --------
@@ -93,9 +93,9 @@ def trade(
     Examples
     --------
     >>> import fifesim
-    >>> found = fifesim.trade("TM", {"pixel": [10, 20, 30, 60], "registration": [0.0, 10.0]})
-    >>> found.r2.sel(variable="lai", registration=0.0).round(2).values
-    array([0.81, 0.78, 0.75, 0.68])
+    >>> found = fifesim.trade("TM", {"pixel": [10, 20, 30, 60], "registration": [0.0, 5.0]})
+    >>> found.r2.sel(variable="lai", registration=5.0).round(2).values
+    array([0.72, 0.79, 0.81, 0.83])
     """
     own = description_of(instrument)
     if scenario is None:
@@ -107,7 +107,7 @@ def trade(
     with threadpool_limits(1, user_api="blas"):
         parts = [_scatter(own, pair, blurs, axes, scenario, weather) for pair in axes["bands"]]
     slope, rmse, scatter = (np.stack(each) for each in zip(*parts, strict=True))
-    # Of all instruments, the last two are the ends of an uncertain blur.
+    # The last two instruments are the ends of an uncertain blur.
     count = len(axes["mtf"])
     total, dims = scatter[:, 1, 1, 1], ("bands", "variable", "pixel", "mtf", "registration", "snr")
     uncertainty = np.full((*total.shape[:3], count, *total.shape[4:]), np.nan)
@@ -132,7 +132,7 @@ def trade(
 
 
 def _axes(own, designs):
-    """Values of all parts of a design, those of the instrument for the parts that are left out."""
+    """Values of all parts of a design, from the instrument for the parts that are left out."""
     if unknown := [name for name in designs if name not in _UNITS]:
         hint = nearest(unknown[0], _UNITS)
         raise ValueError(f"unknown design {unknown[0]!r}: {hint}there are {', '.join(_UNITS)}")
@@ -248,5 +248,5 @@ def _rounding(covariances):
 
 
 def _relative_noise(band, snr):
-    """Variance of the noise of a band with another ratio of signal to noise, relative to its own."""
+    """Factor of the variance of the noise of a band for another ratio of signal to noise."""
     return 1.0 if np.isnan(snr) else (band.noise.equivalent_radiance * snr / band.noise.radiance) ** -2.0

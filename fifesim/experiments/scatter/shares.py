@@ -111,8 +111,8 @@ def budget(
         Seed of the first random field; the others count up, as do the seeds of the noise. By default from the scenario.
     method : {"simulate", "analytic"}, optional
         "analytic" computes the mean over all realisations from the covariances of the pixels, in less than a second and
-        without a standard error, for one level stand without clouds. ``realisations`` and ``seed`` have no effect, and
-        ``cells`` is the window whose mean the regression removes.
+        without a standard error, on level ground without clouds, for one stand or the leaf area of a learned landscape.
+        ``realisations`` and ``seed`` have no effect, and ``cells`` is the window whose mean the regression removes.
     each : callable, optional
         Wrapper of the sequence of realisations to show progress; by default a bar on a terminal or in a notebook.
 
