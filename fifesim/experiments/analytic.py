@@ -29,6 +29,10 @@ DEVIATES = np.linspace(-8.0, 8.0, 4001)
 # Nodes of the quadrature over pixels.
 _PIXEL_NODES = 41
 
+# Nodes and weights of the quadrature over the means of windows.
+_WINDOW_NODES, _WINDOW_SHARES = np.polynomial.hermite_e.hermegauss(7)
+_WINDOW_SHARES = _WINDOW_SHARES / _WINDOW_SHARES.sum()
+
 
 # Compared by identity, because pixels share footprints.
 @dataclass(frozen=True, eq=False)
@@ -96,43 +100,54 @@ class Prepared:
         """Shares of the nodes of all strata."""
         return np.multiply.outer(self.strata, NODE_SHARES).ravel()
 
-    def moments(self, values, rest):
-        """Mean and covariance of quantities from their values and the covariances of remainders at the nodes."""
-        mean = values @ self.node_shares
-        apart = values - mean[:, None]
-        return mean, (apart * self.node_shares) @ apart.T + rest @ self.node_shares
-
     def regressions(self, truths, image):
-        """Regressions of truths, which have no noise, on an image."""
-        means, values, rest = self.given(image.footprints[0], (*truths, image))
-        covariance = self.moments(values, rest)[1]
-        noise = np.zeros(1) if image.noise is None else np.atleast_2d(image.noise(means[-1])) @ self.node_shares
-        of_image, found = covariance[-1, -1] + noise.sum(), []
-        for truth, both in zip(truths, covariance[:-1, -1], strict=True):
-            of_truth = self._variance(truth)
+        """Regressions of truths, which have no noise, on an image, as means over windows."""
+        first = image.footprints[0]
+        means, values, rest = self.given(first, (*truths, image), local=True)
+        shares, found = self._shares_by_window(first), []
+        covariance = np.array([moments(values, rest, each)[1] for each in shares])
+        noise = np.zeros((1, len(shares))) if image.noise is None else np.atleast_2d(image.noise(means[-1])) @ shares.T
+        of_image = covariance[:, -1, -1] + noise.sum(axis=0)
+        for number, truth in enumerate(truths):
+            of_truth, both = self._variances(truth), covariance[:, number, -1]
             left = of_truth - both**2 / of_image
-            found.append(PixelLine(left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both, noise))
+            numbers = left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both
+            found.append(PixelLine(*(each @ _WINDOW_SHARES for each in numbers), noise @ _WINDOW_SHARES))
         return found
 
-    def _variance(self, truth):
-        """Variance of a truth, given its own footprint, which leaves the smallest remainder."""
+    def _variances(self, truth):
+        """Variance of a truth in each window, given its own footprint, which leaves the smallest remainder."""
         key = truth.names, truth.footprints, id(truth.function)
         if key not in self.known:
-            _, values, rest = self.given(truth.footprints[0], (truth,))
-            self.known[key] = self.moments(values, rest)[1][0, 0]
+            _, values, rest = self.given(truth.footprints[0], (truth,), local=True)
+            shares = self._shares_by_window(truth.footprints[0])
+            self.known[key] = np.array([moments(values, rest, each)[1][0, 0] for each in shares])
         return self.known[key]
 
-    def given(self, first, pixels):
+    def _held(self, first):
+        """Share of the variance of the mean of z over a footprint that the mean of a window has."""
+        return np.broadcast_to(self.window, ORDERS)[0] / self.overlap(first, first)[0, 0]
+
+    def _shares_by_window(self, first):
+        """Shares of the nodes in windows, around the mean of each, shape (window, node of all strata)."""
+        held = self._held(first)
+        near = np.exp(-((FIELD_NODES - np.sqrt(held) * _WINDOW_NODES[:, None]) ** 2) / (2 * (1 - held)))
+        shares = self.strata[:, None] * (near / near.sum(axis=1, keepdims=True))[:, None]
+        return shares.reshape(len(near), -1)
+
+    def given(self, first, pixels, local=False):
         """Properties and quantities of pixels given the mean of z over a footprint, and covariances of the rest."""
         # A list of means by pixel, shape (property, node); quantities, shape (pixel, node); and the covariances of the
         # remainders of quantities along their tangents, shape (pixel, pixel, node). Nodes are those of all strata.
+        # Locally, the variance of the means of windows is lost.
         names = [name for pixel in pixels for name in pixel.names]
         footprints = [each for pixel in pixels for each in pixel.footprints]
         a = np.array([self.properties[name] for name in names])
         given = a[..., 1:] * np.array([self.overlap(first, each)[1] for each in footprints])[:, None]
         overlaps = np.array([[self.overlap(one, other)[0] for other in footprints] for one in footprints])
-        rest = np.einsum("isk,jsk,ijk->ijs", a[..., 1:], a[..., 1:], overlaps - self.window)
-        rest = np.repeat(rest - np.einsum("isk,jsk->ijs", given, given), FIELD_NODES.size, axis=-1)
+        kept, lost = (1 - self._held(first) ** np.arange(1, ORDERS + 1), self.window) if local else (1.0, 0.0)
+        rest = np.einsum("isk,jsk,ijk->ijs", a[..., 1:], a[..., 1:], overlaps - lost)
+        rest = np.repeat(rest - np.einsum("isk,jsk->ijs", given * kept, given), FIELD_NODES.size, axis=-1)
         means = (a[..., :1] + given @ _POLYNOMIALS[1:]).reshape(len(a), -1)
         steps = np.sqrt(np.maximum(np.einsum("iiz->iz", rest), 0.0)) / 3 + 1e-4 * np.abs(means).max(1, keepdims=True)
         ends = np.cumsum([0, *(len(pixel.names) for pixel in pixels)])
@@ -228,6 +243,13 @@ FIELD_NODES = np.linspace(-5.0, 5.0, _PIXEL_NODES)
 NODE_SHARES = np.exp(-(FIELD_NODES**2) / 2)
 NODE_SHARES = NODE_SHARES / NODE_SHARES.sum()
 _POLYNOMIALS = polynomials(FIELD_NODES)
+
+
+def moments(values, rest, shares):
+    """Mean and covariance of quantities from their values and the covariances of remainders at the nodes."""
+    mean = values @ shares
+    apart = values - mean[:, None]
+    return mean, (apart * shares) @ apart.T + rest @ shares
 
 
 def tangents_of(function, means, steps):

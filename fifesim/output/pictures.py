@@ -265,7 +265,10 @@ def plot_trade(
     axes.plot(paid[front], best[front], color="black", linewidth=1, label="best designs")
     axes.set(xscale="log", xlabel=cost.attrs.get("long_name", "cost"))
     axes.set_ylabel(f"R² of {variable.upper()} on NDVI")
-    axes.legend(frameon=False, fontsize="small")
+    # Room for the legend.
+    low, high = axes.get_ylim()
+    axes.set_ylim(low - 0.22 * (high - low), high)
+    axes.legend(frameon=False, loc="lower center", ncols=3, fontsize="small")
     return axes
 
 

@@ -17,6 +17,7 @@ from fifesim.experiments.analytic import (
     Pixel,
     correlation_of,
     mean_of_cells,
+    moments,
     prepare,
     reach_of,
 )
@@ -180,7 +181,7 @@ class Covariances:
             return Recording()
         driver = self.driver
         _, values, rest = self.prepared.given(bands[0].footprints[0], bands)
-        mean, covariance = (each[..., None] for each in self.prepared.moments(values, rest))
+        mean, covariance = (each[..., None] for each in moments(values, rest, self.prepared.node_shares))
         variance = np.diagonal(covariance[..., 0])[:, None]
         if "noise" in at_work:
             variance = variance + self.grains(mean)
