@@ -100,7 +100,7 @@ def trade(
     own = description_of(instrument)
     if scenario is None:
         ground = {"soil": 0.0, "brown": 0.05, "moisture": 0.1}
-        scenario = Scenario(ground=ground, terrain={"dem": "flat"})  # type: ignore[arg-type]
+        scenario = Scenario(ground=ground, terrain={"dem": "flat"})
     axes = _axes(own, designs)
     blurs = [own.replace(mtf=float(each)) for each in axes["mtf"]] if "mtf" in designs else [own, *_ends(own)]
     # Threads of BLAS take 50 times as long for matrices of this size if a core is busy.
@@ -122,11 +122,11 @@ def trade(
         "r2_uncertainty": (dims, uncertainty),
         "share": (("bands", "stage", *dims[1:]), share[:, :, :, :, :count]),
     }
-    coordinates = {name: (name, axes[name], {"units": unit}) for name, unit in _UNITS.items()}
-    coordinates["bands"] = ("bands", [", ".join(pair) for pair in axes["bands"]])
-    coordinates |= {"variable": list(_VARIABLES), "stage": list(_STAGES)}
-    units = [cf.QUANTITIES[name].units for name in _VARIABLES]
-    made = xr.Dataset(found, coordinates, {"instrument": own.name}).assign_coords(units=("variable", units))
+    axes["bands"] = [", ".join(pair) for pair in axes["bands"]]
+    coordinates = {name: (name, axes[name], {"units": unit} if unit else {}) for name, unit in _UNITS.items()}
+    coordinates["units"] = ("variable", [cf.QUANTITIES[name].units for name in _VARIABLES], {})
+    made = xr.Dataset(found, coordinates, {"instrument": own.name})
+    made = made.assign_coords(variable=list(_VARIABLES), stage=list(_STAGES))
     made = made.isel({name: 0 for name in _UNITS if name not in designs}, drop=True)
     return made.transpose("stage", "variable", *designs)
 

@@ -591,7 +591,7 @@ class Instrument:
                 f"snr: the description of {self.name} states no radiance: give noise = {{ snr = ..., radiance = ... }} "
                 "of its bands in an instrument file"
             )
-        scale = given.get("gsd", self.gsd) / self.gsd
+        scale = 1.0 if gsd is None else gsd / self.gsd
         changed = [number for name in given for number in _OF_DESIGN[name]]
         lsf = self.lsf if mtf is None else GaussianResponse(kind="gaussian", mtf_at_nyquist=float(mtf))
         bands = tuple(
@@ -600,7 +600,7 @@ class Instrument:
                 gsd=band.gsd and band.gsd * scale,
                 lsf=band.lsf if mtf is None else None,
                 noise=band.noise if snr is None or not band.noise else band.noise.with_snr(float(snr)),
-                sources={number: source for number, source in band.sources.items() if number not in changed},
+                sources={number: each for number, each in band.sources.items() if number not in changed},  # type: ignore[attr-defined]
                 origin={name: origin for name, origin in band.origin.items() if NUMBER_OF[name] not in changed},
             )
             for band in self.bands
