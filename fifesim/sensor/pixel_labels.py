@@ -103,7 +103,8 @@ def warn_of_pixels(instrument, bands, sizes):
         warn(
             f"pixels of {', '.join(f'{size:g}' for size in others)} m have the blur of {instrument.name}, made for "
             f"pixels of {pixels} m: smaller ones overlap and larger ones leave gaps, which changes R2. To compare "
-            f"pixel sizes, give fifesim.instrument({instrument.name!r}).replace(gsd=...), or see fifesim.trade"
+            f"pixel sizes, give fifesim.instrument({instrument.name!r}).replace(gsd=...), in a scenario "
+            "an instrument file with another gsd, or see fifesim.trade"
         )
 
 

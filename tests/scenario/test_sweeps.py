@@ -98,6 +98,6 @@ def test_sweep_of_pixel_sizes_warns_once_that_the_blur_stays(small):
         fifesim.scenario.sweep(small, {"pixel": [15, 25, 30, 37, 60]}, {"n": lambda run: 1.0}).compute()
     (text,) = [str(each.message) for each in caught if "have the blur" in str(each.message)]
     assert text.startswith("pixels of 15, 60 m have the blur of TM, made for pixels of 30 m")
-    assert "fifesim.sensor.read_instrument" in text
+    assert "replace(gsd=...)" in text
     with pytest.warns(UserWarning, match="pixels of 60 m have the blur of TM"):
         fifesim.Study(small.replace(pixel=60), {"visibility": {"uniform": [5, 60]}})
