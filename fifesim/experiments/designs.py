@@ -141,6 +141,8 @@ def _axes(own, designs):
         raise ValueError(f"{empty[0]} needs at least one value")
     pairs = axes.get("bands") or [[band.name for band in own.red_and_near_infrared()]]
     axes["bands"] = [pairs] if isinstance(pairs[0], str) else pairs
+    if wrong := [pair for pair in axes["bands"] if len(pair) != 2]:
+        raise ValueError(f"bands: each must be a pair of names, of red and near infrared, got {wrong[0]}")
     axes.setdefault("pixel", [own.pixel(own.select(axes["bands"][0])[0])])
     axes.setdefault("mtf", [np.nan])
     axes.setdefault("snr", [np.nan])

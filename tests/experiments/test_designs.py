@@ -121,6 +121,8 @@ def test_bands_are_compared_on_the_same_ground():
         ("TM", {"registration": [-1.0]}, "at least 0 m, got"),
         ("TM", {"mtf": [1.5]}, r"mtf must be in \(0, 1\), got 1.5"),
         ("TM", {"snr": [0.0], "registration": [0.0]}, "snr must be above 0"),
+        ("TM", {"bands": [["TM2", "TM3", "TM4"]]}, "each must be a pair of names"),
+        ("MSI", {"bands": [["MSI4", "MSI8A"]]}, "different grids"),
         ("MSS", {"pixel": [60.0]}, "has no noise for"),
         ("VIIRS", {"mtf": [0.2]}, "sums samples on board"),
     ],
