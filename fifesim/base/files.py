@@ -41,13 +41,13 @@ def check_suffix(path, kind, *suffixes):
         raise ValueError(f"{in_a_line(path, 150)} is to be a {kind}: end its name in {suffixes[0]}")
 
 
-def read_csv(path, what):
+def read_csv(path, what, dtype=None):
     """Read a CSV table, in which ``#`` starts a comment, with the file name in every message."""
     with reading(what, path, "; it must be CSV in UTF-8"), warnings.catch_warnings():
         # Without index_col, pandas takes surplus values for an index.
         warnings.simplefilter("error", pd.errors.ParserWarning)
         try:
-            return pd.read_csv(path, comment="#", skipinitialspace=True, index_col=False)
+            return pd.read_csv(path, comment="#", skipinitialspace=True, index_col=False, dtype=dtype)
         except pd.errors.ParserWarning:
             raise ValueError(
                 "rows have more values than the first line has names; name all columns, and write decimals with a point"

@@ -16,7 +16,6 @@ from fifesim.base.arguments import PLAIN, Array
 from fifesim.base.messages import nearest, warn
 from fifesim.experiments.analytic import Pixel, coefficients, mean_of_cells, reach_of
 from fifesim.experiments.scatter.analytic import (
-    LARGEST_ROUNDING,
     Covariances,
     IndexImage,
     Recording,
@@ -34,6 +33,8 @@ from fifesim.sensor.description.instruments import instrument as description_of
 
 _UNITS = {"bands": "", "pixel": "m", "mtf": "1", "registration": "m", "snr": "1"}
 _VARIABLES = ("lai", "fpar", "gpp")
+# Share of rounding in the variance of NDVI, up to which it is as good as independent: 1 - R2 is right within 0.001.
+_LARGEST_ROUNDING = 0.03
 # Noise in digital numbers, above which the correlation of rounding errors with the signal is below 1 %.
 _SMALLEST_NOISE = 0.5
 _STAGES = ("ground", "point spread", "registration", "noise")
@@ -236,10 +237,10 @@ def _check_rounding(covariances, share, scale):
     prepared = covariances.prepared
     seen = np.array([prepared.properties[f"{name}1"][:, :1].T @ prepared.strata for name in ("red", "nir")])
     spread = np.sqrt(covariances.grains(seen) * scale / (12 * _rounding(covariances))).min()
-    if share > LARGEST_ROUNDING and spread < _SMALLEST_NOISE:
+    if share > _LARGEST_ROUNDING and spread < _SMALLEST_NOISE:
         raise ValueError(
             f"a trade study does not hold: rounding has {share:.2g} of the variance of NDVI, at most "
-            f"{LARGEST_ROUNDING}, and noise has {spread:.2g} digital numbers, at least {_SMALLEST_NOISE} is needed: "
+            f"{_LARGEST_ROUNDING}, and noise has {spread:.2g} digital numbers, at least {_SMALLEST_NOISE} is needed: "
             "simulate with fifesim.scenario.sweep"
         )
 

@@ -48,6 +48,21 @@ def test_designs_have_the_scatter_of_instruments_written_for_them(tmp_path):
         np.testing.assert_allclose(r2, 1 - total, atol=2e-4)
 
 
+def test_rounding_has_the_scatter_of_digital_numbers(tmp_path):
+    """Eight bits, and noise of 0.1 digital numbers; with seven bits, rounding depends on the signal."""
+    own, path = _camera(tmp_path, 30.0, mtf_at_nyquist=0.3), tmp_path / "camera_30_1.toml"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("bits = 12", "bits = 7"), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"at most 0.03, and noise has 0.0\d+ digital numbers"):
+        fifesim.trade(own, {"registration": [0.0]}, _level())
+    path.write_text(text.replace("bits = 12", "bits = 8"), encoding="utf-8")
+    found = fifesim.trade(own, {"registration": [0.0]}, _level()).r2.sel(variable=["lai", "fpar"]).squeeze()
+    sensor = {"instrument": own, "noise": ["all"]}
+    budget = fifesim.budget(_level(sensor=sensor), method="analytic", cells=1350).squeeze("realisation")
+    np.testing.assert_allclose(found, 1 - budget["total"], atol=1e-3)
+    assert (budget["alone"].sel(stage="quantisation") > 0.01).all()
+
+
 def test_scatter_agrees_with_simulation_where_cells_do_not_divide_pixels(tmp_path):
     own = _camera(tmp_path, 25.0, mtf_at_nyquist=0.3)
     scenario = _level(sensor={"instrument": own, "noise": ["all"], "offset": [0.2, 0.2]})
@@ -148,14 +163,15 @@ def test_unknown_geolocation_is_no_silent_zero(tmp_path):
 
 
 def test_the_front_joins_designs_that_no_cheaper_one_equals():
-    found = fifesim.trade("OLI", {"pixel": [10, 30], "snr": [30, 100, 300], "registration": [3.0]}, _level())
+    designs = {"pixel": [10, 30], "snr": [30, 100, 300], "registration": [9.0, 3.0]}
+    found = fifesim.trade("OLI", designs, _level())
     axes = fifesim.output.plot_trade(found, found.snr**2 / found.pixel**2, variable="gpp")
     (front,) = axes.get_lines()
     cost, best = front.get_data()
     assert (np.diff(cost) > 0).all() and (np.diff(best) > 0).all()
-    r2 = found.r2.sel(variable="gpp").squeeze("registration")
+    r2 = found.r2.sel(variable="gpp")
     assert best[-1] == pytest.approx(float(r2.max()))
-    price = (found.snr**2 / found.pixel**2).transpose("pixel", "snr")
+    price = (found.snr**2 / found.pixel**2).broadcast_like(r2)
     for one, own in zip(price.values.ravel(), r2.values.ravel(), strict=True):
         assert own <= best[cost <= one].max()
     with pytest.raises(ValueError, match="cost has dimensions time"):

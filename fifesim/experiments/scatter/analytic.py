@@ -306,7 +306,7 @@ def _even(line, start, cells):
 
 
 # Largest scatter by digital numbers alone, beyond which they are no small errors of a normal signal.
-LARGEST_ROUNDING = 0.1
+_LARGEST_ROUNDING = 0.1
 
 
 def scatters(scenario):
@@ -320,10 +320,10 @@ def scatters(scenario):
     stages = covariances.stages
     if "quantisation" in stages:
         rounding = covariances.lines({"quantisation"})[0].scatter - covariances.lines(set())[0].scatter
-        if rounding > LARGEST_ROUNDING:
+        if rounding > _LARGEST_ROUNDING:
             raise ValueError(
                 f"method='analytic' does not hold: digital numbers alone give a scatter of {rounding:.2g}, at most "
-                f"{LARGEST_ROUNDING} is allowed: give method='simulate'"
+                f"{_LARGEST_ROUNDING} is allowed: give method='simulate'"
             )
     found = np.empty((len(VARIABLES), *(2,) * len(stages)))
     for state in product((0, 1), repeat=len(stages)):

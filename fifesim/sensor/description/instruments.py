@@ -19,7 +19,7 @@ from fifesim.base import files
 from fifesim.base.arguments import FilePath
 from fifesim.base.bands import solar_irradiance
 from fifesim.base.caches import cached
-from fifesim.base.files import check_regular, in_a_line, read_toml, shown
+from fifesim.base.files import in_a_line, read_toml, shown
 from fifesim.sensor.description.fields import errors_in_words, key, lookup
 from fifesim.sensor.description.instrument_file import (
     BAND_NUMBERS,
@@ -180,8 +180,7 @@ def read_responses(
     Parameters
     ----------
     path : str or path
-        CSV file with a column ``wavelength`` [um] and a column for each band, whose empty cells are left out;
-        responses below 0 are noise, and become 0.
+        CSV file with a column ``wavelength`` [um] and a column for each band, whose empty cells are left out.
     name : str
     altitude : float
         Above the ground. [m]
@@ -426,8 +425,7 @@ def _table(folder, name):
     try:
         if Path(name).name != name or not os.path.isfile(path):
             raise FileNotFoundError
-        check_regular(path)
-        table = pd.read_csv(path, comment="#", skipinitialspace=True, dtype={"name": str, "shape": str})
+        table = files.read_csv(path, "bands", dtype={"name": str, "shape": str})
     except (OSError, ValueError) as error:
         reason = "no such file beside it" if isinstance(error, FileNotFoundError) else in_a_line(error, 150)
         raise ValueError(f"bands = {shown(name)}: {reason}; type a CSV file of bands, or [[bands]]") from None
@@ -456,8 +454,7 @@ def _measured(table, what):
     found, table = [], table.sort_values("wavelength")
     for name in names:
         own = table[table[name].notna()]
-        # Measured responses scatter around zero outside of the band.
-        response = np.maximum(own[name].to_numpy(float), 0.0)
+        response = own[name].astype(float)
         if len(own) < 2 or not response.max() > 0:
             raise ValueError(f"{what}: the column {name} has no response above 0 at two wavelengths or more")
         found.append({"name": name, "srf": {"wavelength": own["wavelength"].tolist(), "response": response.tolist()}})

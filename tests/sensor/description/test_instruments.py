@@ -296,6 +296,8 @@ def test_blur_from_mtf_at_nyquist(changed):
         ("bands.csv", "wavelength,red\n0.6,low\n0.7,1\n", "the column red must have numbers, got 'low'"),
         ("bands.csv", "wavelength,red,red\n0.6,0,1\n0.7,1,0\n", "the column red occurs twice"),
         ("bands.csv", "wavelength\n0.6\n0.7\n", "no column beside wavelength"),
+        ("bands.csv", "wavelength,red\n0.6,0,5\n0.7,1,0\n", "cannot read bands"),
+        ("bands.csv", "wavelength,red\n0.6,-0.1\n0.65,1\n0.7,0\n", "the response must not be negative"),
         ("bands.csv", "wavelength,red\n0.6,0\n0.6,1\n0.7,0\n", "wavelengths must increase"),
     ],
 )
