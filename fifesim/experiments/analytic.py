@@ -68,11 +68,10 @@ def mean_of_cells(means):
 
 
 class PixelLine(NamedTuple):
-    """Regression of a truth on an image: scatter 1 - R2, slope, residual standard deviation, and moments of pixels."""
+    """Regression of a truth on an image: scatter 1 - R2, slope, and moments of pixels."""
 
     scatter: float
     slope: float
-    rmse: float
     truth_variance: float
     image_variance: float
     covariance: float
@@ -88,7 +87,7 @@ class Prepared:
     """rho^k at lags of rows and columns, shape (order from 1, lags, lags)."""
     properties: dict[str, np.ndarray]
     """Coefficients by name, shape (stratum, order from 0). The covariance at lag d is sum_k a_k b_k rho(d)^k."""
-    window: np.ndarray | float = 0.0
+    window: np.ndarray = field(default_factory=lambda: np.zeros(ORDERS))
     """Variance of the mean of fields of correlation rho^k over the window of a regression, shape (order from 1,)."""
     strata: np.ndarray = field(default_factory=lambda: np.ones(1))
     """Shares of the strata, which have properties of their own and are larger than pixels."""
@@ -111,13 +110,13 @@ class Prepared:
         for number, truth in enumerate(truths):
             of_truth, both = self._variances(truth), covariance[:, number, -1]
             left = of_truth - both**2 / of_image
-            numbers = left / of_truth, both / of_image, np.sqrt(left), of_truth, of_image, both
+            numbers = left / of_truth, both / of_image, of_truth, of_image, both
             found.append(PixelLine(*(each @ _WINDOW_SHARES for each in numbers), noise @ _WINDOW_SHARES))
         return found
 
     def _variances(self, truth):
-        """Variance of a truth in each window, given its own footprint, which leaves the smallest remainder."""
-        key = truth.names, truth.footprints, id(truth.function)
+        """Variance of a truth in each window, given the footprint of the truth, which leaves the smallest remainder."""
+        key = truth[:3]
         if key not in self.known:
             _, values, rest = self.given(truth.footprints[0], (truth,), local=True)
             shares = self._shares_by_window(truth.footprints[0])
@@ -126,7 +125,7 @@ class Prepared:
 
     def _held(self, first):
         """Share of the variance of the mean of z over a footprint that the mean of a window has."""
-        return np.broadcast_to(self.window, ORDERS)[0] / self.overlap(first, first)[0, 0]
+        return self.window[0] / self.overlap(first, first)[0, 0]
 
     def _shares_by_window(self, first):
         """Shares of the nodes in windows, around the mean of each, shape (window, node of all strata)."""
@@ -138,7 +137,7 @@ class Prepared:
     def given(self, first, pixels, local=False):
         """Properties and quantities of pixels given the mean of z over a footprint, and covariances of the rest."""
         # A list of means by pixel, shape (property, node); quantities, shape (pixel, node); and the covariances of the
-        # remainders of quantities along their tangents, shape (pixel, pixel, node). Nodes are those of all strata.
+        # remainders of quantities along their tangents, shape (pixel, pixel, node), with the nodes of all strata.
         # Locally, the variance of the means of windows is lost.
         names = [name for pixel in pixels for name in pixel.names]
         footprints = [each for pixel in pixels for each in pixel.footprints]
@@ -192,14 +191,14 @@ class Prepared:
 
 def prepare(rho, properties, *, strata=(1.0,), window=None, reach=96):
     """Field of a correlation, and properties of its cells by name, each an array of values at the `DEVIATES`."""
-    # Strata with properties of their own have shares; their values have shape (stratum, deviate).
+    # With strata, values have shape (stratum, deviate).
     # The correlation at lags of rows and columns from 0 is zero beyond them. Regressions are of pixels in a window of
     # rows and columns [cell], whose mean they remove; by default unlimited. Cells of two footprints are at most a
     # reach apart. [cell]
     missing = [(0, max(reach + 1 - size, 0)) for size in rho.shape]
     near = np.pad(rho, missing)[: reach + 1, : reach + 1]
     powers = near ** np.arange(1, ORDERS + 1)[:, None, None]
-    lost = 0.0 if window is None else _of_mean(rho, window)
+    lost = np.zeros(ORDERS) if window is None else _of_mean(rho, window)
     return Prepared(powers, {name: coefficients(each) for name, each in properties.items()}, lost, np.array(strata))
 
 

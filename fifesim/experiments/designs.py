@@ -186,8 +186,8 @@ def _scatter(own, pair, blurs, axes, scenario, weather):
     covariances.prepared.properties["gpp"] = coefficients(gpp)
     shape = len(seen), len(blurs) + 1, len(axes["registration"]) + 1
     lines = [_lines(covariances, rows[0][0], each) for rows in seen for each in rows]
-    moments = np.array([[line[3:6] for line in each] for each in lines]).reshape(*shape, len(_VARIABLES), 3)
-    truth, clear, both = np.moveaxis(moments, (-1, -2), (0, 1))
+    found = [[(one.truth_variance, one.image_variance, one.covariance) for one in each] for each in lines]
+    truth, clear, both = np.moveaxis(np.reshape(found, (*shape, len(_VARIABLES), 3)), (-1, -2), (0, 1))
     noise = np.moveaxis(np.array([each[0].noise for each in lines]).reshape(*shape, -1), -1, 0)
     clear = clear - noise.sum(axis=0)
     # Variance of the noise of each band and ratio.

@@ -237,7 +237,7 @@ def plot_trade(
     Raises
     ------
     ValueError
-        If the cost has other dimensions than the designs, or is not finite.
+        If the cost has other dimensions than the designs, or is not positive and finite.
 
     Examples
     --------
@@ -250,8 +250,8 @@ def plot_trade(
     r2 = results["r2"].sel(variable=variable, drop=True)
     if unknown := [str(dim) for dim in cost.dims if dim not in r2.dims]:
         raise ValueError(f"cost has dimensions {', '.join(unknown)}, the designs have {', '.join(map(str, r2.dims))}")
-    if not np.isfinite(cost).all():
-        raise ValueError("cost must be finite for each design")
+    if not ((cost > 0) & np.isfinite(cost)).all():
+        raise ValueError("cost must be positive and finite for each design")
     if axes is None:
         _, axes = plt.subplots(figsize=(5.8, 4.4), layout="constrained")
     r2, cost = xr.broadcast(r2, cost)

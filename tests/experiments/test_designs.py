@@ -174,5 +174,7 @@ def test_the_front_joins_designs_that_no_cheaper_one_equals():
     price = (found.snr**2 / found.pixel**2).broadcast_like(r2)
     for one, own in zip(price.values.ravel(), r2.values.ravel(), strict=True):
         assert own <= best[cost <= one].max()
+    with pytest.raises(ValueError, match="cost must be positive and finite"):
+        fifesim.output.plot_trade(found, 0 * found.snr)
     with pytest.raises(ValueError, match="cost has dimensions time"):
         fifesim.output.plot_trade(found, found.snr.rename(snr="time"))

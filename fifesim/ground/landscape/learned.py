@@ -204,7 +204,7 @@ def variance_kept(spacing, cell):
 
 def spline_correlation(lags):
     """Autocorrelation of `spline_noise` along an axis at lags over its spacing. [1]"""
-    # Of cubic splines with random coefficients, it is the spline of degree seven.
+    # For cubic splines with random coefficients, it is the spline of degree seven.
     spline = BSpline.basis_element(np.arange(9.0) - 4, extrapolate=False)
     return np.nan_to_num(spline(lags)) / float(spline(0.0))
 

@@ -342,6 +342,8 @@ def _completed(content, path):
 
 def _add_noise(bands, ratios):
     """Add the noise of bands of a table by name, each a ratio of signal to noise and the radiance where it holds."""
+    if not isinstance(ratios, dict):
+        raise ValueError(f"snr: it must have the names of bands, such as snr = {{ red = [200, 100] }}, got {ratios!r}")
     if unknown := set(ratios) - {band["name"] for band in bands}:
         known = ", ".join(band["name"] for band in bands)
         raise ValueError(f"snr: there is no band {', '.join(sorted(unknown))}, the table has {known}")

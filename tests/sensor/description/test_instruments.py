@@ -335,6 +335,10 @@ def test_measured_responses_are_bands(tmp_path):
     path.write_text(text + "snr = { red = [120, 22] }\n", encoding="utf-8")
     again = instrument(path)
     assert again.bands == made.bands and again.lsf == made.lsf
+    path.write_text(text + "snr = 120\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"snr: it must have the names of bands, .* got 120"):
+        instrument(path)
+    path.write_text(text, encoding="utf-8")
     # The table is read again when it changes.
     (tmp_path / "srf.csv").write_text(MEASURED.replace("0.80", "0.82"), encoding="utf-8")
     assert instrument(path).bands[0].response.wavelength[2] == 0.82
