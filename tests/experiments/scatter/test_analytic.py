@@ -178,8 +178,8 @@ def test_scores_of_a_learned_landscape_have_their_distribution_and_correlation()
     rho = correlation_of_scores(land, cell)
     np.testing.assert_allclose(np.array(along) / drawn.var(), rho[0, lags], atol=0.03)
     np.testing.assert_allclose(np.array(down) / drawn.var(), rho[lags, lags], atol=0.03)
-    # Without broad gusts, the correlation is exact for places at random in a lattice; cells as wide as the finest lattice
-    # differ by 0.007 at lag 1. The standard errors are 0.001 to 0.007.
+    # Without broad gusts, the correlation is exact for places at random in a lattice. Cells as wide as the finest
+    # lattice differ by 0.007 at lag 1; the standard errors are 0.001 to 0.007.
     still = land.model_copy(update={"level_gusts": land.level_gusts | {"broad": 0.0, "medium": 0.0}})
     calm = np.stack([scores(still, -place, place, seed, cell=cell) for seed in range(2000)])
     along = [np.mean(calm[:, :, lag:] * calm[:, :, :-lag]) for lag in lags]
