@@ -18,7 +18,7 @@ from fifesim.cli import app
 from fifesim.output import report
 from fifesim.output.reproduction import Rerun
 from fifesim.output.run_folder import FILES
-from fifesim.scenario.scenario import read_scenario
+from fifesim.scenario.scenario import Scenario, default_scenario, read_scenario
 from fifesim.scenario.toml import write_scenario
 
 SMALL = """
@@ -119,10 +119,12 @@ def test_written_scenario_reproduces_the_files(first, invoke, tmp_path):
 
 def test_printed_scenario_is_the_default_one(invoke, tmp_path):
     printed = invoke("scenario").stdout
+    assert printed == write_scenario(default_scenario().complete())
     (tmp_path / "default.toml").write_text(printed)
     assert write_scenario(read_scenario(tmp_path / "default.toml")) == printed
     assert 'learned = "konza"' in printed and "distribution =" not in printed
     paper = invoke("scenario", "--paper").stdout
+    assert paper == write_scenario(Scenario(base="paper").complete())
     assert (
         'learned = "none"' in paper and 'distribution = "burned-grazed"' in paper and 'bands = ["TM3", "TM4"]' in paper
     )

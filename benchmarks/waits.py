@@ -1,0 +1,204 @@
+"""
+What people wait for, by this version and by an older one, in one run.
+
+Each row is a ratio within one process, or processor time of a new one. The older version comes from the history of the
+repository. Rows that it cannot run are empty.
+
+    python benchmarks/waits.py
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from labels import cases as small_cases
+from start import COMMAND, processor_time
+from timing import both_times, in_turn, seconds
+
+import fifesim
+from fifesim.atmosphere import engines
+from fifesim.chain import coupled_ground
+from fifesim.models.radiation import two_stream
+
+OLDER = "ae5f6de4"
+BANDS = ["TM3", "TM4"]
+TARGETS = {
+    "`fifesim simulate` on a new machine, kernels not compiled [s]": 12,
+    "the same, kernels compiled [s]": None,
+    "`fifesim scenario`, times `import fifesim`": 2,
+    "a misspelt key, times `import fifesim`": 2,
+    "to_toa with 40 % clouds, times clear": 1.6,
+    "to_toa with view angles by cell, times one geometry": 8,
+    "to_toa with adjacency, times clear": 5,
+    "slopes='upright', times 'kt'": 2,
+    "chlorophyll by cell, times equal leaves": 8,
+    "skies of a band for directional coupling [ms]": 20,
+    "terms of a band [ms]": None,
+    "surface_reflectance, 333 x 333 cells, times its kernel": 3,
+    "to_toa, 333 x 333 cells, times its kernel": 4,
+    "sense, 333 x 333 cells, times its kernel": 4,
+    "ndvi, 50 x 50 pixels, times xarray.apply_ufunc": 2,
+    "two workers, first call, times threads": None,
+    "two workers, later calls, times threads": 2,
+    "level chain in memory, times the floor": 1,
+    "two_stream [million cells/s]": 10,
+}
+
+
+def commands():
+    """Processes from their start to their end: time on the clock with and without kernels, and ratios."""
+    with tempfile.TemporaryDirectory() as folder:
+        environment = os.environ | {"NUMBA_CACHE_DIR": str(Path(folder) / "kernels")}
+        for _ in range(2):
+            start = time.perf_counter()
+            call = [sys.executable, "-c", COMMAND, "simulate", "-o", str(Path(folder) / "out"), "--overwrite"]
+            subprocess.run(call, env=environment, capture_output=True, check=True)
+            yield time.perf_counter() - start
+        (Path(folder) / "typo.toml").write_text("[grid]\nwidht = 300.0\n", encoding="utf-8")
+        calls = ("import fifesim",), (COMMAND, "scenario"), (COMMAND, "simulate", "typo.toml")
+        rounds = [[processor_time(*each, folder=folder) for each in calls] for _ in range(6)]
+    base, *spent = np.median(rounds[1:], axis=0)
+    yield from spent / base
+
+
+def atmosphere():
+    """Clouds, view angles by cell and adjacency, each in turn with a clear sky and one geometry."""
+    grid = fifesim.fife_site(30 / 9, window=((0, 2000), (0, 2000)))
+    lai = fifesim.lai_scene(grid, arp=0.15, seed=7)
+    rho = lai.fifesim.surface_reflectance("TM", bands=BANDS)
+    zenith = lai.copy(data=np.broadcast_to(np.linspace(0, 50, 2000), lai.shape)).drop_attrs(deep=False)
+    swath = xr.Dataset({"sza": 30.0, "saa": 120.0, "vza": zenith, "vaa": 200.0})
+    sky = rho.fifesim.cast_clouds(fifesim.cloud_field(grid, 0.4, seed=3, margin=3000))
+    anywhere = rho.drop_vars(["sza", "saa", "vza", "vaa"])
+    spent = in_turn(
+        {
+            "clear": rho.fifesim.to_toa,
+            "clouds": lambda: rho.fifesim.to_toa(clouds=sky),
+            "swath": lambda: anywhere.fifesim.to_toa(geometry=swath),
+            "adjacency": lambda: rho.fifesim.to_toa(adjacency=True),
+        }
+    )
+    yield from (spent[name] / spent["clear"] for name in ("clouds", "swath", "adjacency"))
+
+
+def canopy():
+    """Upright plants on slopes and leaves that differ."""
+    grid = fifesim.fife_site(30 / 9, window=((0, 1000), (0, 1000)))
+    lai, dem = fifesim.lai_scene(grid, arp=0.15, seed=7), fifesim.flint_hills(grid, seed=7)
+    horizon = fifesim.horizon(dem)
+    spent = in_turn(
+        {
+            slopes: lambda slopes=slopes: lai.fifesim.surface_reflectance(
+                "TM", bands=BANDS, dem=dem, horizon=horizon, slopes=slopes
+            )
+            for slopes in ("kt", "upright")
+        }
+    )
+    yield spent["upright"] / spent["kt"]
+    chlorophyll = lai.copy(data=np.random.default_rng(1).uniform(20, 60, lai.shape)).drop_attrs(deep=False)
+    leaves = fifesim.Canopy(), fifesim.Canopy(leaf_optics=fifesim.Leaf(chlorophyll=chlorophyll))
+    equal, by_cell = in_turn(
+        {each: lambda each=each: fifesim.surface_reflectance(lai, bands=BANDS, canopy=each) for each in leaves}
+    ).values()
+    yield by_cell / equal
+
+
+def skies():
+    """Milliseconds for the skies and for the terms of a band that nobody asked for before."""
+    band = fifesim.instrument("TM").select("TM3")[0].response
+    angles = iter(np.linspace(20, 50, 100))
+
+    def geometry():
+        return fifesim.Geometry(sza=next(angles), saa=120.0, vza=5.0, vaa=200.0)
+
+    air = fifesim.Atmosphere()
+    yield 1e3 * both_times(lambda: coupled_ground.skies_of(air, (band,), geometry()), 5)[1]
+    yield 1e3 * both_times(lambda: engines.band_terms(air, (band,), next(angles), 5.0, 80.0), 5)[1]
+
+
+def small():
+    """Public functions on small rasters, relative to their kernels."""
+    for _, ours, plain in small_cases():
+        spent = in_turn({"ours": ours, "plain": plain}, rounds=30)
+        yield spent["ours"] / spent["plain"]
+
+
+def workers():
+    """Two worker processes relative to two threads: first call with the start of the workers, and later calls."""
+    import dask
+    from dask.distributed import Client, LocalCluster
+
+    lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 1800), (0, 1800))), arp=0.15, seed=7, chunks="auto")
+
+    def chain():
+        lai.fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().fifesim.sense("TM").compute()
+
+    def clock():
+        start = time.perf_counter()
+        chain()
+        return time.perf_counter() - start
+
+    with dask.config.set(scheduler="threads", num_workers=2):
+        threads = [clock() for _ in range(4)]
+    start = time.perf_counter()
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster):
+        chain()
+        yield (time.perf_counter() - start) / threads[0]
+        yield min(clock() for _ in range(3)) / min(threads)
+
+
+def level():
+    """The level chain in memory, from field to digital numbers, relative to the floor."""
+    from chain import floor, grid_of
+
+    grid, seeds = grid_of(4500), iter(range(100, 200))
+
+    def chain():
+        lai = fifesim.lai_scene(grid, arp=0.15, seed=next(seeds))
+        lai.fifesim.surface_reflectance("TM", bands=BANDS, atmosphere=fifesim.Atmosphere()).fifesim.to_toa().fifesim.sense("TM")
+
+    spent = in_turn({"floor": lambda: floor(4500), "chain": chain})
+    yield spent["chain"] / spent["floor"]
+
+
+def light():
+    """Million cells per second of the two-stream layer with its sunlit and shaded leaves."""
+    lai = np.random.default_rng(1).uniform(0, 6, (2, 1_000_000))
+    optics = np.array([[0.1], [0.45]]), np.array([[0.05], [0.4]])
+    yield 1 / seconds(lambda: two_stream(*optics, 0.1, 35.0, lai, np.array([[0.1], [0.2]])))
+
+
+GROUPS = (commands, atmosphere, canopy, skies, small, workers, level, light)
+
+
+def rows(groups):
+    """Figures of some groups, in the order of `TARGETS`; of a group that fails, the reason on stderr."""
+    for group in groups:
+        try:
+            yield from map(float, group())
+        except Exception as error:  # of the older version
+            print(f"{group.__name__}: {error!r}", file=sys.stderr)
+            yield None
+
+
+def main():
+    """Print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument("--group", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.group:
+        warnings.simplefilter("ignore")
+        print(json.dumps([float(each) for each in globals()[given.group]()]))
+        return
+
+
+if __name__ == "__main__":
+    main()
