@@ -6,6 +6,7 @@ Cells are computed in rows, band by band, and cosines are polynomials, so that a
 """
 
 import dataclasses
+import math
 import threading
 from typing import NamedTuple
 
@@ -285,16 +286,11 @@ def _node_terms(atmosphere, bands, sza, vza, raa):
     return terms_at(atmosphere, bands, sza, np.array(vza), np.array(raa))
 
 
-def _polynomial(function, low, high, degree):
-    """Coefficients of the polynomial through Chebyshev nodes, from the highest power on."""
-    fitted = Chebyshev.interpolate(function, degree, [low, high]).convert(kind=Polynomial)
-    return tuple(fitted.coef[::-1].tolist())
-
-
-# Cosine of angles up to pi by the square of the angle, and arc cosine over the root of its distance from 1: both within
-# 1e-13.
-_COSINE = _polynomial(lambda square: np.cos(np.sqrt(square)), 0, np.pi**2, 11)
-_ARC = _polynomial(lambda cosine: np.arccos(cosine) / np.sqrt(1 - cosine), 0, 1, 14)
+# Coefficients, from the highest power on: cosine by the square of the angle, to 90 degrees, within 2e-16 (Taylor), and
+# arc cosine over the root of its distance from 1, within 1e-13 (Chebyshev nodes).
+_COSINE = tuple((-1) ** n / math.factorial(2 * n) for n in range(10, -1, -1))
+_ARC = Chebyshev.interpolate(lambda cosine: np.arccos(cosine) / np.sqrt(1 - cosine), 14, [0, 1])
+_ARC = tuple(_ARC.convert(kind=Polynomial).coef[::-1].tolist())
 
 _ROW = 256  # cells whose intermediate results stay in the processor cache
 
@@ -309,8 +305,9 @@ def _power_series(coefficients, x):
 
 @jitable
 def _cosine(degrees):
-    angle = np.radians(degrees)
-    return _power_series(_COSINE, angle * angle)
+    angle = np.radians(min(degrees, 180 - degrees))
+    found = _power_series(_COSINE, angle * angle)
+    return found if degrees <= 90 else -found
 
 
 @jitable
@@ -355,7 +352,7 @@ def _scattering(sza, vza, raa, air_mass, turned, place):
     for i in range(sza.size):
         mu_s, mu_v = _cosine(sza[i]), _cosine(vza[i])
         air_mass[i], turned[i] = 1 / mu_s + 1 / mu_v, 1 / (4 * (mu_s + mu_v))
-        place[i] = -mu_s * mu_v - np.sqrt((1 - mu_s * mu_s) * (1 - mu_v * mu_v)) * _cosine(raa[i])
+        place[i] = -mu_s * mu_v - np.sqrt(max((1 - mu_s * mu_s) * (1 - mu_v * mu_v), 0.0)) * _cosine(raa[i])
     for i in range(sza.size):
         cosine = min(max(place[i], -1.0), 1.0)
         arc = np.sqrt(1 - abs(cosine)) * _power_series(_ARC, abs(cosine))
