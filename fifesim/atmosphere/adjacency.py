@@ -429,18 +429,23 @@ def _cells_of(along, pieces, linear):
 @compiled
 def _add_moments(values, down, across, sums):
     """Add sums and counts of each piece in integers, whose sum does not depend on the order."""
-    for i in range(values.shape[0]):
-        for j in range(values.shape[1]):
-            value = np.float64(values[i, j])
-            if not np.isnan(value):
-                value = min(max(value, -_LARGEST), _LARGEST)
-                row, column = down.piece[i], across.piece[j]
-                for k in range(down.weights.shape[1]):
-                    for m in range(across.weights.shape[1]):
+    for k in range(down.weights.shape[1]):
+        for m in range(across.weights.shape[1]):
+            for i in range(values.shape[0]):
+                row, j = down.piece[i], 0
+                if down.weights[down.place[i], k] == 0:
+                    continue
+                while j < values.shape[1]:
+                    column, total, count = across.piece[j], np.int64(0), np.int64(0)
+                    while j < values.shape[1] and across.piece[j] == column:
+                        value = np.float64(values[i, j])
                         weight = down.weights[down.place[i], k] * across.weights[across.place[j], m] * _UNIT
-                        if weight > 0:
-                            sums[0, k, m, row, column] += np.int64(np.rint(weight * value))
-                            sums[1, k, m, row, column] += np.int64(np.rint(weight))
+                        if not np.isnan(value):
+                            total += np.int64(np.rint(weight * min(max(value, -_LARGEST), _LARGEST)))
+                            count += np.int64(np.rint(weight))
+                        j += 1
+                    sums[0, k, m, row, column] += total
+                    sums[1, k, m, row, column] += count
 
 
 def on_cells(rows, columns, around, *, along_y, along_x):

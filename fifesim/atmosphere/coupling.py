@@ -72,7 +72,7 @@ def apparent_reflectance(
     0.25
     """
     factors = path_reflectance, transmittance_down, transmittance_up, spherical_albedo, gas_transmittance
-    toa, refused = _by_cell(_apparent, (surface_reflectance, surface_reflectance), factors)
+    toa, refused = _by_cell(_apparent, (surface_reflectance, surface_reflectance), (*factors, 1.0, 0.0))
     if refused:
         _refuse(surface_reflectance, spherical_albedo, "surface_reflectance")
     return toa
@@ -159,8 +159,7 @@ def inhomogeneous_reflectance(target, environment, terms):
     0.0787
     """
     path, down, direct, diffuse, albedo, gas = terms
-    leaving = np.multiply(target, direct) + np.multiply(environment, diffuse)
-    toa, refused = _by_cell(_apparent, (leaving, environment), (path, down, 1.0, albedo, gas))
+    toa, refused = _by_cell(_apparent, (target, environment), (path, down, 1.0, albedo, gas, direct, diffuse))
     if refused:
         _refuse(environment, albedo, "the environment's reflectance")
     return toa
@@ -283,13 +282,14 @@ def _by_cell(kernel, cells, terms):
 
 # Without transmitted light, division by zero gives infinity as in numpy.
 @compiled
-def _apparent(leaving, around, terms, out):
+def _apparent(target, around, terms, out):
     """Fill in the apparent reflectances, and count those to be refused."""
     refused = 0
     for i in range(out.shape[0]):
-        path, down, up, albedo, gas = terms[:, i]
+        path, down, up, albedo, gas, direct, diffuse = terms[:, i]
         for j in range(out.shape[1]):
-            out[i, j] = apparent_reflectance_of_cell(leaving[i, j], around[i, j], path, down, up, albedo, gas)
+            leaving = target[i, j] * direct + around[i, j] * diffuse
+            out[i, j] = apparent_reflectance_of_cell(leaving, around[i, j], path, down, up, albedo, gas)
             refused += np.isinf(out[i, j])
     return refused
 
