@@ -151,23 +151,24 @@ _AT_ONCE = 2**14
 def _upright(canopy, lai, elevation, sky, cell, seen):
     """Reflectance of upright plants in cells, shape (band, rows, columns). [1]"""
     light, scene = slope_light(elevation, sky, cell, seen), canopy.scene
-    known = np.flatnonzero(~np.isnan(check_map(lai) + light.cosine))
+    known = ~np.isnan(check_map(lai) + light.cosine)
     bands = [np.array(each)[:, None] for each in (scene.leaf_reflectance, scene.leaf_transmittance, canopy.background)]
     given = {name: getattr(scene, name) for name in ("sza", "vza", "raa", "leaf_angles", "hotspot")}
     given["diffuse_fraction"] = np.array(scene.sky)[:, None]
-    out = np.full((len(scene.sky), lai.size), np.nan)
-    for start in range(0, known.size, _AT_ONCE):
-        part = known[start : start + _AT_ONCE]
-        out[:, part] = upright_reflectance(
-            lai.flat[part],
-            *bands,
-            **given,
-            cosine=light.cosine.flat[part],
-            mu_s_local=light.mu_s_local.flat[part],
-            mu_v_local=light.upwelling.flat[part] * seen.mu_v,
-            sky_view=light.sky_view.flat[part],
+    cells = lai, light.cosine, light.mu_s_local, light.upwelling * seen.mu_v, light.sky_view
+    cells = [each.ravel() if known.all() else each[known] for each in cells]
+    found = np.empty((len(scene.sky), cells[0].size))
+    for start in range(0, cells[0].size, _AT_ONCE):
+        part = slice(start, start + _AT_ONCE)
+        area, cosine, sun, view, sky_view = (each[part] for each in cells)
+        found[:, part] = upright_reflectance(
+            area, *bands, **given, cosine=cosine, mu_s_local=sun, mu_v_local=view, sky_view=sky_view
         )
-    return out.reshape(-1, *lai.shape)
+    if known.all():
+        return found.reshape(-1, *lai.shape)
+    out = np.full((len(found), *lai.shape), np.nan)
+    out[:, known] = found
+    return out
 
 
 class Land(NamedTuple):
