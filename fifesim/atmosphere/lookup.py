@@ -20,9 +20,10 @@ from fifesim.atmosphere.coupling import apparent_reflectance_of_cell, corrected_
 from fifesim.atmosphere.engines import LARGEST_ZENITH, terms_at
 from fifesim.base.arrays import compiled, jitable, read_only
 from fifesim.base.caches import cached
-from fifesim.base.geometry import relative_azimuth
+from fifesim.base.geometry import relative_azimuth, scattering_angle_cosine
 
 ANGLE_STEP = 0.25  # between scattering angles of the phase function [degree]
+_ANGLES = np.arange(0, 180 + ANGLE_STEP / 2, ANGLE_STEP)
 
 
 class Once(NamedTuple):
@@ -38,7 +39,7 @@ class Once(NamedTuple):
 def scattered_once(atmosphere, bands):
     """Optical properties for single scattering by the aerosol at the middle of each band."""
     wavelength = np.array([band.center for band in bands])
-    cosine = np.cos(np.radians(np.arange(0, 180 + ANGLE_STEP / 2, ANGLE_STEP)))
+    cosine = np.cos(np.radians(_ANGLES))
     none = np.zeros(wavelength.size)
     if atmosphere.aot == 0:
         return Once(none, none, none, np.zeros((wavelength.size, cosine.size)))
@@ -51,52 +52,33 @@ def scattered_once(atmosphere, bands):
     return Once(albedo, atmosphere.aerosol_optical_depth(wavelength), overlying, phase)
 
 
-@compiled
-def once_reflectance(sza, vza, raa, once, band):
+def once_reflectance(sza, vza, raa, once):
     r"""
-    Reflectance by single scattering in one band.
+    Reflectance by single scattering in each band.
 
     .. math:: \rho_1 = \frac{\omega P(\Theta)}{4 (\mu_s + \mu_v)} \left(1 - e^{-m \tau_A}\right) e^{-m \tau_R}
 
     Parameters
     ----------
-    sza, vza, raa : float
+    sza, vza, raa : array, shape (...)
         [degree]
     once : Once
-    band : int
-        Number of the band in it.
 
     Returns
     -------
-    reflectance : float
+    reflectance : array, shape (..., band)
         [1]
 
     References
     ----------
     [Tanre1990]_
     """
-    mu_s, mu_v = np.cos(np.radians(sza)), np.cos(np.radians(vza))
-    sines = np.sin(np.radians(sza)) * np.sin(np.radians(vza))
-    cosine = min(max(-mu_s * mu_v - sines * np.cos(np.radians(raa)), -1.0), 1.0)
-    place = np.degrees(np.arccos(cosine)) / ANGLE_STEP
-    phase = once.phase[band]
-    index = min(int(place), phase.size - 2)
-    between = phase[index] + (place - index) * (phase[index + 1] - phase[index])
+    mu_s, mu_v = np.cos(np.radians([sza, vza]))[..., None]
+    angle = np.degrees(np.arccos(np.clip(scattering_angle_cosine(sza, vza, raa), -1, 1)))
+    phase = np.stack([np.interp(angle, _ANGLES, each) for each in once.phase], axis=-1)
     air_mass = 1 / mu_s + 1 / mu_v
-    turned = once.albedo[band] * between / (4 * (mu_s + mu_v))
-    return turned * -np.expm1(-air_mass * once.depth[band]) * np.exp(-air_mass * once.overlying[band])
-
-
-@compiled
-def once_on_nodes(sza, vza, raa, once):
-    """Reflectance by single scattering [Tanre1990]_ on nodes, shape (S, V, R, band). [1]"""
-    out = np.empty((sza.size, vza.size, raa.size, once.albedo.size))
-    for s in range(sza.size):
-        for v in range(vza.size):
-            for r in range(raa.size):
-                for b in range(once.albedo.size):
-                    out[s, v, r, b] = once_reflectance(sza[s], vza[v], raa[r], once, b)
-    return out
+    turned = once.albedo * phase / (4 * (mu_s + mu_v))
+    return turned * -np.expm1(-air_mass * once.depth) * np.exp(-air_mass * once.overlying)
 
 
 # The lattice does not depend on the requested cells, so the result does not depend on chunks or windows.
@@ -266,7 +248,8 @@ def _tables(atmosphere, bands, once, nodes):
 
     scattered = np.array([[terms.path_reflectance for terms in row] for row in grid])
     tables = Tables(
-        path_reflectance=scattered - once_on_nodes(nodes.sza, vza, raa, once),
+        path_reflectance=scattered
+        - once_reflectance(*np.broadcast_arrays(nodes.sza[:, None, None], vza[:, None], raa), once),
         transmittance_down=gathered("transmittance_down"),
         transmittance_up=gathered("transmittance_up", vza.size)[:, 0],
         spherical_albedo=gathered("spherical_albedo", vza.size),
@@ -311,30 +294,20 @@ def _cosine(degrees):
 
 
 @jitable
-def _linear(value, lattice, weights):
-    """Fill in the weights of two nodes; the index of the first one, and their number."""
+def _stencil(value, lattice, order, weights):
+    """Fill in the Lagrange weights of two or four nodes; the index of the first one, and their number."""
     if lattice.size == 1:
         weights[0] = 1.0
         return 0, 1
     place = value / lattice.step
-    start = min(max(int(place), 0), lattice.size - LINEAR)
-    weights[1] = place - start
-    weights[0] = 1 - weights[1]
-    return start - lattice.first, LINEAR
-
-
-@jitable
-def _cubic(value, lattice, weights):
-    """Fill in the Lagrange weights of four nodes; the index of the first one, and their number."""
-    if lattice.size == 1:
-        weights[0] = 1.0
-        return 0, 1
-    place = value / lattice.step
-    start = min(max(int(place) - 1, 0), lattice.size - CUBIC)
+    start = min(max(int(place) - (order // 2 - 1), 0), lattice.size - order)
     a = place - start
-    b, c, d = a - 1, a - 2, a - 3
-    weights[0], weights[1], weights[2], weights[3] = b * c * d / -6, a * c * d / 2, a * b * d / -2, a * b * c / 6
-    return start - lattice.first, CUBIC
+    if order == LINEAR:
+        weights[0], weights[1] = 1 - a, a
+    else:
+        b, c, d = a - 1, a - 2, a - 3
+        weights[0], weights[1], weights[2], weights[3] = b * c * d / -6, a * c * d / 2, a * b * d / -2, a * b * c / 6
+    return start - lattice.first, order
 
 
 @jitable
@@ -360,72 +333,64 @@ def _scattering(sza, vza, raa, air_mass, turned, place):
 
 
 @jitable
-def _row(
-    reflectance, places, lattices, air_mass, turned, place, tables, albedo, depth, overlying, to_surface, weights, out
-):
-    """Fill in the reflectance of a row of cells in one band; the last table is the phase function."""
-    path_table, down_table, up_table, albedo_table, gas_table, phase = tables
-    for_altitude, for_sun, for_view, for_azimuth = weights
-    suns, views, azimuths = lattices.sza.count, lattices.vza.count, lattices.raa.count
+def _row(reflectance, places, lattices, light, tables, once, to_surface, weights, out):
+    """Fill in the reflectance of a row of cells in one band."""
+    air_mass, turned, place = light
     altitude, sza, vza, raa = places
+    along_altitude, along_sza, along_vza, along_raa = weights
+    paths, downs, ups, albedos, gases = tables
+    scattered, depth, overlying, phase = once
+    suns, views, azimuths = lattices.sza.count, lattices.vza.count, lattices.raa.count
     for i in range(out.size):
         if np.isnan(altitude[i] + sza[i] + vza[i] + raa[i]):
             out[i] = np.nan
             continue
-        a, n_altitudes = _linear(altitude[i], lattices.altitude, for_altitude)
-        s, n_suns = _cubic(sza[i], lattices.sza, for_sun)
-        v, n_views = _cubic(vza[i], lattices.vza, for_view)
-        r, n_azimuths = _cubic(raa[i], lattices.raa, for_azimuth)
-        path = down = up = spherical = gas = 0.0
-        for j in range(a, a + n_altitudes):
-            up += for_altitude[j - a] * _along(up_table, j * views + v, 1, for_view, n_views)
+        a, n_altitudes = _stencil(altitude[i], lattices.altitude, LINEAR, along_altitude)
+        s, n_suns = _stencil(sza[i], lattices.sza, CUBIC, along_sza)
+        v, n_views = _stencil(vza[i], lattices.vza, CUBIC, along_vza)
+        r, n_azimuths = _stencil(raa[i], lattices.raa, CUBIC, along_raa)
+        path = down = up = albedo = gas = 0.0
+        for j in range(n_altitudes):
+            up += along_altitude[j] * _along(ups, (a + j) * views + v, 1, along_vza, n_views)
             for k in range(n_suns):
-                weight, node = for_altitude[j - a] * for_sun[k], j * suns + s + k
-                down += weight * down_table[np.uint64(node)]
+                weight, node = along_altitude[j] * along_sza[k], (a + j) * suns + s + k
+                down += weight * downs[np.uint64(node)]
                 node = node * views + v
-                spherical += weight * _along(albedo_table, node, 1, for_view, n_views)
-                gas += weight * _along(gas_table, node, 1, for_view, n_views)
-                node = node * azimuths + r
-                if n_azimuths == 1:
-                    path += weight * _along(path_table, node, azimuths, for_view, n_views)
-                else:
-                    for m in range(CUBIC):
-                        share = weight * for_azimuth[m]
-                        path += share * _along(path_table, node + m, azimuths, for_view, n_views)
+                albedo += weight * _along(albedos, node, 1, along_vza, n_views)
+                gas += weight * _along(gases, node, 1, along_vza, n_views)
+                for m in range(n_azimuths):
+                    at = node * azimuths + r + m
+                    path += weight * along_raa[m] * _along(paths, at, azimuths, along_vza, n_views)
         step = min(int(place[i]), phase.size - 2)
-        once = albedo * (phase[step] + (place[i] - step) * (phase[step + 1] - phase[step])) * turned[i]
-        once *= -np.expm1(-air_mass[i] * depth)
-        if overlying > 0:
-            once *= np.exp(-air_mass[i] * overlying)
+        toward = phase[step] + (place[i] - step) * (phase[step + 1] - phase[step])
+        beside = scattered * toward * turned[i] * -np.expm1(-air_mass[i] * depth)
+        path += beside * np.exp(-air_mass[i] * overlying) if overlying > 0 else beside
         # One transmittance of both ways stands for the two.
+        rho, two_way = reflectance[i], down * up
         if to_surface:
-            out[i] = corrected_reflectance_of_cell(reflectance[i], path + once, down * up, 1.0, spherical, gas)
+            out[i] = corrected_reflectance_of_cell(rho, path, two_way, 1.0, albedo, gas)
         else:
-            out[i] = apparent_reflectance_of_cell(
-                reflectance[i], reflectance[i], path + once, down * up, 1.0, spherical, gas
-            )
+            out[i] = apparent_reflectance_of_cell(rho, rho, path, two_way, 1.0, albedo, gas)
 
 
 @compiled
 def _through(reflectance, places, lattices, tables, once, to_surface, light, out):
     weights = ByAxis(np.empty(LINEAR), np.empty(CUBIC), np.empty(CUBIC), np.empty(CUBIC))
     for first in range(0, out.shape[1], _ROW):
-        last = min(first + _ROW, out.shape[1])
-        n = last - first
-        for i in range(n):
-            light[0, i] = places.altitude[first + i if places.altitude.size > 1 else 0]
-            light[1, i] = places.sza[first + i if places.sza.size > 1 else 0]
-            light[2, i] = places.vza[first + i if places.vza.size > 1 else 0]
-            light[3, i] = places.raa[first + i if places.raa.size > 1 else 0]
-        row = ByAxis(light[0, :n], light[1, :n], light[2, :n], light[3, :n])
-        air_mass, turned, place = light[4, :n], light[5, :n], light[6, :n]
-        _scattering(row.sza, row.vza, row.raa, air_mass, turned, place)
+        n = min(_ROW, out.shape[1] - first)
+        for k in range(4):
+            each = places[k]
+            for i in range(n):
+                light[k, i] = each[first + i if each.size > 1 else 0]
+        # Slices of both axes would not be contiguous, and loops over them not vectorized.
+        cells = ByAxis(light[0, :n], light[1, :n], light[2, :n], light[3, :n])
+        scattered = light[4, :n], light[5, :n], light[6, :n]
+        _scattering(cells.sza, cells.vza, cells.raa, *scattered)
         for b in range(out.shape[0]):
-            of_band = (
-                tables.path_reflectance[b], tables.transmittance_down[b], tables.transmittance_up[b],
-                tables.spherical_albedo[b], tables.gas_transmittance[b], once.phase[b],
+            t, optics = tables, Once(once.albedo[b], once.depth[b], once.overlying[b], once.phase[b])
+            of_band = Tables(
+                t.path_reflectance[b], t.transmittance_down[b], t.transmittance_up[b], t.spherical_albedo[b],
+                t.gas_transmittance[b],
             )  # fmt: skip
-            _row(
-                reflectance[b, first:last], row, lattices, air_mass, turned, place, of_band,
-                once.albedo[b], once.depth[b], once.overlying[b], to_surface, weights, out[b, first:last],
-            )  # fmt: skip
+            rho, seen = reflectance[b, first : first + n], out[b, first : first + n]
+            _row(rho, cells, lattices, scattered, of_band, optics, to_surface, weights, seen)

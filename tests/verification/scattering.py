@@ -13,7 +13,7 @@ from fifesim.atmosphere.aerosols import aerosol_optics, aerosol_phase
 from fifesim.atmosphere.coupling import BandTerms, TargetTerms, inhomogeneous_reflectance
 from fifesim.atmosphere.engines import band_terms
 from fifesim.atmosphere.gases import DEPOLARIZATION, rayleigh_phase
-from fifesim.atmosphere.lookup import once_on_nodes, scattered_once
+from fifesim.atmosphere.lookup import once_reflectance, scattered_once
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
 from fifesim.base.geometry import scattering_angle_cosine
@@ -117,7 +117,7 @@ def _once():
     cases = ("5S", (40.0, 25.0, 130.0)), ("successive-orders", (55.0, 40.0, 20.0)), ("5S", (35.0, 35.0, 0.0))
     for engine, angles in cases:
         air = Atmosphere(visibility=10.0, altitude=0.0, engine=engine)
-        found = once_on_nodes(*(np.array([angle]) for angle in angles), scattered_once(air, (band,)))
+        found = once_reflectance(*angles, scattered_once(air, (band,)))
         mu_s, mu_v = np.cos(np.radians(angles[:2]))
         # The closed forms neglect molecules above the aerosol.
         above = 0.0 if engine == "5S" else float(air.rayleigh_optical_depth(at)[0])
