@@ -34,6 +34,7 @@ PARTS = {
     "Sensor": "sensor.py",
     "Spectra": "spectra.py",
     "Start": "start.py",
+    "Waits": "waits.py",
 }
 
 

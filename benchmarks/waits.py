@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from chain import CASE, chain_on, floor, grid_of
 from labels import cases as small_cases
 from start import COMMAND, processor_time
 from timing import both_times, in_turn, seconds
@@ -112,29 +113,29 @@ def workers():
     import dask
     from dask.distributed import Client, LocalCluster
 
-    lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 1800), (0, 1800))), arp=0.15, seed=7, chunks="auto")
+    lai = fifesim.lai_scene(grid_of(1800), arp=0.15, seed=7, chunks="auto")
 
-    def chain():
-        lai.fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().fifesim.sense("TM").compute()
+    def small_scene():
+        lai.fifesim.surface_reflectance("TM", bands=BANDS, **CASE).fifesim.to_toa().fifesim.sense("TM").compute()
 
-    def clock():
+    def clock(call):
         start = time.perf_counter()
-        chain()
+        call()
         return time.perf_counter() - start
 
+    calls = small_scene, lambda: chain_on(4500).compute()
     with dask.config.set(scheduler="threads", num_workers=2):
-        threads = [clock() for _ in range(4)]
+        threads = [[clock(call) for _ in range(4)] for call in calls]
     start = time.perf_counter()
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster):
-        chain()
-        yield (time.perf_counter() - start) / threads[0]
-        yield min(clock() for _ in range(3)) / min(threads)
+        small_scene()
+        yield (time.perf_counter() - start) / threads[0][0]
+        for call, known in zip(calls, threads, strict=True):
+            yield min(clock(call) for _ in range(4)) / min(known)
 
 
 def level():
     """The level chain in memory, from field to digital numbers, relative to the floor."""
-    from chain import floor, grid_of
-
     grid, seeds = grid_of(4500), iter(range(100, 200))
 
     def chain():
@@ -176,7 +177,8 @@ ROWS = {
     },
     workers: {
         "two workers, first call with their start, times threads": None,
-        "two workers, later calls, times threads": 2,
+        "two workers, later calls, 3.2 million cells, times threads": 2,
+        "two workers, 20 million cells of new landscapes, times threads": None,
     },
     level: {"level chain in memory, times the floor": 1},
     light: {"two_stream [million values/s]": 10},

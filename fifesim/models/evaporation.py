@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fifesim.models.production import TMIN_RAMP, VPD_RAMP, canopy_photosynthesis, ramp
+from fifesim.models.production import TMIN_RAMP, VPD_RAMP, ramp
 from fifesim.models.weather import in_range
 
 STEFAN_BOLTZMANN = 5.67e-8  # [W m-2 K-4]
@@ -281,69 +281,3 @@ def _extraterrestrial(latitude, day_of_year):
     sunset = np.arccos(np.clip(-np.tan(phi) * np.tan(declination), -1, 1))
     height = sunset * np.sin(phi) * np.sin(declination) + np.cos(phi) * np.cos(declination) * np.sin(sunset)
     return 24 / np.pi * 4.92 * (1 + 0.033 * np.cos(angle)) * height
-
-
-@in_range
-def canopy_conductance(
-    lai, par, ta_k, vpd_pa, extinction=0.5, g_max=0.0055, half_light=150.0, optimum_k=298.15, range_k=25.0,
-    half_deficit=1500.0, integral="leaves",
-):  # fmt: skip
-    r"""
-    Stomatal conductance of a canopy after Jarvis, integrated over the leaves.
-
-    .. math::
-
-        g_l = g_{max} \, \frac{I}{I + I_{50}} \left[ 1 - \left( \frac{T - T_0}{\Delta T} \right)^2 \right]
-            \frac{1}{1 + D / D_{50}}, \qquad I = K I_0 \, e^{-K l}
-
-    Parameters
-    ----------
-    lai : array
-        NaN gives NaN. [m2 m-2]
-    par : array
-        Photon flux above the canopy, :math:`I_0`. [umol m-2 s-1]
-    ta_k : array
-        Leaf temperature. [K]
-    vpd_pa : array
-        Vapour pressure deficit, :math:`D`. [Pa]
-    extinction : array, optional
-        :math:`K`. [1]
-    g_max : array, optional
-        Conductance of a leaf without stress. [m s-1]
-    half_light : array, optional
-        Photon flux on a leaf with half of the conductance, :math:`I_{50}`. [umol m-2 s-1]
-    optimum_k, range_k : float, optional
-        Temperature of the largest conductance, and distance to temperatures of none. [K]
-    half_deficit : float, optional
-        Deficit with half of the conductance, :math:`D_{50}`. [Pa]
-    integral : {"leaves", "sib2"}, optional
-        "leaves": the light on each leaf, in closed form. "sib2": the uppermost leaf times :math:`(1 - e^{-K L}) / K`,
-        for leaves whose capacity declines with light, as in SiB2.
-
-    Returns
-    -------
-    conductance : array, shape of the broadcast inputs
-        Per ground area. [m s-1]
-
-    Raises
-    ------
-    ValueError
-        If the integral is unknown.
-
-    Notes
-    -----
-    Defaults of light, temperature and deficit are round numbers within the ranges of [Jarvis1976]_ (assumed).
-
-    References
-    ----------
-    [Jarvis1976]_; [Sellers1992]_
-    """
-    warmth = np.clip(1 - ((np.asarray(ta_k, float) - optimum_k) / range_k) ** 2, 0.0, 1.0)
-    unstressed = g_max * warmth / (1 + np.asarray(vpd_pa, float) / half_deficit)
-    if integral == "leaves":
-        # The hyperbola of photosynthesis, with a slope of one conductance per half light.
-        return unstressed * canopy_photosynthesis(lai, extinction, par, 1 / np.asarray(half_light, float), 1.0)
-    if integral != "sib2":
-        raise ValueError(f"integral must be 'leaves' or 'sib2', got {integral!r}")
-    k = np.asarray(extinction, float)
-    return unstressed * k * par / (k * par + half_light) * -np.expm1(-k * np.asarray(lai, float)) / k

@@ -148,19 +148,6 @@ def test_c4_leaves_agree_with_an_independent_solution():
     assert c4_photosynthesis(1e9, 39.0, 298.15, 1e9) == pytest.approx(39.0 / (1 + np.exp(-3.6)) / (1 + np.exp(-3.3)))
 
 
-def test_conductance_agrees_with_quadrature_over_leaves():
-    def leaf(depth):
-        flux = 0.6 * 900 * np.exp(-0.6 * depth)
-        return 0.006 * flux / (flux + 200) * (1 - (8 / 25) ** 2) / (1 + 1200 / 1500)
-
-    options = {"extinction": 0.6, "g_max": 0.006, "half_light": 200.0}
-    made = evaporation.canopy_conductance(4.0, 900.0, 290.15, 1200.0, **options)
-    assert np.isclose(made, quad(leaf, 0, 4)[0], rtol=1e-9)
-    # SiB2 multiplies the uppermost leaf by intercepted light over extinction.
-    sib2 = evaporation.canopy_conductance(4.0, 900.0, 290.15, 1200.0, **options, integral="sib2")
-    assert np.isclose(sib2, leaf(0) * (1 - np.exp(-2.4)) / 0.6, rtol=1e-12)
-
-
 def test_two_stream_is_continuous_where_printed_solutions_divide_by_zero():
     """The extinction of the beam equals the eigenvalue at mu = 1 / (2 m)."""
     omega, back = 0.3, (0.3 + 0.1 / 4) / 2
@@ -181,7 +168,6 @@ def test_missing_cells_stay_missing_and_bare_ground_has_no_flux():
         farquhar_canopy(lai, 1000.0, 0.2, 30.0, 298.0),
         c4_canopy(lai, 1000.0, 0.2, 30.0, 298.0),
         evaporation.penman_monteith(298.0, 50.0, 1e5, lai, 0.3 * lai, 400.0, 288.0).le,
-        evaporation.canopy_conductance(lai, 1000.0, 298.0, 1000.0),
         two_stream(0.1, 0.05, 0.0, 30.0, lai, 0.15).absorbed_beam,
     ]
     for result in results:
@@ -200,8 +186,6 @@ def test_missing_cells_stay_missing_and_bare_ground_has_no_flux():
             lambda: reference(285.0, 295.0, 1.4, 22.0, 2.0, 100.0, 50.0, 187),
             "tmin .* degC, got 285: K was given for deg",
         ),
-        (lambda: evaporation.canopy_conductance(2.0, 900.0, 290.0, -1.0), "vpd_pa must be in .* got -1"),
-        (lambda: evaporation.canopy_conductance(4.0, 900.0, 290.0, 1200.0, integral="leaf"), "'leaves' or 'sib2'"),
         (lambda: production.light_use_gpp(15.0, 650.0, 50.0, 10.0), r"fpar .* \[0, 1\], got 50: .*percent by 100"),
         (lambda: canopy_photosynthesis(-1.0, 0.5, 9.0, 0.05, 20.0), r"lai must be in \[0, 100\] m2 m-2, got -1"),
         (lambda: canopy_photosynthesis(3.0, 0.5, -1.0, 0.05, 20.0), r"par .* \[0, inf\], got -1: it is not neg"),
