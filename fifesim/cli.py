@@ -340,11 +340,9 @@ def explore_command(
 @app.command("scenario")
 def scenario_command(paper: _Paper = False):
     """Print the default scenario as TOML. Every key has its unit and meaning; save it to a file and edit."""
-    # From a file, because the scenario takes 2 s to compute; the tests compare them.
-    from fifesim.base import files
-
-    text = files.path(f"scenarios/{'paper' if paper else 'default'}.toml").read_text(encoding="utf-8")
-    print_lines(text.rstrip())
+    # From a file, because the scenario takes 2 s to compute; the tests compare both.
+    text = Path(__file__).with_name("scenario") / ("paper.toml" if paper else "default.toml")
+    print_lines(text.read_text(encoding="utf-8").rstrip())
 
 
 @app.command("sensors")
