@@ -19,9 +19,11 @@ from fifesim.scenario.simulation import simulate
 WHEN = {"geometry": {"time": "1987-06-06T16:35:00Z"}, "atmosphere": {"altitude": 0.4}}  # wherever it reaches
 
 
-def scenario_of(side, dem="flat"):
+def scenario_of(side, dem="flat", paper=True):
+    """Scenario of the paper's stand, or of the default landscape."""
     size = side // 9 * 9 * CELL
-    return parse_scenario({"grid": {"width": size, "height": size}, "terrain": {"dem": dem}} | WHEN).complete()
+    keys = {"grid": {"width": size, "height": size}, "terrain": {"dem": dem}} | WHEN
+    return parse_scenario({"base": "paper"} | keys if paper else keys).complete()
 
 
 def lai_of(side):
@@ -69,6 +71,11 @@ def terrain_chain(side):
     return lambda: simulate(scenario)["image"]["dn"].compute()
 
 
+def landscape_chain(side):
+    scenario = scenario_of(side, "flint-hills", paper=False)
+    return lambda: simulate(scenario)["image"]["dn"].compute()
+
+
 def run_flat(side):
     return _to_folder(scenario_of(side))
 
@@ -105,7 +112,8 @@ STAGES = {
 CHAINS = {
     "flat chain, field to DN": flat_chain,
     "terrain chain, field to DN": terrain_chain,
-    "fifesim simulate, flat": run_flat,
-    "fifesim simulate, terrain": run_terrain,
+    "default landscape on hills, field to DN": landscape_chain,
+    "fifesim simulate --paper, flat": run_flat,
+    "fifesim simulate --paper, terrain": run_terrain,
 }
 FLOOR = {"floor: normals and FFT": floor_of}
