@@ -81,9 +81,9 @@ def readme(found):
     clock, memory = float(scene["on the clock [s]"]), float(scene["peak memory [GB]"])
     elsewhere = "" if machine(scene) == machine(found[LEVEL]) else f" (measured on an {machine(scene)})"
     lines = [
-        f"""On one core ({machine(found[LEVEL])}), fifesim simulates {level} million ground cells per second of a stand on
-        level ground, {hills} million of a stand on hills and {default} million of the default landscape, from random
-        field to digital numbers in two bands ({size} million cells of 3.33 m).""",
+        f"""On one core ({machine(found[LEVEL])}), fifesim simulates {level} million ground cells per second of a
+        stand on level ground, {hills} million of a stand on hills and {default} million of the default landscape, from
+        random field to digital numbers in two bands ({size} million cells of 3.33 m).""",
         f"""A Landsat scene of 185 km ({cells(LANDSAT)} million cells) takes {clock:.0f} s and {memory:.1f} GB on two
         cores{elsewhere}.""",
     ]
