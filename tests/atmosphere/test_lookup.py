@@ -51,6 +51,14 @@ def test_interpolated_terms_agree_with_exact_terms_per_cell(toward):
     np.testing.assert_allclose(table, one_by_one(atmosphere, *scene), rtol=0, atol=6e-5)
 
 
+def test_molecules_above_the_aerosol_dim_what_it_scatters_once():
+    """At nodes of the table, terms of successive orders are those of one cell."""
+    atmosphere = Atmosphere(visibility=10, engine="successive-orders")
+    rho, places = np.full((2, len(BANDS)), 0.1), (0.5, 40.0, 0.0, [20.0, 25.0], 60.0)
+    table = varying_reflectance(rho, *map(np.array, places), atmosphere=atmosphere, bands=BANDS)
+    np.testing.assert_allclose(table, one_by_one(atmosphere, rho, *np.broadcast_arrays(*places)), rtol=1e-11)
+
+
 def test_user_columns_decrease_with_elevation_like_the_profile():
     """A column is given above the altitude of the atmosphere; higher ground has a smaller column."""
     rho = np.full((1, len(BANDS)), 0.3)

@@ -359,6 +359,10 @@ def test_upright_canopy_on_a_dem():
     lazy = scene(DEM.chunk(y=70), HILL_LAI.chunk(y=50, x=90))
     assert lazy.chunks is not None and "upright" in lazy.history
     np.testing.assert_allclose(lazy.compute(), upright, rtol=1e-12)
+    gap = HILL_LAI.copy()
+    gap[3, 5] = np.nan
+    expected = upright.where(gap.notnull())
+    np.testing.assert_allclose(scene(DEM, gap).transpose(*upright.dims), expected, rtol=1e-12)
     with pytest.raises(ValueError, match="upright"):
         scene(DEM, brown=0.3)
     sizes = {"grass": 0.0, "wood": 0.1}
