@@ -14,6 +14,7 @@ from fifesim.base import files
 from fifesim.chain.comparison import TYPICAL_LAI, engine_error
 from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
+from fifesim.grids.reductions import computed
 from fifesim.output.colours import axis_label, capital, draw_line, finite, percentile_limits, position
 from fifesim.output.folders import versions
 from fifesim.output.maps import encoded, false_colour_names, image_map, relief_map, rendered, stretch_of, value_map
@@ -349,5 +350,6 @@ def _thinned(rasters, step):
 
 def _statistics(image, truth):
     """Label, mean and standard deviation of each quantity of the pixels."""
-    rasters = [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]
-    return [(capital(_label(name)), float(values.mean()), float(values.std())) for name, values in rasters]
+    rasters = dict(truth.data_vars) | ({"ndvi": image["ndvi"]} if "ndvi" in image else {})
+    (found,) = computed({name: (values.mean(), values.std()) for name, values in rasters.items()})
+    return [(capital(_label(name)), *map(float, each)) for name, each in found.items()]
