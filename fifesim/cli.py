@@ -341,8 +341,8 @@ def explore_command(
 def scenario_command(paper: _Paper = False):
     """Print the default scenario as TOML. Every key has its unit and meaning; save it to a file and edit."""
     # From a file, because the scenario takes 2 s to compute; the tests compare both.
-    text = Path(__file__).with_name("scenario") / ("paper.toml" if paper else "default.toml")
-    print_lines(text.read_text(encoding="utf-8").rstrip())
+    path = Path(__file__).with_name("scenario") / ("paper.toml" if paper else "default.toml")
+    print_lines(path.read_text(encoding="utf-8").rstrip())
 
 
 @app.command("sensors")

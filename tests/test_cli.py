@@ -118,6 +118,7 @@ def test_written_scenario_reproduces_the_files(first, invoke, tmp_path):
 
 
 def test_printed_scenario_is_the_default_one(invoke, tmp_path):
+    """The files in ``fifesim/scenario`` hold the texts of `write_scenario`: write them again when a key changes."""
     printed = invoke("scenario").stdout
     assert printed == write_scenario(default_scenario().complete())
     (tmp_path / "default.toml").write_text(printed)

@@ -170,25 +170,18 @@ class _Mode(NamedTuple):
     """Scattering matrices and direct transmittances of one Fourier mode."""
 
     basis: np.ndarray  # shape (components * directions, basis) [1]
-    backward: np.ndarray  # its transpose [1]
     weights: np.ndarray  # of the directions, for each component [1]
     mixing: np.ndarray  # of `_Column.mixing` [1]
     through: np.ndarray  # of light entering a layer, shape (directions of a hemisphere,) [1]
     averaged: np.ndarray  # its mean over the layer [1]
 
 
-@cached(128, "basis functions of the directions of successive orders")
-def _basis(mode, streams, count, components):
-    basis = stokes_basis(mode, quadrature(streams)[0], count, components)
-    return basis, np.ascontiguousarray(basis.T)
-
-
 def _mode_of(column, mode, components, streams):
     """Scattering matrices and direct transmittances of a column in a Fourier mode."""
     nodes, weights = quadrature(streams)
-    basis, backward = _basis(mode, streams, column.terms, components)
+    basis = stokes_basis(mode, nodes, column.terms, components)
     weights = np.tile(weights / 2, components)
-    return _Mode(basis, backward, weights, column.mixing(mode, components), *column.steps(nodes[:streams]))
+    return _Mode(basis, weights, column.mixing(mode, components), *column.steps(nodes[:streams]))
 
 
 def _by_layers(light, matrix):
@@ -249,10 +242,10 @@ def _sum_orders(source, mode, least, tolerance):
     # Returns the mean of each layer, shape (layers, components * directions), and its weighted sum. The error of the
     # tail is held below the tolerance times this sum, or times `least` where that is larger.
     total = np.zeros_like(source)
-    return total, _add_orders(source, mode, least, tolerance, total)
+    return total, _add_orders(source, mode, np.ascontiguousarray(mode.basis.T), least, tolerance, total)
 
 
-def _add_orders(source, mode, least, tolerance, total):
+def _add_orders(source, mode, backward, least, tolerance, total):
     field, weighted = np.empty(source.shape), np.empty(source.shape)
     size, last, last_ratio = 0.0, 0.0, 2.0
     for _ in range(MOST_ORDERS):
@@ -269,7 +262,7 @@ def _add_orders(source, mode, least, tolerance, total):
         if not strength > 0:
             break
         last, last_ratio = strength, ratio
-        source = _scattered(weighted, mode.basis, mode.mixing) @ mode.backward
+        source = _scattered(weighted, mode.basis, mode.mixing) @ backward
     return size
 
 

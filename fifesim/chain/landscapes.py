@@ -156,7 +156,7 @@ def _upright(canopy, lai, elevation, sky, cell, seen):
     given = {name: getattr(scene, name) for name in ("sza", "vza", "raa", "leaf_angles", "hotspot")}
     given["diffuse_fraction"] = np.array(scene.sky)[:, None]
     cells = lai, light.cosine, light.mu_s_local, light.upwelling * seen.mu_v, light.sky_view
-    cells = [each.ravel() if known.all() else each[known] for each in cells]
+    cells = [each[known] for each in cells]
     found = np.empty((len(scene.sky), cells[0].size))
     for start in range(0, cells[0].size, _AT_ONCE):
         part = slice(start, start + _AT_ONCE)
@@ -164,8 +164,6 @@ def _upright(canopy, lai, elevation, sky, cell, seen):
         found[:, part] = upright_reflectance(
             area, *bands, **given, cosine=cosine, mu_s_local=sun, mu_v_local=view, sky_view=sky_view
         )
-    if known.all():
-        return found.reshape(-1, *lai.shape)
     out = np.full((len(found), *lai.shape), np.nan)
     out[:, known] = found
     return out

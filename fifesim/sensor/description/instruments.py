@@ -197,7 +197,7 @@ def read_responses(
     Returns
     -------
     instrument : Instrument
-        Other numbers are those of a short instrument file.
+        Other numbers have the defaults of a short instrument file.
 
     Raises
     ------
