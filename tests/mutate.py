@@ -4,7 +4,6 @@ Change one operator, comparison, constant or call of the package at a time, and 
     python tests/mutate.py fifesim/output/stac.py                      # 15 changes of a file, a few minutes
     pytest -n auto --cov=fifesim --cov-context=test --cov-report=      # once: which test runs which line
     python tests/mutate.py --draws 300 --log mutations.txt             # the package, hours; goes on where the log ends
-    python tests/mutate.py --draws 40 --verify                         # what `fifesim verify` notices in its kernels
 
 The last lines are a summary for a pull request. Without the coverage run, only tests of the module and of modules that
 import it are used.
@@ -48,8 +47,6 @@ TURNED = {
 TURNED |= {ast.FloorDiv: ast.Mult, ast.And: ast.Or, ast.Or: ast.And, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd}
 TURNED |= {ast.Lt: ast.GtE, ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
 SHIFTED = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}
-CHECKS = "fifesim/experiments/verification.py"  # what `fifesim verify` runs
-STAGES = ("base", "ground", "atmosphere", "sensor", "analysis")  # whose kernels it names
 
 
 def changes(tree):
@@ -94,13 +91,12 @@ def changed(source, number):
     return ast.unparse(tree), node.lineno, f"line {node.lineno}: {before[:90]}  ->  {ast.unparse(node)[:90]}"
 
 
-def draw(count, seed, only, verify=False):
-    """Random mutations of all code, or only of kernels that `fifesim verify` calls."""
+def draw(count, seed, only):
+    """Random mutations of a folder or module."""
     places, start = [], ROOT / only
     for path in sorted(each.relative_to(ROOT) for each in ([start] if start.is_file() else start.rglob("*.py"))):
         tree = ast.parse((ROOT / path).read_text())
-        lines = _named_lines(path, tree) if verify else None
-        places += [(path, n) for n, (node, *_) in enumerate(changes(tree)) if not verify or node.lineno in lines]
+        places += [(path, n) for n, _ in enumerate(changes(tree))]
     return random.Random(seed).sample(places, min(count, len(places)))
 
 
@@ -110,30 +106,6 @@ def imported(tree):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("fifesim"):
             for name in (node.module, *(f"{node.module}.{each.name}" for each in node.names)):
                 yield Path(*name.split(".")).with_suffix(".py")
-
-
-@cache
-def _named():
-    """Files that the comparisons import, and all names that they use."""
-    tree = ast.parse((ROOT / CHECKS).read_text())
-    return set(imported(tree)), _names(tree)
-
-
-def _names(node):
-    return {getattr(each, "id", getattr(each, "attr", None)) for each in ast.walk(node)}
-
-
-def _named_lines(path, tree):
-    """Lines of functions of a file that the comparisons name, and of functions of the file called by them."""
-    files, names = _named()
-    if path not in files or path.parts[1] not in STAGES or {"raster.py", "rasters"} & set(path.parts):
-        return set()
-    known = {each.name: each for each in tree.body if isinstance(each, ast.FunctionDef | ast.ClassDef)}
-    found, ahead = set(), set(known) & names
-    while ahead:
-        found |= ahead
-        ahead = (set(known) & set().union(*(_names(known[each]) for each in ahead))) - found
-    return {line for each in found for line in range(known[each].lineno, known[each].end_lineno + 1)}
 
 
 # Limits are processor time, so that a loaded machine gives the same result.
@@ -269,13 +241,6 @@ def failing(tests, seconds=LONGEST):
     return watch.failed or (None if code in (0, 2, 5) else f"exit {code}")
 
 
-def verified():
-    """The first comparison of `fifesim verify` beyond its bound, or None."""
-    from fifesim.experiments.verification import verify
-
-    return next((f"{each.area}: {each.what}" for each in verify() if not each.within), None)
-
-
 def apart(folder, function, *given):
     """Result of a function in a fork that imports the package from a folder."""
     fork = multiprocessing.get_context("fork")
@@ -358,14 +323,12 @@ class Checkout:
                 return failed
         return None
 
-    def tried(self, path, number, verify):
+    def tried(self, path, number):
         """Description of a change, and the test that detected it."""
         text, line, words = changed((self.kept / path).read_text(), number)
         self.restore(path)
         (self.folder / path).write_text(text)
         try:
-            if verify:
-                return words, apart(self.folder, verified)
             return words, self.noticed(path, line)
         finally:
             self.restore(path, caches=True)
@@ -386,14 +349,13 @@ def main():
     parser.add_argument("path", nargs="?", default="fifesim", help="folder or module of the package")
     parser.add_argument("--draws", type=int, default=15)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--verify", action="store_true", help="ask `fifesim verify` instead of the tests")
     parser.add_argument("--log", type=Path, help="file of results, whose changes are not tried again")
     parser.add_argument("--part", default="1/1", help="such as 2/2: every second, to run two at once")
     given = parser.parse_args()
     part, parts = map(int, given.part.split("/"))
     lines = given.log.read_text().splitlines() if given.log and given.log.exists() else []
     known = "\n".join(lines)
-    drawn = draw(given.draws, given.seed, given.path, given.verify)[part - 1 :: parts]
+    drawn = draw(given.draws, given.seed, given.path)[part - 1 :: parts]
     # Threads that wait for each other cost more than they bring in products so small.
     os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     with tempfile.TemporaryDirectory() as scratch:
@@ -403,7 +365,7 @@ def main():
             if f"{path} {number}:" in known:
                 continue
             began = time.monotonic()
-            words, found = checkout.tried(path, number, given.verify)
+            words, found = checkout.tried(path, number)
             lines.append(f"{path} {number}: {words} | {found or 'SURVIVES'} | {time.monotonic() - began:.0f} s")
             print(lines[-1], flush=True)
             if given.log:

@@ -1,28 +1,22 @@
 """Tables that the documentation generates from the code are complete."""
 
-import importlib
 import tomllib
 from pathlib import Path
 
+import make_tables as tables
 import pytest
 import typer
 import yaml
 
 import fifesim
 from fifesim.cli import app
-from fifesim.scenario.keys import FIELD_LIMITS, Section, StandKeys
+from fifesim.scenario.keys import FIELD_LIMITS, StandKeys
 from fifesim.scenario.scenario import Scenario
 from fifesim.sensor.response.noise import KINDS
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 BOUNDS = ("ge", "gt", "le", "lt")
-
-
-@pytest.fixture
-def tables(monkeypatch):
-    monkeypatch.syspath_prepend(str(DOCS))
-    return importlib.import_module("make_tables")
 
 
 def sections(text):
@@ -38,14 +32,7 @@ def rows(text):
     return {cells[0].strip(" `"): [cell.strip() for cell in cells] for cells in lines}
 
 
-def test_each_page_includes_its_table(tables):
-    pages = {"scenario_keys": "scenario_keys", "command_line": "command_line", "instruments": "instruments"}
-    for page, table in (pages | {"cite": "citation"}).items():
-        assert f"```{{include}} tables/{table}.md" in (DOCS / f"{page}.md").read_text("utf-8")
-        assert callable(getattr(tables, table))
-
-
-def test_scenario_keys_have_unit_range_default_and_meaning(tables):
+def test_scenario_keys_have_unit_range_default_and_meaning():
     found = sections(tables.scenario_keys())
     assert list(found) == [f"[{'classes.NAME' if name == 'classes' else name}]" for name in Scenario.model_fields]
     for name, text in zip(Scenario.model_fields, found.values(), strict=True):
@@ -73,24 +60,7 @@ def approx(value):
     return pytest.approx(value) if isinstance(value, float) else value
 
 
-@pytest.mark.parametrize(
-    ("section", "key", "row"),
-    [
-        ("ground", "arp", ["number", "1", "[0, 0.25)", "`0.15`"]),
-        ("grid", "cell", ["number", "m", "≥ 0.001", "`3.333333333`"]),
-        ("ground", "seed", ["whole number", "", "[0, 2⁶³)", "`7`"]),
-        ("landscape", "deviations", ["table of numbers", "", "[0, 1]", "empty"]),
-        ("sensor", "offset", ["two numbers", "pixel", "", "`[0, 0]`"]),
-        ("sensor", "interval", ["name or number", "m", "`product`, `native`", '`"product"`']),
-        ("atmosphere", "adjacency", ["true or false", "", "", "`false`"]),
-        ("atmosphere", "h2o", ["number", "g\N{NO-BREAK SPACE}cm⁻²", "[0, 10]", "–"]),
-    ],
-)
-def test_rows_of_selected_keys(tables, section, key, row):
-    assert rows(sections(tables.scenario_keys())[f"[{section}]"])[key][1:5] == row
-
-
-def test_scenario_accepts_exactly_the_listed_names(tables):
+def test_scenario_accepts_exactly_the_listed_names():
     for (section, key), names in tables.NAMES.items():
         annotation = Scenario.section((section,)).model_fields[key].annotation
         for name in names:
@@ -105,22 +75,14 @@ def test_scenario_accepts_exactly_the_listed_names(tables):
             fifesim.Scenario(**{section: {key: wrong}})
 
 
-def test_landscape_limits_agree_with_the_table(tables):
+def test_landscape_limits_agree_with_the_table():
     for key, (low, high) in FIELD_LIMITS.items():
         assert rows(sections(tables.scenario_keys())["[landscape]"])[key][3] == f"[{low:g}, {high:g}]"
         with pytest.raises(ValueError, match="must be in"):
             fifesim.Scenario(landscape={"cover": "none", "deviations": {"soil": 0.1}} | {key: {"soil": high + 0.01}})
 
 
-def test_key_of_unknown_type_raises(tables):
-    class Other(Section):
-        key: bytes = b""
-
-    with pytest.raises(KeyError):
-        tables._type(Other.model_fields["key"], ())
-
-
-def test_page_has_every_command_option_and_help_text(tables):
+def test_page_has_every_command_option_and_help_text():
     group = typer.main.get_command(app)
     if any(parameter.help is None for command in group.commands.values() for parameter in command.params):
         pytest.skip(f"typer {typer.__version__} has no help of arguments, which the page then lacks")
@@ -138,7 +100,7 @@ def test_page_has_every_command_option_and_help_text(tables):
     assert "fifesim rerun [OPTIONS] {file}" in found["rerun"]
 
 
-def test_page_has_a_source_for_every_instrument_value(tables):
+def test_page_has_a_source_for_every_instrument_value():
     page = tables.instruments()
     found = {name.partition("\n")[0]: text for name, text in sections(page).items()}
     for name in fifesim.sensor.instrument_names():
@@ -154,7 +116,7 @@ def test_page_has_a_source_for_every_instrument_value(tables):
         assert f"(#{tables._anchor(item)})" in page and f"({tables._anchor(item)})=" in page
 
 
-def test_values_of_an_instrument(tables):
+def test_values_of_an_instrument():
     found = sections(tables.instruments())
     tm, msi = rows(found["TM"]), rows(found["MSI"])
     assert tm["altitude"][1:3] == ["705 km", "Friedl1995"]
@@ -166,7 +128,7 @@ def test_values_of_an_instrument(tables):
     assert overview["[L4TM](#instrument-l4tm)"][-3] != "unknown" and overview["[L4TM](#instrument-l4tm)"][-1] == "8.5 m"
 
 
-def test_citation_page_has_the_software_and_the_paper(tables):
+def test_citation_page_has_the_software_and_the_paper():
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     (paper,) = cited["references"]
     text = tables.citation()
