@@ -34,7 +34,7 @@ def test_page_agrees_with_the_benchmark_tables(load, page):
 
 def test_summary_rows_exist_in_the_benchmarks(load):
     summary, work, commands, peers = (load(name) for name in ("summary", "work", "commands", "peers"))
-    assert {summary.LEVEL, summary.HILLS} <= set(work.CHAINS)
+    assert {summary.LEVEL, summary.HILLS, summary.DEFAULT} <= set(work.CHAINS)
     assert set(summary.RUNS) <= set(commands.CASES)
     assert {summary.EACH, summary.INTERPOLATED} <= set(peers.ROWS)
 
