@@ -126,6 +126,7 @@ def test_mean_leaf_area_above_dense_forest_causes_a_warning():
         assert warn_of_large(tenths) is tenths
     with warnings.catch_warnings(action="error"):
         warn_of_large(np.array([7.9, 8.1, np.nan]))
+        warn_of_large(np.full(3, np.nan))
 
 
 def test_within_finds_values_outside_a_range_in_any_memory_layout():
