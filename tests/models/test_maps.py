@@ -94,32 +94,10 @@ def test_weather_by_cell_is_checked_when_it_is_computed(lai):
             lazy.compute()
     with pytest.raises(ValueError, match="humidity must be finite"):
         WEATHER.replace(humidity=field(lai, 0, 1).where(lai > lai.min()))
+    # FPAR of bare and almost bare ground is also a valid fraction.
+    assert all((area.fifesim.gpp() >= 0).all() for area in (0 * lai, 0 * lai + 1e-9))
     # Only light-use and Penman-Monteith need the minimum temperature.
     assert np.isfinite(lai.fifesim.gpp(cold, model="farquhar")).all()
-
-
-def test_fpar_of_almost_bare_ground_is_a_valid_fraction(lai):
-    for area in (0 * lai, 0 * lai + 1e-9):
-        assert (area.fifesim.gpp() >= 0).all()
-
-
-def test_weather_and_leaves_of_another_site_are_asked_for():
-    """Each argument that is given ends its warning; the energy balance needs the leaves, FPAR of a map does not."""
-    lai, _ = raster(52.5)
-    sun, air = fifesim.Geometry(sza=40, saa=150), fifesim.Atmosphere(altitude=0.1)
-    verb = partial(lai.fifesim.evapotranspiration, atmosphere=air, geometry=sun)
-    with pytest.warns(UserWarning, match=r"weather over lai is unknown.*June.*300 K.*weather=fifesim\.models\.Weather"):
-        verb(canopy=CANOPY)
-    with pytest.warns(UserWarning, match=r"weather over lai is unknown"):
-        lai.fifesim.gpp(model="farquhar", geometry=sun, canopy=CANOPY, atmosphere=air)
-    for leaves in (verb, lambda **options: lai.fifesim.light(atmosphere=air, geometry=sun)):
-        with pytest.warns(UserWarning, match=r"vegetation of lai is unknown.*FIFE's tallgrass.*leaf_optics=") as found:
-            leaves(weather=WEATHER)
-        assert len(found) == 1
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", UserWarning)
-        verb(weather=WEATHER, canopy=CANOPY)
-        lai.fifesim.evapotranspiration(WEATHER, fpar=0.1 * lai.rename("fpar"), geometry=sun)
 
 
 AREAS = np.array([0.1, 0.25, 0.5, 0.74, 1.0, 1.41, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0])
@@ -220,6 +198,19 @@ def test_polar_night_is_zero_and_polar_day_has_24_hours():
     assert "24.00 h" in summer.history and summer.values[0, 2] > summer.values[0, 1] > 0
     with pytest.warns(UserWarning, match="day_length 14.9 h, but the sun is over .* for 24.0 h"):
         lai.fifesim.gpp(**given | {"weather": WEATHER}, time="2022-06-21T12:00Z")
+
+
+def test_weather_and_leaves_of_another_site_are_asked_for():
+    """Each argument that is given ends its warning; FPAR of a map needs no leaves."""
+    lai, _ = raster(52.5)
+    verb = partial(lai.fifesim.evapotranspiration, atmosphere=AIR, geometry=fifesim.Geometry(sza=40, saa=150))
+    with pytest.warns(UserWarning, match=r"weather over lai is unknown.*June.*300 K.*weather=fifesim\.models\.Weather"):
+        verb(canopy=CANOPY)
+    with pytest.warns(UserWarning, match=r"vegetation of lai is unknown.*FIFE's tallgrass.*leaf_optics="):
+        verb(weather=WEATHER)
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        verb(weather=WEATHER, canopy=CANOPY)
+        lai.fifesim.evapotranspiration(WEATHER, fpar=0.1 * lai.rename("fpar"), geometry=fifesim.Geometry(40, 150))
 
 
 def test_declination_follows_from_the_sun_of_any_time():

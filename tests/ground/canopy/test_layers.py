@@ -20,40 +20,17 @@ from fifesim.ground.canopy.layers import (
     green_fpar,
     leaf_layers,
     light_budget,
-    mixed,
     two_layers,
 )
 from fifesim.ground.canopy.leaf_transfer import discrete_ordinates
 from fifesim.ground.canopy.sail_model import sail, with_background
 
-LAI = np.array([0, 1e-6, 0.5, 3, 20, 100])[:, None]
-BROWN = np.array([0, 1e-9, 0.2, 0.7, 1 - 1e-9, 1])
-GREEN, DEAD = (0.45, 0.42), (0.3, 0.1)
-
-
-def canopies(brown, dissociation, green=GREEN, dead=DEAD, lai=LAI, **view):
-    return two_layers(lai, *green, *dead, brown=brown, dissociation=dissociation, **view)
-
-
-def check_equal(found, expected, atol=1e-12):
-    for name, value in expected._asdict().items():
-        one, other = np.broadcast_arrays(getattr(found, name), value)
-        np.testing.assert_allclose(one, other, rtol=0, atol=atol, err_msg=name)
-
-
-@pytest.mark.parametrize("sza, vza, raa, hotspot", [(28.5, 28.5, 0, 0.1), (75, 60, 180, 1.0)])
-@pytest.mark.parametrize("dissociation", [0.0, 0.4, 1.0])
-def test_equal_leaves_or_leaves_of_one_kind_or_mixed_leaves_equal_sail(sza, vza, raa, hotspot, dissociation):
-    view = {"sza": sza, "vza": vza, "raa": raa, "hotspot": hotspot}
-    check_equal(canopies(BROWN, dissociation, dead=GREEN, **view), sail(LAI, *GREEN, **view))
-    check_equal(canopies(0.0, dissociation, **view), sail(LAI, *GREEN, **view))
-    check_equal(canopies(1.0, dissociation, **view), sail(LAI, *DEAD, **view))
-    check_equal(canopies(BROWN, 0.0, **view), sail(LAI, *mixed(GREEN, DEAD, BROWN), **view))
+GREEN = 0.45, 0.42
 
 
 def test_nan_of_leaf_area_dead_share_and_crowns_stays_in_its_cell():
     lai, brown = np.array([1.0, np.nan, 1.0]), np.array([0.3, 0.3, np.nan])
-    found = canopies(brown, 0.5, lai=lai, sza=28.5, vza=28.5, hotspot=0.1)
+    found = two_layers(lai, *GREEN, 0.3, 0.1, brown=brown, dissociation=0.5, sza=28.5, vza=28.5, hotspot=0.1)
     for name in ("rso", "rdd_below", "tdo"):
         assert np.isnan(getattr(found, name)).tolist() == [False, True, True]
     check_crowns([5.0, np.nan, 5.0], [0.0, 0.5, np.nan])

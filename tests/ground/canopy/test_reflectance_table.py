@@ -6,10 +6,7 @@ import pytest
 from fifesim.ground.canopy.interpolation import (
     LARGEST_FOLIAGE_LAI,
     LARGEST_TABLE_LAI,
-    crown_table,
     interpolate,
-    interpolate_crowned,
-    interpolate_foliage,
     tabulate,
     tabulate_foliage,
 )
@@ -114,7 +111,9 @@ def varied_cells():
     lai[:8], brown[:8], cover[:8] = [0, 1, 1, 8, 8, 1e-9, 15, 20], [0.5, 0, 1, 0, 1, 0.3, 1e-6, 0.999], [1, 1] * 4
     cover = np.maximum(cover, lai / 90)
     cover[8] = 0
-    return lai, brown, cover, rng.choice([0, 0.2, 0.99, 1], (2, n))
+    ground = rng.choice([0, 0.2, 0.99, 1], (2, n))
+    lai[9] = brown[10] = cover[11] = ground[1, 12] = np.nan
+    return lai, brown, cover, ground
 
 
 def varied_scene(sza, vza, raa, hotspot, leaf_angles, **given):
@@ -124,6 +123,7 @@ def varied_scene(sza, vza, raa, hotspot, leaf_angles, **given):
 
 
 def check_varied(lai, ground, scene):
+    """Also that cells without data are NaN."""
     exact = cell_by_cell(lai, ground, scene)
     np.testing.assert_allclose(varied_reflectance(lai, ground, scene), exact, rtol=0, atol=1e-6)
 
@@ -154,6 +154,20 @@ def test_canopies_outside_the_table_are_evaluated_exactly(varied_cells):
     np.testing.assert_array_equal(varied_reflectance(lai, ground, given), cell_by_cell(lai, ground, given))
 
 
+@pytest.mark.parametrize(("name", "most"), [("lai", 100), ("brown", 1), ("ground", 1), ("crown_cover", 1)])
+@pytest.mark.parametrize("is_low", [True, False])
+def test_invalid_values_of_one_cell_are_refused(varied_cells, name, most, is_low):
+    given = dict(zip(("lai", "brown", "crown_cover", "ground"), (each.copy() for each in varied_cells), strict=True))
+    given[name].reshape(-1)[-10] = -0.005 if is_low else most + 0.005
+    lai, ground = given.pop("lai"), given.pop("ground")
+    view = (28.5, 0, 0, 0, "spherical")
+    with pytest.raises(ValueError, match=r"must (be in \[0, 1\]|not be negative nor above 100), got|at most 100"):
+        varied_reflectance(lai, ground, varied_scene(*view, **given))
+    if name != "crown_cover":
+        with pytest.raises(ValueError, match="must"):
+            varied_reflectance(lai, ground, varied_scene(*view, brown=given["brown"]))
+
+
 @pytest.mark.parametrize("part", ["all", "green", "light"])
 @pytest.mark.parametrize("by_cell", [False, True])
 def test_absorbed_light_is_the_light_budget_averaged_over_bands(varied_cells, part, by_cell):
@@ -180,49 +194,3 @@ def test_tables_meet_their_tolerance_or_raise():
         tabulate(lambda lai: np.floor(lai)[None], rate=1.0)
     with pytest.raises(ValueError, match="exact=True"):
         tabulate_foliage(lambda lai, _: np.floor(lai)[None], rate=1.0, by_brown=False)
-
-
-def foliage(count):
-    """Table of terms of two bands for dead leaves below green ones, with decay rates typical of canopies."""
-    rates = np.linspace(0.5, 2.0, 2 * count)[:, None]
-
-    def terms(lai, brown):
-        return (0.5 * np.exp(-rates * (1 - brown) * lai) + 0.25 * np.exp(-rates * brown * lai)) / (1 + rates)
-
-    return tabulate_foliage(terms, rate=2.0)
-
-
-@pytest.fixture(scope="module")
-def leaves():
-    return foliage(4)
-
-
-@pytest.fixture(scope="module")
-def crowned():
-    return foliage(8)
-
-
-def test_foliage_and_crowns_are_nan_without_data_and_infinite_beyond_the_table(leaves, crowned):
-    lai, brown = np.array([1, np.nan, 1, LARGEST_FOLIAGE_LAI + 1e-9]), np.array([0.2, 0.2, np.nan, 0.2])
-    found, wrong = interpolate_foliage(leaves, lai, brown, np.array([[0.1], [0.2]]))
-    assert np.isfinite(found[:, 0]).all() and np.isnan(found[:, 1:3]).all() and np.isinf(found[:, 3]).all()
-    assert wrong == 0
-    lai = np.array([1, np.nan, 1, 1, 1, 0.5 * LARGEST_FOLIAGE_LAI + 1e-9])
-    brown, cover = np.array([0.2, 0.2, np.nan, 0.2, 0.2, 0.2]), np.array([0.5, 0.5, 0.5, np.nan, 1.5, 0.5])
-    found, wrong = interpolate_crowned(crowned, crown_table(1.0, 30, 0, 0), lai, brown, cover, np.full((2, 1), 0.2))
-    assert np.isfinite(found[:, 0]).all() and np.isnan(found[:, 1:5]).all() and np.isinf(found[:, 5]).all()
-    assert wrong > 0
-
-
-@pytest.mark.parametrize(("name", "most"), [("lai", 100), ("brown", 1), ("ground", 1), ("cover", 1)])
-@pytest.mark.parametrize("is_low", [True, False])
-def test_invalid_values_are_counted(leaves, crowned, name, most, is_low):
-    """In any run of cells; NaN is not counted."""
-    n = 600
-    given = {"lai": np.ones(n), "brown": np.full(n, 0.2), "cover": np.full(n, 0.5), "ground": np.full((2, n), 0.2)}
-    for each in given.values():
-        each[..., 5] = np.nan
-    given[name].reshape(-1)[-10] = -0.005 if is_low else most + 0.005
-    assert interpolate_crowned(crowned, crown_table(1.0, 30, 0, 0), *given.values())[1] > 0
-    del given["cover"]
-    assert bool(interpolate_foliage(leaves, *given.values())[1]) == (name != "cover")
