@@ -7,22 +7,12 @@ import pandas as pd
 import pytest
 
 from fifesim.base import files
-from fifesim.ground.canopy.prospect import leaf_band_means
 from fifesim.retrieval import networks
 from fifesim.retrieval.inversion import optimal_estimation, table_posterior
 
 DATA = Path(__file__).parents[1] / "data"
-LINEAR, CASES, LEAVES = (
-    pd.read_csv(DATA / f"{name}.csv", comment="#")
-    for name in ("optimal_estimation_linear", "sl2p_cases", "prosail_inversion")
-)
-PROBLEMS = {
-    case: {
-        what: part.pivot(index="row", columns="column", values="value").to_numpy()
-        for what, part in rows.groupby("what")
-    }
-    for case, rows in LINEAR.groupby("case")
-}
+LINEAR = pd.read_csv(DATA / "optimal_estimation_linear.csv", comment="#")
+CASES = pd.read_csv(DATA / "sl2p_cases.csv", comment="#")
 
 
 def forward_of(slope):
@@ -30,10 +20,11 @@ def forward_of(slope):
 
 
 def test_linear_problems_agree_with_the_closed_form():
-    for own in PROBLEMS.values():
-        found = optimal_estimation(
-            own["y"].T, forward_of(own["K"]), own["xa"][:, 0], own["Sa"], own["Se"], tolerance=1e-9
-        )
+    for _, rows in LINEAR.groupby("case"):
+        parts = rows.groupby("what")
+        own = {what: part.pivot(index="row", columns="column", values="value").to_numpy() for what, part in parts}
+        prior = own["xa"][:, 0], own["Sa"], own["Se"]
+        found = optimal_estimation(own["y"].T, forward_of(own["K"]), *prior, tolerance=1e-9)
         assert found.converged.all()
         assert found.state[0] == pytest.approx(own["x_hat"][:, 0], abs=1e-9)
         assert found.covariance[0] == pytest.approx(own["S_hat"], abs=1e-9)
@@ -51,9 +42,8 @@ def test_error_that_depends_on_the_state_agrees_with_the_estimate_of_minimum_var
     cross = -0.4 * spread @ slope.T
     error = 0.16 * slope @ spread @ slope.T + noise @ noise.T + 0.01 * np.eye(4)
     measured = rng.normal(size=(5, 4))
-    found = optimal_estimation(
-        measured, forward_of(slope), prior, spread, error, cross_covariance=cross, tolerance=1e-9
-    )
+    given = {"cross_covariance": cross, "tolerance": 1e-9}
+    found = optimal_estimation(measured, forward_of(slope), prior, spread, error, **given)
     both = spread @ slope.T + cross
     gain = both @ np.linalg.inv(slope @ spread @ slope.T + slope @ cross + cross.T @ slope.T + error)
     np.testing.assert_allclose(found.state, prior + (measured - slope @ prior) @ gain.T, rtol=0, atol=1e-9)
@@ -80,38 +70,6 @@ def test_estimate_minimises_the_cost_within_its_limits():
     found = optimal_estimation(measured, saturating, prior, 20 * spread, 1e-6 * np.eye(2), limits=limits)
     assert np.isnan(found.state[0, 0]) and not found.converged[0]
     assert found.state[1, 0] == 3.0
-
-
-CONTENTS = ["structure", "chlorophyll", "carotenoids", "brown", "water", "dry_matter"]
-TYPICAL = np.array([1.5, 40.0, 8.0, 0.1, 0.012, 0.006])
-NANOMETRES = LEAVES.wavelength_nm.unique()
-
-
-def leaves(states):
-    """Leaf reflectance and transmittance from contents relative to typical ones, shape (n, 18)."""
-    structure, chlorophyll, carotenoids, brown, water, dry_matter = (states * TYPICAL).T
-    weights = np.zeros((2101, len(NANOMETRES)))
-    weights[NANOMETRES - 400, np.arange(len(NANOMETRES))] = 1
-    contents = structure, chlorophyll, carotenoids, 0 * structure, brown, water, dry_matter
-    return leaf_band_means(contents, weights).reshape(2 * len(NANOMETRES), -1).T
-
-
-def with_slopes(states, pixels):
-    """Leaf optics, and their complex-step derivatives, shape (n, 18, 6)."""
-    steps = np.eye(6) * 1e-30j
-    return leaves(states), np.stack([leaves(states + step).imag / 1e-30 for step in steps], axis=-1)
-
-
-def test_leaf_contents_are_retrieved_from_reflectance_and_transmittance_of_prosail():
-    """Half of the leaves have no brown pigments."""
-    cases = [rows for _, rows in LEAVES.groupby("case")]
-    measured = np.array([np.concatenate([rows.leaf_reflectance, rows.leaf_transmittance]) for rows in cases])
-    true = np.array([rows.iloc[0][CONTENTS].astype(float) for rows in cases])
-    limits, prior = (np.array([1 / 1.5, 0, 0, 0, 0, 0]), np.full(6, 20.0)), np.ones(6)
-    error = 1e-14 * np.eye(18)
-    found = optimal_estimation(measured, with_slopes, prior, 4 * np.eye(6), error, limits=limits, iterations=60)
-    assert found.converged.all()
-    assert found.state * TYPICAL == pytest.approx(true, rel=0.01, abs=1e-4)
 
 
 def test_lookup_agrees_with_brute_force():

@@ -5,7 +5,6 @@ import warnings
 from dataclasses import replace
 from functools import cache, partial
 
-import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -85,12 +84,15 @@ def test_intervals_have_their_coverage_on_unseen_landscapes(retrieval):
 
 def test_retrieved_map_is_near_the_truth_and_on_its_grid(retrieval, image, light):
     found, truth = light.fifesim.retrieve(retrieval), image["truth"]["lai"]
-    score = fifesim.score(found, truth)
-    assert float(score.rmse) < 0.25
+    assert float(fifesim.score(found, truth).rmse) < 0.25
     assert found.rio.crs == truth.rio.crs and np.array_equal(found.x, truth.x)
     inside = found.where(found.flag >= 0)
     assert bool((inside.lai_low <= inside.lai_high).where(inside.lai.notnull(), True).all())
     assert bool((inside.lai_low.diff("level") <= 0).where(inside.lai.notnull(), True).all())
+    if retrieval.method == "line":
+        # The intervals are normal where the lower end is not clipped.
+        width = (found.lai_high - found.lai_low).sel(level=0.8).where(found.lai_low.sel(level=0.8) > 0)
+        np.testing.assert_allclose(width / (2 * 1.28155 * found.lai_sd), np.where(width > 0, 1, np.nan), rtol=0.01)
     assert found.flag.dtype == np.int8
     missing = light.isnull().any("band")
     assert np.array_equal(found.flag.values == -1, missing.values) and np.array_equal(found.lai.isnull(), missing)
@@ -120,10 +122,8 @@ def test_training_is_reproducible_to_the_bit(chips):
 def test_retrieval_is_restored_from_its_file(retrieval, light, tmp_path):
     retrieval.to_netcdf(tmp_path / "mine.nc")
     again = fifesim.retrieval.read_retrieval(tmp_path / "mine.nc")
-    assert again == retrieval and again != replace(
-        retrieval, tables=retrieval.tables | {"stretch": np.full((2, 3), 2.0)}
-    )
-    assert again.score.coverage.values == pytest.approx(retrieval.score.coverage.values)
+    other = retrieval.tables | {"stretch": np.full((2, 3), 2.0)}
+    assert again == retrieval and again != replace(retrieval, tables=other)
     assert light.fifesim.retrieve(again).identical(light.fifesim.retrieve(retrieval))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.nc"]
 
@@ -135,8 +135,6 @@ def test_spectra_outside_the_training_are_flagged(retrieval, light):
     # Dense grass is brighter in the near infrared and darker in the red than all training pixels.
     dense = light.where(light.band == "MSI8", 0.04).where(light.band != "MSI8", 0.42)
     assert (dense.fifesim.retrieve(retrieval).flag.values[1:-1, 1:-1] > 0).all()
-    # Digital numbers with fractions are indistinguishable from reflectance.
-    assert ((1e4 * light).assign_attrs(light.attrs).fifesim.retrieve(retrieval).flag != 0).all()
 
 
 def test_quantiles_of_a_network_are_sorted_and_give_the_standard_deviation():
@@ -325,19 +323,18 @@ SEVERAL, BARE = {"study": PASTURES.to_toml()}, {"instrument": "MSI"}
 @pytest.mark.parametrize(
     ("attrs", "options", "message"),
     [
-        (None, {"bands": "MSI2"}, "no band MSI2, they have MSI3, MSI4, MSI8"),
-        (None, {"method": "line", "bands": ["MSI3", "MSI4"]}, "needs a red and a near infrared band"),
+        (SEVERAL, {"quantities": "green_fpar"}, "no green_fpar"),
+        (SEVERAL, {"bands": "MSI2"}, "no band MSI2, they have MSI3, MSI4, MSI8"),
+        (SEVERAL, {"method": "line", "bands": ["MSI3", "MSI4"]}, "needs a red and a near infrared band"),
         (BARE, {"level": "surface"}, "needs the study of the chips"),
         (BARE, {"pixels": "uniform"}, "needs the study of the chips"),
         (SEVERAL, {"method": "optimal-estimation"}, "single stand|of one stand"),
         (SEVERAL, {"pixels": "uniform"}, "single stand|of one stand"),
-        (None, {"quantities": "green_fpar"}, "no green_fpar"),
     ],
 )
 def test_invalid_training_is_rejected(chips, attrs, options, message):
-    given = chips if attrs is None else chips.drop_attrs(deep=False).assign_attrs(attrs)
     with pytest.raises(ValueError, match=message):
-        fifesim.train(given, **options)
+        fifesim.train(chips.drop_attrs(deep=False).assign_attrs(attrs), **options)
 
 
 def test_learned_landscape_is_the_prior(tmp_path):
@@ -350,8 +347,6 @@ def test_learned_landscape_is_the_prior(tmp_path):
     # The standard error of the mean of 12 landscapes of 150 m is 6 %.
     assert mean == pytest.approx(float(dense.simulate(grid, seed=1)["lai"].mean()), rel=0.18)
     assert retrieval.prior.endswith(f"learned from {path}")
-    with pytest.raises(TypeError, match=r"path of a learned landscape that Landscape\.save wrote"):
-        fifesim.train(STUDY, "line", landscape=dense)
 
 
 def test_corrected_chips_of_many_landscapes_are_trained_at_the_surface_without_a_study(chips):
@@ -376,11 +371,6 @@ def test_chips_of_a_dataset_are_retrieved_as_reflectance(light, trained, change)
     np.testing.assert_array_equal(carries.fifesim.ndvi(), light.fifesim.ndvi())
 
 
-def sealed(content, path):
-    """Write the content of a file with a valid checksum."""
-    path.write_bytes(content + f"\nfifesim retrieval 3 {hashlib.sha256(content).hexdigest()}".encode())
-
-
 def test_changed_bytes_of_a_file_are_rejected(tmp_path, trained):
     """Any change of content, checksum or length; netCDF's library does not return from some damaged files."""
     path, random = tmp_path / "mine.nc", np.random.default_rng(5)
@@ -400,7 +390,6 @@ def test_changed_bytes_of_a_file_are_rejected(tmp_path, trained):
     ("change", "said"),
     [
         (lambda file: file.drop_vars("table_stretch"), "table stretch is missing"),
-        (lambda file: file.assign(table_more=1.0), "table more is unknown"),
         (lambda file: file.assign(table_stretch=file.table_stretch.T), r"stretch has the shape \(3, 2\)"),
         (lambda file: file.assign(table_bias0=file.table_bias0 * np.inf), "bias0 has values that are not finite"),
         (lambda file: file.assign(table_scale=-file.table_scale), "scale has values"),
@@ -408,23 +397,14 @@ def test_changed_bytes_of_a_file_are_rejected(tmp_path, trained):
         (lambda file: file.assign(table_angle_range=file.table_angle_range[::-1] + [[1.0], [0]]), "an upper end below"),
         (lambda file: file.isel(level=[0]), "scores have dimensions"),
         (lambda file: file.assign_attrs(fifesim_retrieval=file.fifesim_retrieval.replace("fpar", "sky")), "'sky'"),
-        (lambda file: file.drop_attrs(deep=False), "fifesim_retrieval"),
     ],
 )
 def test_files_with_impossible_content_are_rejected(tmp_path, trained, change, said):
-    file = change(trained("quantiles")._dataset())
-    sealed(bytes(file.to_netcdf(engine="netcdf4")), tmp_path / "mine.nc")
+    content = bytes(change(trained("quantiles")._dataset()).to_netcdf(engine="netcdf4"))
+    seal = f"\nfifesim retrieval 3 {hashlib.sha256(content).hexdigest()}".encode()
+    (tmp_path / "mine.nc").write_bytes(content + seal)
     with pytest.raises(ValueError, match=rf"mine.nc is not a valid retrieval.*{said}.*train it again"):
         fifesim.retrieval.read_retrieval(tmp_path / "mine.nc")
-
-
-def test_declared_size_is_checked_before_it_is_read(tmp_path):
-    with netCDF4.Dataset(tmp_path / "large.nc", "w") as file:
-        file.createDimension("many", 10**12)
-        file.createVariable("table_stretch", "f8", ("many",), chunksizes=(10**6,))
-    sealed((tmp_path / "large.nc").read_bytes(), tmp_path / "large.nc")
-    with pytest.raises(ValueError, match=r"large.nc.*declares 8000000000000 bytes"):
-        fifesim.retrieval.read_retrieval(tmp_path / "large.nc")
 
 
 def test_links_in_the_folder_of_a_file_are_not_followed(tmp_path, trained):
