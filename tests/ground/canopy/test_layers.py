@@ -205,5 +205,3 @@ def test_canopy_uses_the_model(lai):
     assert abs(float(ratio.sel(band="TM3")) - 1) < 0.01 < float(ratio.sel(band="TM4")) - 1 < 0.03
     lazy = lai.chunk(y=11).fifesim.surface_reflectance("TM", canopy=canopy, **verb)
     np.testing.assert_array_equal(lazy.compute(), exact)
-    with pytest.raises(ValueError, match="without dissociation"):
-        lai.fifesim.surface_reflectance("TM", canopy=canopy.replace(brown=0.3, dissociation=0.5), **verb)

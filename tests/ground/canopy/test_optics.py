@@ -24,17 +24,15 @@ from fifesim.ground.canopy.optics import (
 from fifesim.ground.canopy.prospect import CONTENTS, LEAF_RANGES, Leaf
 from fifesim.ground.canopy.soil import FILM, below_film, brightened, grains_in_water, moistened, soil_line, water_films
 
-LARGEST = {
-    "structure": 3.5, "chlorophyll": 100, "carotenoids": 25, "anthocyanins": 10, "brown": 1, "water": 0.05,
-    "dry_matter": 0.03,
-}  # fmt: skip
-
 
 def test_random_leaves_agree_with_prosail():
     """Both sum the same terms in double precision without cancellation, hence 1e-12."""
     rng = np.random.default_rng(0)
+    limits = {
+        name: (each.lowest, each.lowest + 0.3 * (each.highest - each.lowest)) for name, each in LEAF_RANGES.items()
+    }
     for _ in range(10):
-        leaf = Leaf(**{name: rng.uniform(name == "structure", high) for name, high in LARGEST.items()})
+        leaf = Leaf(**{name: rng.uniform(*ends) for name, ends in limits.items()})
         wavelength, *ours = prospect.leaf_spectrum(leaf)
         nanometres, *theirs = prosail.run_prospect(
             leaf.structure, leaf.chlorophyll, leaf.carotenoids, leaf.brown, leaf.water, leaf.dry_matter,
