@@ -1,6 +1,5 @@
 """Maps of production, evapotranspiration and albedo: labels, weather, sums over a day, and error messages."""
 
-import warnings
 from functools import partial
 
 import numpy as np
@@ -190,19 +189,6 @@ def test_polar_night_is_zero_and_polar_day_has_24_hours():
     assert "24.00 h" in summer.history and summer.values[0, 2] > summer.values[0, 1] > 0
     with pytest.warns(UserWarning, match="day_length 14.9 h, but the sun is over .* for 24.0 h"):
         lai.fifesim.gpp(**given | {"weather": WEATHER}, time="2022-06-21T12:00Z")
-
-
-def test_weather_and_leaves_of_another_site_are_asked_for():
-    """Each argument that is given ends its warning; FPAR of a map needs no leaves."""
-    lai, _ = raster(52.5)
-    verb = partial(lai.fifesim.evapotranspiration, atmosphere=AIR, geometry=fifesim.Geometry(sza=40, saa=150))
-    with pytest.warns(UserWarning, match=r"weather over lai is unknown.*June.*300 K.*weather=fifesim\.models\.Weather"):
-        verb(canopy=CANOPY)
-    with pytest.warns(UserWarning, match=r"vegetation of lai is unknown.*FIFE's tallgrass.*leaf_optics="):
-        verb(weather=WEATHER)
-    with warnings.catch_warnings(action="error", category=UserWarning):
-        verb(weather=WEATHER, canopy=CANOPY)
-        lai.fifesim.evapotranspiration(WEATHER, fpar=0.1 * lai.rename("fpar"), geometry=fifesim.Geometry(40, 150))
 
 
 def test_declination_follows_from_the_sun_of_any_time():

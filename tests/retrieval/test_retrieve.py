@@ -1,9 +1,12 @@
 """Training on a study, and retrieval from images: intervals, flags, files and error messages."""
 
 import hashlib
+import re
+import tomllib
 import warnings
 from dataclasses import replace
 from functools import cache, partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -291,50 +294,20 @@ def test_sl2p_maps_sentinel_2_reflectance(image):
     assert list(found.data_vars) == ["lai", "fpar", "fcover", "flag"]
     assert found.lai.values[1, 1] == pytest.approx(1.49, abs=0.01)  # the first published case, rounded
     assert np.isnan(found.lai.values[0, 0]) and found.flag.values[0, 0] == -1 and found.flag.values[1, 1] == 0
-    with pytest.raises(ValueError, match="lacks MSI5"):
-        light.sel(band=["MSI3", "MSI4"]).fifesim.retrieve("sl2p")
-    with pytest.raises(ValueError, match="surface reflectance factor is needed"):
-        light.assign_attrs(standard_name="toa_bidirectional_reflectance").fifesim.retrieve("sl2p")
 
 
-@pytest.mark.parametrize(
-    ("change", "options", "message"),
-    [
-        (lambda light: light.sel(band=["MSI3", "MSI4"]), {}, "lacks MSI8"),
-        (lambda light: light.drop_vars("vaa"), {}, "no coordinate vaa"),
-        (lambda light: light.assign_coords(sza=50.0), {}, r"image is 50\.0 degrees, the training had 28\.5"),
-        (lambda light: light.assign_attrs(standard_name=SURFACE), {}, "top of the atmosphere"),
-        (lambda light: light.assign_coords(wavelength=("band", [0.56, 0.66, 0.9])), {}, "band MSI8 .* is at 0.9"),
-        (lambda light: light, {"intervals": [0.9]}, r"levels of the training, 0\.5, 0\.8, 0\.95, got \[0\.9\]"),
-        (lambda light: light.drop_attrs().rename("dn").assign_coords(gain=1.0, offset=0.0), {}, "digital numbers"),
-        (lambda light: (1e4 * light).fillna(0).astype("uint16"), {}, "digital numbers"),
-    ],
-)
-def test_unsuitable_images_and_options_are_rejected(trained, light, change, options, message):
-    with pytest.raises(ValueError, match=message):
-        change(light).fifesim.retrieve(**{"retrieval": trained("line")} | options)
+MISTAKES = tomllib.loads((Path(__file__).parents[1] / "data" / "retrieval_mistakes.toml").read_text(encoding="utf-8"))
 
 
-# The study of other chips has several stands.
-PASTURES = fifesim.Study(CHIP.replace(cover="pastures"), {"visibility": {"uniform": [20, 60]}}, landscapes=3)
-SEVERAL, BARE = {"study": PASTURES.to_toml()}, {"instrument": "MSI"}
-
-
-@pytest.mark.parametrize(
-    ("attrs", "options", "message"),
-    [
-        (SEVERAL, {"quantities": "green_fpar"}, "no green_fpar"),
-        (SEVERAL, {"bands": "MSI2"}, "no band MSI2, they have MSI3, MSI4, MSI8"),
-        (SEVERAL, {"method": "line", "bands": ["MSI3", "MSI4"]}, "needs a red and a near infrared band"),
-        (BARE, {"level": "surface"}, "needs the study of the chips"),
-        (BARE, {"pixels": "uniform"}, "needs the study of the chips"),
-        (SEVERAL, {"method": "optimal-estimation"}, "single stand|of one stand"),
-        (SEVERAL, {"pixels": "uniform"}, "single stand|of one stand"),
-    ],
-)
-def test_invalid_training_is_rejected(chips, attrs, options, message):
-    with pytest.raises(ValueError, match=message):
-        fifesim.train(chips.drop_attrs(deep=False).assign_attrs(attrs), **options)
+@pytest.mark.parametrize("title", MISTAKES["use"])
+def test_unsuitable_images_and_chips_are_rejected(trained, light, chips, title):
+    pastures = CHIP.replace(cover="pastures")
+    several = fifesim.Study(pastures, {"visibility": {"uniform": [20, 60]}}, landscapes=3).to_toml()
+    bare, names = chips.drop_attrs(deep=False), {"np": np, "fifesim": fifesim, "light": light, "line": trained("line")}
+    names |= {"bare": bare.assign_attrs(instrument="MSI"), "several": bare.assign_attrs(study=several)}
+    with pytest.raises(ValueError) as caught:
+        eval(MISTAKES["use"][title]["code"], names)
+    assert [word for word in MISTAKES["use"][title]["refused"] if word not in str(caught.value)] == []
 
 
 def test_learned_landscape_is_the_prior(tmp_path):
@@ -353,7 +326,8 @@ def test_corrected_chips_of_many_landscapes_are_trained_at_the_surface_without_a
     """Twice as many chips of the same landscapes do not help against a warning; other landscapes do."""
     with pytest.warns(UserWarning, match=r"few landscapes \(train 12, validation 6, test 6\).*at least 10 landscapes"):
         fifesim.train(chips, "line")
-    corrected = chips.drop_attrs(deep=False).assign_attrs(BARE).assign(surface_reflectance=chips.toa_reflectance)
+    corrected = chips.assign(surface_reflectance=chips.toa_reflectance)
+    corrected.attrs = {"instrument": "MSI"}
     enough = corrected.assign(landscape=("chip", np.arange(chips.sizes["chip"])))
     with warnings.catch_warnings():
         warnings.filterwarnings("error", message="the chips are of few landscapes")
@@ -386,23 +360,13 @@ def test_changed_bytes_of_a_file_are_rejected(tmp_path, trained):
         assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda file: file.drop_vars("table_stretch"), "table stretch is missing"),
-        (lambda file: file.assign(table_stretch=file.table_stretch.T), r"stretch has the shape \(3, 2\)"),
-        (lambda file: file.assign(table_bias0=file.table_bias0 * np.inf), "bias0 has values that are not finite"),
-        (lambda file: file.assign(table_scale=-file.table_scale), "scale has values"),
-        (lambda file: file.assign(table_prior_range=file.table_prior_range * 1e300), "prior_range has values"),
-        (lambda file: file.assign(table_angle_range=file.table_angle_range[::-1] + [[1.0], [0]]), "an upper end below"),
-        (lambda file: file.isel(level=[0]), "scores have dimensions"),
-        (lambda file: file.assign_attrs(fifesim_retrieval=file.fifesim_retrieval.replace("fpar", "sky")), "'sky'"),
-    ],
-)
-def test_files_with_impossible_content_are_rejected(tmp_path, trained, change, said):
-    content = bytes(change(trained("quantiles")._dataset()).to_netcdf(engine="netcdf4"))
+@pytest.mark.parametrize("title", MISTAKES["file"])
+def test_files_with_impossible_content_are_rejected(tmp_path, trained, title):
+    changed = eval(MISTAKES["file"][title]["code"], {"np": np, "file": trained("quantiles")._dataset()})
+    content = bytes(changed.to_netcdf(engine="netcdf4"))
     seal = f"\nfifesim retrieval 3 {hashlib.sha256(content).hexdigest()}".encode()
     (tmp_path / "mine.nc").write_bytes(content + seal)
+    said = re.escape(MISTAKES["file"][title]["refused"])
     with pytest.raises(ValueError, match=rf"mine.nc is not a valid retrieval.*{said}.*train it again"):
         fifesim.retrieval.read_retrieval(tmp_path / "mine.nc")
 

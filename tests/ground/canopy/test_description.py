@@ -79,13 +79,6 @@ def test_given_lists_the_fields_that_were_passed_and_replace_leaves_others_unset
         canopy.replace(bron=0.3)
 
 
-def test_given_fields_take_precedence_in_over():
-    first, scene = Canopy(brown=0.0, background=0.1), Canopy(brown=0.3, hotspot=0.1, moisture=RASTER)
-    both = first.over(scene)
-    assert both.given == {"brown", "background", "hotspot", "moisture"}
-    assert (both.brown, both.background, both.hotspot, both.moisture is RASTER) == (0.0, 0.1, 0.1, True)
-
-
 def test_canopies_are_equal_by_value_frozen_and_can_be_recreated():
     """Also with rasters and leaves; a field with the default value differs from a missing one."""
     one, two = (

@@ -28,11 +28,9 @@ from fifesim.ground.canopy.soil import FILM, below_film, brightened, grains_in_w
 def test_random_leaves_agree_with_prosail():
     """Both sum the same terms in double precision without cancellation, hence 1e-12."""
     rng = np.random.default_rng(0)
-    limits = {
-        name: (each.lowest, each.lowest + 0.3 * (each.highest - each.lowest)) for name, each in LEAF_RANGES.items()
-    }
-    for _ in range(10):
-        leaf = Leaf(**{name: rng.uniform(*ends) for name, ends in limits.items()})
+    low, high = np.array([(each.lowest, each.highest) for each in LEAF_RANGES.values()]).T
+    for values in rng.uniform(low, low + 0.3 * (high - low), (10, len(low))):
+        leaf = Leaf(**dict(zip(LEAF_RANGES, values.tolist(), strict=True)))
         wavelength, *ours = prospect.leaf_spectrum(leaf)
         nanometres, *theirs = prosail.run_prospect(
             leaf.structure, leaf.chlorophyll, leaf.carotenoids, leaf.brown, leaf.water, leaf.dry_matter,

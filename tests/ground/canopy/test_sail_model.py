@@ -18,7 +18,6 @@ from fifesim.ground.canopy.sail_model import (
     bidirectional_gap,
     exponential_chain,
     leaf_scattering,
-    reflectance_factor,
     sail,
     upright_reflectance,
     volume_scattering,
@@ -118,30 +117,6 @@ def test_gap_and_sunlit_visible_leaf_area_match_quadrature(lai, alpha):
     np.testing.assert_allclose([seen, tsstoo], [expected, gap], rtol=1e-9)
 
 
-def check_slab(monkeypatch, *args, **options):
-    """Check that the closed form of the slab equals the sum of exponential chains, which is never singular."""
-    found = sail(*args, **options)
-    with monkeypatch.context() as patch:
-        patch.setattr(sail_model, "_slabs", lambda *given: given[-1].fill(True))
-        expected = sail(*args, **options)
-    for name in ("rso", "rdo", "rsd", "rdd", "tss", "too", "tsd", "tdo", "tdd"):
-        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=0, atol=1e-14, err_msg=name)
-
-
-@pytest.mark.parametrize("leaf_angles", ["spherical", "campbell(80)", "0: 1", "90: 1"])
-@pytest.mark.parametrize("angles", [(28.5, 10, 40), (0, 0, 0), (75, 50, 180)])
-def test_closed_form_of_the_slab_equals_exponential_chains(leaf_angles, angles, monkeypatch):
-    """LAI from 1e-8 to 60, black to non-absorbing leaves."""
-    random = np.random.default_rng(7)
-    lai = np.concatenate([random.uniform(0, 8, 200), 10 ** random.uniform(-8, 1.8, 200), [0.0]])
-    absorbed = 10 ** random.uniform(-9, 0, lai.size)
-    absorbed[:40], absorbed[40:80] = 0, 1
-    rho = (1 - absorbed) * random.uniform(0, 1, lai.size)
-    tau = np.maximum(1 - absorbed - rho, 0)
-    given = dict(zip(("sza", "vza", "raa"), angles, strict=True), leaf_angles=leaf_angles)
-    check_slab(monkeypatch, lai, rho, tau, **given)
-
-
 def test_nearly_equal_attenuation_rates_are_not_singular(monkeypatch):
     """Attenuation rates of sun, view and diffuse light differ relatively by 1e-14 to 0.01."""
     classes = leaf_angle_classes("spherical")
@@ -152,7 +127,12 @@ def test_nearly_equal_attenuation_rates_are_not_singular(monkeypatch):
     rho = leaf + 10 ** random.uniform(-14, -2, 2000) * random.choice([-1, 1], 2000)
     lai = 10 ** random.uniform(-4, 1.5, 2000)
     given = {"sza": 40.0, "vza": 40.0 + 10 ** random.uniform(-12, -1, 2000), "raa": 30.0}
-    check_slab(monkeypatch, lai, rho, rho, **given)
+    found = sail(lai, rho, rho, **given)
+    # The sum of exponential chains is never singular.
+    monkeypatch.setattr(sail_model, "_slabs", lambda *options: options[-1].fill(True))
+    expected = sail(lai, rho, rho, **given)
+    for name in ("rso", "rdo", "rsd", "rdd", "tss", "too", "tsd", "tdo", "tdd"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=0, atol=1e-14, err_msg=name)
 
 
 def test_angles_by_cell_equal_separate_calls_with_folded_azimuth():
@@ -184,16 +164,6 @@ def on(slope, sza, vza, raa, aspect=0.0):
     ]
     given = {"cosine": np.cos(tilt), "mu_s_local": local[0], "mu_v_local": local[1], "sky_view": 1.0}
     return {"sza": sza, "vza": vza, "raa": raa} | given
-
-
-@pytest.mark.parametrize("hotspot", [0.0, 0.1])
-@pytest.mark.parametrize("leaf_angles", ["spherical", "planophile"])
-def test_upright_canopy_on_level_ground_equals_sail(hotspot, leaf_angles):
-    canopy = {"leaf_angles": leaf_angles, "hotspot": hotspot}
-    lai = np.array([0.0, 0.5, 3.0])
-    surface = with_background(sail(lai, *GREEN, sza=40.0, vza=25.0, raa=60.0, **canopy), 0.15)
-    found = upright_reflectance(lai, *GREEN, 0.15, **on(0.0, 40.0, 25.0, 60.0), diffuse_fraction=0.2, **canopy)
-    np.testing.assert_allclose(found, reflectance_factor(surface.rso, surface.rdo, 0.2), rtol=1e-12)
 
 
 def test_slope_seen_along_its_normal_equals_level_canopy():
@@ -274,9 +244,10 @@ def scene(dem, lai=HILL_LAI, hotspot=0.0):
 
 def test_upright_canopy_on_a_dem():
     """A flat DEM gives the level result, chunks change nothing, and a class equals its canopy."""
-    level = HILL_LAI.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    spot = fifesim.Canopy(hotspot=0.1)
+    level = HILL_LAI.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], canopy=spot)
+    np.testing.assert_allclose(scene(0 * DEM + 400.0, hotspot=0.1), level, rtol=0, atol=1e-6)
     upright = scene(DEM)
-    np.testing.assert_allclose(scene(0 * DEM + 400.0), level, rtol=0, atol=1e-6)
     gap = HILL_LAI.copy()
     gap[3, 5] = np.nan
     lazy = scene(DEM.chunk(y=40), gap.chunk(y=50, x=30))
