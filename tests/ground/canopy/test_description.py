@@ -43,23 +43,6 @@ def test_rasters_need_dims_y_x_and_real_numbers(name):
         Canopy(**{name: RASTER.astype(bool)})
 
 
-@pytest.mark.parametrize(
-    ("field", "error", "message"),
-    [
-        ({"brown": True}, TypeError, r"^brown must be a number, or an xarray.DataArray over \(y, x\), got True"),
-        ({"hotspot": RASTER}, TypeError, "^hotspot must be a number, got an xarray.DataArray"),
-        ({"hotspot": 0.99 * LEAST_HOTSPOT}, ValueError, "hotspot must be 0, for no .* at least 1e-06, got 9.9e-07"),
-        ({"leaf_angles": [0.5, 0.6]}, ValueError, "1.1"),
-        ({"leaf_optics": RASTER}, TypeError, "^leaf_optics must be a fifesim.Leaf, .*got an xarray.DataArray"),
-        ({"model": "exact"}, ValueError, "model must be"),
-    ],
-    ids=str,
-)
-def test_invalid_fields_are_refused_by_name(field, error, message):
-    with pytest.raises(error, match=message):
-        Canopy(**field)
-
-
 def test_default_canopy_is_tallgrass_without_given_fields(lai):
     assert TALLGRASS.given == frozenset() and repr(TALLGRASS) == "Canopy()"
     assert fifesim.Setup().canopy is TALLGRASS and fifesim.CoverClass("grass").canopy is TALLGRASS
@@ -97,21 +80,6 @@ def test_canopies_are_equal_by_value_frozen_and_can_be_recreated():
     assert again == Canopy(**one) and again.given == set(one)
     with pytest.raises(AttributeError, match="brown"):
         canopy.brown = 0.2
-
-
-def test_rasters_over_time_are_evaluated_date_by_date(lai):
-    """Also rasters in a mapping."""
-    days = xr.Variable("time", np.array(["1987-06-06T16:35", "1987-07-06T16:35"], "M8[ns]"))
-    season = xr.concat([lai, 1.1 * lai], dim=days, combine_attrs="override")
-    share = xr.concat([lai / 10, lai / 20], dim=days, combine_attrs="override").drop_attrs(deep=False)
-    canopy = Canopy(background={"TM3": share, "TM4": 0.3}, brown=share, hotspot=0.1)
-    found = season.fifesim.surface_reflectance("TM", bands=TM34, canopy=canopy)
-    absorbed = season.fifesim.fpar(canopy=canopy, leaves="green")
-    for date in (0, 1):
-        one = Canopy(background={"TM3": share[date], "TM4": 0.3}, brown=share[date], hotspot=0.1)
-        alone = season[date].fifesim.surface_reflectance("TM", bands=TM34, canopy=one)
-        np.testing.assert_array_equal(found[date], alone)
-        np.testing.assert_array_equal(absorbed[date], season[date].fifesim.fpar(canopy=one, leaves="green"))
 
 
 def test_a_class_inherits_only_fields_that_it_does_not_give(site):

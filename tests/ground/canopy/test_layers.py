@@ -12,7 +12,7 @@ from verification import tables
 from verification.benchmarks import RAMI_AEROSOL, RAMI_GROUND, RAMI_MOLECULES, RAMI_SZA, _rami_air, hom45
 
 import fifesim
-from fifesim.ground.canopy.crowns import check_crowns, clumped, crown_shares
+from fifesim.ground.canopy.crowns import clumped, crown_shares
 from fifesim.ground.canopy.layers import (
     FPAR_INF,
     beer_fpar,
@@ -20,22 +20,11 @@ from fifesim.ground.canopy.layers import (
     green_fpar,
     leaf_layers,
     light_budget,
-    two_layers,
 )
 from fifesim.ground.canopy.leaf_transfer import discrete_ordinates
 from fifesim.ground.canopy.sail_model import sail, with_background
 
 GREEN = 0.45, 0.42
-
-
-def test_nan_of_leaf_area_dead_share_and_crowns_stays_in_its_cell():
-    lai, brown = np.array([1.0, np.nan, 1.0]), np.array([0.3, 0.3, np.nan])
-    found = two_layers(lai, *GREEN, 0.3, 0.1, brown=brown, dissociation=0.5, sza=28.5, vza=28.5, hotspot=0.1)
-    for name in ("rso", "rdd_below", "tdo"):
-        assert np.isnan(getattr(found, name)).tolist() == [False, True, True]
-    check_crowns([5.0, np.nan, 5.0], [0.0, 0.5, np.nan])
-    with pytest.raises(ValueError, match="lai / crown_cover, at most 100, got up to 150"):
-        check_crowns([1.0, 3.0], 0.02)
 
 
 @pytest.mark.parametrize("dissociation", [0.0, 0.4, 1.0])

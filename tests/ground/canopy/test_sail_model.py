@@ -135,15 +135,6 @@ def test_nearly_equal_attenuation_rates_are_not_singular(monkeypatch):
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=0, atol=1e-14, err_msg=name)
 
 
-def test_angles_by_cell_equal_separate_calls_with_folded_azimuth():
-    """Repeated angles are grouped; results stay in their cells."""
-    sza = np.array([[30.0, 50.0], [50.0, np.nan]])
-    found = sail(1.0, 0.07, 0.04, sza=sza, vza=20.0, raa=200.0, hotspot=0.1)
-    for place in np.ndindex(2, 2):
-        one = sail(1.0, 0.07, 0.04, sza=sza[place], vza=20.0, raa=160.0, hotspot=0.1)
-        np.testing.assert_array_equal(found.rso[place], one.rso)
-
-
 @pytest.mark.parametrize("gap", [0, 0.01, 10])
 def test_recursion_stays_within_its_arrays(gap):
     """Plain Python raises IndexError where compiled code would read beyond an array."""
