@@ -67,10 +67,11 @@ def test_results_agree_with_every_row_of_the_table(name):
 
 
 def test_reference_evapotranspiration_agrees_with_fao_56():
-    """Example 18, and the wind at 2 m by the logarithmic profile."""
+    """Example 18, and its wind at 10 m by the logarithmic profile of Eq. 47."""
     uccle = (12.3, 21.5, 1.409, 22.07), (100.0, 50.8, 187)
     assert abs(reference(*uccle[0], 2.078, *uccle[1]) - 3.9) < 0.1
-    at_10_m = reference(*uccle[0], 2.078 * np.log(67.8 * 10 - 5.42) / 4.87, *uccle[1], wind_height=10.0)
+    wind = 2.078 * np.log(67.8 * 10 - 5.42) / np.log(67.8 * 2 - 5.42)
+    at_10_m = reference(*uccle[0], wind, *uccle[1], wind_height=10.0)
     assert at_10_m == pytest.approx(reference(*uccle[0], 2.078, *uccle[1]), rel=1e-12)
 
 

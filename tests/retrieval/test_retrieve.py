@@ -310,6 +310,7 @@ def test_unsuitable_images_and_chips_are_rejected(trained, light, chips, title):
     assert [word for word in MISTAKES["use"][title]["refused"] if word not in str(caught.value)] == []
 
 
+@pytest.mark.slow
 def test_learned_landscape_is_the_prior(tmp_path):
     konza = fifesim.ground.Landscape.read("konza")
     dense = konza.model_copy(update={"lai": tuple(2 * each for each in konza.lai)})
