@@ -1,15 +1,18 @@
-"""Maps of production, evapotranspiration and albedo: labels, weather and error messages."""
+"""Maps of production, evapotranspiration and albedo: labels, weather, sums over a day, and error messages."""
 
-import warnings
 from functools import partial
 
 import numpy as np
 import pytest
 import xarray as xr
 from lazy import check_raster_function, in_chunks
+from scipy.interpolate import PchipInterpolator
 
 import fifesim
-from fifesim.models import production
+from fifesim.chain.absorbed_light import PAR_BANDS, par_at_ground, sunlit_kernel
+from fifesim.chain.landscapes import Land, canopies_of
+from fifesim.models import evaporation, production
+from fifesim.models.daylight import Suns, declination
 from fifesim.models.radiation import two_stream
 
 WEATHER = fifesim.models.fife_weather()
@@ -20,16 +23,13 @@ def field(lai, low, high):
     return lai.copy(data=values).drop_attrs().rename("field")
 
 
-@pytest.mark.parametrize("model", ["light-use", "photosynthesis", "farquhar"])
-def test_production_is_a_raster_function(lai, model):
-    check_raster_function(lambda each: each.fifesim.gpp(model=model), lai, quantity="gpp")
-
-
-@pytest.mark.parametrize("model", ["penman-monteith", "pt-jpl"])
-def test_evapotranspiration_is_a_raster_function(lai, model):
-    warm = WEATHER.replace(temperature=field(lai, 290, 300))
-    verb = partial(fifesim.evapotranspiration, weather=warm, model=model)
-    check_raster_function(verb, lai, quantity="evapotranspiration")
+@pytest.mark.parametrize("verb", ["light-use", "photosynthesis", "farquhar", "penman-monteith", "pt-jpl", "albedo"])
+def test_models_are_raster_functions(lai, verb):
+    """Weather by cell."""
+    warm = {"weather": WEATHER.replace(temperature=field(lai, 290, 300)), "model": verb}
+    name = "evapotranspiration" if verb in ("penman-monteith", "pt-jpl") else "gpp"
+    function = fifesim.albedo if verb == "albedo" else partial(getattr(fifesim, name), **warm)
+    check_raster_function(function, lai, quantity="albedo" if verb == "albedo" else name)
 
 
 def test_light_use_map_equals_the_formula_at_each_cell(lai):
@@ -59,8 +59,6 @@ def test_pathway_is_c4_for_the_tallgrass_of_fife(lai):
     grass, c3 = lai.fifesim.gpp(model="farquhar"), lai.fifesim.gpp(model="farquhar", pathway="C3")
     np.testing.assert_array_equal(grass, lai.fifesim.gpp(model="farquhar", pathway="C4"))
     assert "C4" in grass.history and "C3" in c3.history and float(grass.mean()) > 1.2 * float(c3.mean())
-    with pytest.raises(ValueError, match="pathway has no effect with model='light-use'"):
-        lai.fifesim.gpp(pathway="C4")
 
 
 def test_albedo_equals_the_two_stream_model_of_each_band(lai):
@@ -71,101 +69,137 @@ def test_albedo_equals_the_two_stream_model_of_each_band(lai):
     # All bands have the same optics, so albedo lies between both values, closer to the value for the beam.
     assert ((made >= low - 1e-6) & (made <= high + 1e-6)).all()
     assert (abs(made - found.albedo_beam) <= abs(made - found.albedo_diffuse) + 2e-6).all()
-    check_raster_function(lambda each: each.fifesim.albedo(), lai, quantity="albedo")
-    with pytest.raises(ValueError, match="canopies that differ in leaf area only, got crown_cover"):
-        lai.fifesim.albedo(canopy=fifesim.Canopy(crown_cover=0.5))
 
 
-@pytest.mark.parametrize(
-    "change, message",
-    [
-        ({"temperature": 25.0}, r"temperature must be in \[150, 350\] K, got 25: degC was given for K: add 273.15"),
-        ({"humidity": 50.0}, "divide percent by 100"),
-        ({"pressure": 965.0}, "multiply hPa by 100, kPa by 1000"),
-    ],
-)
-def test_other_units_are_refused(lai, change, message):
-    with pytest.raises(ValueError, match=message):
-        WEATHER.replace(**change)
-    (name, value), *_ = change.items()
-    raster = xr.full_like(lai, value).drop_attrs()
-    with pytest.raises(ValueError, match=message):
-        WEATHER.replace(**{name: raster})
-    in_blocks = WEATHER.replace(**{name: in_chunks(raster, {"y": 9, "x": 9})})
-    lazy = in_chunks(lai, {"y": 9, "x": 9}).fifesim.evapotranspiration(in_blocks)
-    with pytest.raises(ValueError, match=message):
-        lazy.compute()
-
-
-def test_units_of_rasters_and_ranges_of_formulas_are_checked(lai):
-    celsius = xr.full_like(lai, 25.0).assign_attrs(units="degC")
-    with pytest.raises(ValueError, match="temperature has units 'degC', needs 'K'"):
+def test_weather_by_cell_is_checked_when_it_is_computed(lai):
+    chunks = {"y": 9, "x": 9}
+    celsius = xr.full_like(lai, 25.0).drop_attrs()
+    with pytest.raises(ValueError, match=r"temperature must be in \[150, 350\] K, got 25: degC was given for K"):
         WEATHER.replace(temperature=celsius)
-    with pytest.warns(UserWarning, match=r"temperature is 340 K.*hold from 228.15 to 333.15"):
-        WEATHER.replace(temperature=340.0, temperature_max=345.0)
-    with pytest.warns(UserWarning, match=r"shortwave is 29\.5 W m-2, .* not MJ m-2 d-1"):
-        WEATHER.replace(shortwave=29.5)
-    for name, value in (("shortwave", np.nan), ("day_length", np.inf)):
-        with pytest.raises(ValueError, match=f"{name} must be finite"):
-            WEATHER.replace(**{name: value})
+    cold = WEATHER.replace(temperature=field(lai, 280, 300))
+    messages = {"temperature must be in": WEATHER.replace(temperature=in_chunks(celsius, chunks))}
+    messages["temperature_min must not exceed temperature, got 289 and 28"] = cold
+    for message, weather in messages.items():
+        lazy = in_chunks(lai, chunks).fifesim.evapotranspiration(weather)
+        with pytest.raises(ValueError, match=message):
+            lazy.compute()
     with pytest.raises(ValueError, match="humidity must be finite"):
         WEATHER.replace(humidity=field(lai, 0, 1).where(lai > lai.min()))
-
-
-def test_weather_is_equal_by_value(lai):
-    moist, dry = field(lai, 0.5, 1), field(lai, 0, 0.5)
-    assert fifesim.models.fife_weather() == WEATHER and hash(fifesim.models.fife_weather()) == hash(WEATHER)
-    assert WEATHER.replace(humidity=moist) == WEATHER.replace(humidity=moist.copy())
-    assert WEATHER.replace(humidity=moist) != WEATHER.replace(humidity=dry) != WEATHER
-
-
-def test_contradictory_weather_is_rejected(lai):
-    for change in ({"temperature": 288.0}, {"temperature_max": 299.0}):
-        with pytest.raises(ValueError, match=r"must not exceed temperature.*, got (289|300) and (288|299) K"):
-            WEATHER.replace(**change)
-    cold = WEATHER.replace(temperature=field(lai, 280, 300))
-    with pytest.raises(ValueError, match="temperature_min must not exceed temperature, got 289 and 28"):
-        lai.fifesim.gpp(cold).compute()
-    shifted = WEATHER.replace(pressure=field(lai, 96000, 97000).assign_coords(x=lai.x + 30))
-    with pytest.raises(ValueError, match="'pressure' have different grids"):
-        lai.fifesim.evapotranspiration(shifted)
+    # FPAR of bare and almost bare ground is also a valid fraction.
+    assert all((area.fifesim.gpp() >= 0).all() for area in (0 * lai, 0 * lai + 1e-9))
     # Only light-use and Penman-Monteith need the minimum temperature.
     assert np.isfinite(lai.fifesim.gpp(cold, model="farquhar")).all()
 
 
-def test_given_fpar_is_a_fraction_and_must_have_an_effect(lai):
-    absorbed = field(lai, 0, 1)
-    for wrong in (100 * absorbed, -absorbed):
-        with pytest.raises(ValueError, match=r"fpar must be in \[0, 1\], got"):
-            lai.fifesim.evapotranspiration(fpar=wrong).compute()
-    with pytest.raises(ValueError, match="fpar has no effect with model='farquhar'"):
-        lai.fifesim.gpp(fpar=absorbed, model="farquhar")
-    for what, given in (("canopy", fifesim.Canopy(brown=0.5)), ("atmosphere", fifesim.Atmosphere(visibility=20.0))):
-        for verb in (fifesim.gpp, fifesim.evapotranspiration):
-            with pytest.raises(ValueError, match=f"{what} has no effect with fpar, .*leave out one of them"):
-                verb(lai, fpar=absorbed, **{what: given})
-    # FPAR of bare and almost bare ground is also a valid fraction.
-    for area in (0 * lai, 0 * lai + 1e-9):
-        assert (area.fifesim.gpp() >= 0).all()
+AREAS = np.array([0.1, 0.25, 0.5, 0.74, 1.0, 1.41, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0])
+AIR = fifesim.Atmosphere()
+CANOPY = fifesim.Canopy(leaf_optics=fifesim.Leaf(), background=0.2)
+NOON = {"2022-03-20": 0.0, "2022-06-21": 23.44, "2022-10-15": -8.5, "2022-12-21": -23.44}
+FLUXES = {
+    "light-use": ("gpp", {}),
+    "photosynthesis": ("gpp", {}),
+    "C3": ("gpp", {"model": "farquhar", "pathway": "C3"}),
+    "C4": ("gpp", {"model": "farquhar", "pathway": "C4"}),
+    "penman-monteith": ("evapotranspiration", {}),
+    "pt-jpl": ("evapotranspiration", {}),
+}
 
 
-def test_weather_and_leaves_of_another_site_are_asked_for():
-    """Each argument that is given ends its warning; the energy balance needs the leaves, FPAR of a map does not."""
-    grid = fifesim.grid_at("EPSG:32633", 390000, 5820000, width=300, height=300, cell=30)
-    lai = fifesim.lai_scene(grid, seed=7)
-    sun, air = fifesim.Geometry(sza=40, saa=150), fifesim.Atmosphere(altitude=0.1)
-    canopy = fifesim.Canopy(leaf_optics=fifesim.Leaf(), background=0.2)
-    verb = partial(lai.fifesim.evapotranspiration, atmosphere=air, geometry=sun)
-    with pytest.warns(UserWarning, match=r"weather over lai is unknown.*June.*300 K.*weather=fifesim\.models\.Weather"):
-        verb(canopy=canopy)
-    for model in ("light-use", "farquhar"):
-        with pytest.warns(UserWarning, match=r"weather over lai is unknown"):
-            lai.fifesim.gpp(model=model, geometry=sun, canopy=canopy, atmosphere=air)
-    for leaves in (verb, lambda **options: lai.fifesim.light(atmosphere=air, geometry=sun)):
-        with pytest.warns(UserWarning, match=r"vegetation of lai is unknown.*FIFE's tallgrass.*leaf_optics=") as found:
-            leaves(weather=WEATHER)
-        assert len(found) == 1
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", UserWarning)
-        verb(weather=WEATHER, canopy=canopy)
-        lai.fifesim.evapotranspiration(WEATHER, fpar=0.1 * lai.rename("fpar"), geometry=sun)
+def raster(latitude, values=AREAS):
+    """Leaf area in UTM zone 33 at a latitude, and this latitude."""
+    grid = fifesim.grid_at("EPSG:32633", 500000, 110900.0 * latitude, 30 * len(values), 30, 30)
+    lai = fifesim.lai_scene(grid, seed=7).copy(data=np.reshape(values, (1, -1)))
+    return lai, float(fifesim.grids.projection.middle(grid)[1])
+
+
+@pytest.fixture(scope="module")
+def absorbed():
+    """FPAR of the leaf areas, and photon flux and its diffuse fraction, by zenith angle of the sun."""
+    angles = np.array([*range(0, 76, 5), *np.arange(77, 90, 2.0), 89.9])
+    stand = canopies_of(Land(None), PAR_BANDS, CANOPY)[None]
+    kernel, rasters = sunlit_kernel(None, stand, AIR, tuple(angles.tolist()), "green")
+    fpar = PchipInterpolator(angles, kernel(AREAS, *(each.values for each in rasters)))
+    light = [(flux.sum(), flux @ sky / flux.sum()) for flux, sky in (par_at_ground(AIR, each) for each in angles)]
+    return fpar, PchipInterpolator(angles, light)
+
+
+def fluxes(lai, fpar, sza, weather, light, sky):
+    """Production [g m-2 s-1] and evapotranspiration [kg m-2 s-1] at one sun, by the formulas."""
+    mean, photons = 0.45 * weather.shortwave * light, 4.57 * 0.45 * weather.shortwave * light
+    deficit = evaporation.saturation_pressure(weather.temperature)[0] * (1 - weather.humidity)
+    heat = evaporation.latent_heat(weather.temperature)
+    air = weather.temperature, 100 * weather.humidity, weather.pressure
+    net, soil = light * weather.net_radiation, light * weather.ground_heat
+    carbon, light_and_heat = production.CARBON, (lai, photons, sky, sza, weather.temperature)
+    return {
+        "light-use": production.light_use_gpp(weather.temperature_min - 273.15, deficit, fpar, 1e-6 * mean),
+        "photosynthesis": carbon
+        * production.canopy_photosynthesis(lai, 0.5 / np.cos(np.radians(sza)), photons, 0.05, 30.0),
+        "C3": carbon * production.farquhar_canopy(*light_and_heat),
+        "C4": carbon * production.c4_canopy(*light_and_heat, pressure_pa=weather.pressure),
+        "penman-monteith": evaporation.penman_monteith(*air, lai, fpar, net, weather.temperature_min).le / heat,
+        "pt-jpl": evaporation.pt_jpl(*air, 0.8 * fpar + 0.17, 0.94, lai, net, soil).le / heat,
+    }
+
+
+@pytest.mark.parametrize("date", NOON)
+@pytest.mark.parametrize("latitude", [0.5, 39.0, 60.0])
+def test_day_equals_the_sum_over_144_steps(absorbed, latitude, date):
+    lai, north = raster(latitude)
+    phi, delta = np.radians([north, NOON[date]])
+    sunset = np.arccos(-np.tan(phi) * np.tan(delta))
+    angle = sunset * (2 * (np.arange(144) + 0.5) / 144 - 1)
+    sza = np.degrees(np.arccos(np.sin(phi) * np.sin(delta) + np.cos(phi) * np.cos(delta) * np.cos(angle)))
+    weather = WEATHER.replace(day_length=24 / np.pi * sunset)
+    (flux, sky), fpar = absorbed[1](sza).T, absorbed[0](sza)
+    flux = flux * np.cos(np.radians(sza))
+    light, sky = flux / flux.mean(), weather.diffuse_fraction * sky * flux.sum() / (sky @ flux)
+    steps = [fluxes(AREAS, *each[:2], weather, *each[2:]) for each in zip(fpar, sza, light, sky, strict=True)]
+    noon = fifesim.Geometry(abs(north - NOON[date]), 180.0 if north > NOON[date] else 0.0)
+    for name, (verb, options) in FLUXES.items():
+        given = {"model": name, "canopy": CANOPY, "atmosphere": AIR, "geometry": noon} | options
+        day = getattr(lai.fifesim, verb)(weather, **given)
+        total = 3600 * weather.day_length * np.mean([each[name] for each in steps], axis=0)
+        np.testing.assert_allclose(day.values[0], total, rtol=5e-3, err_msg=name)
+
+
+def test_instant_is_a_flux_and_a_date_is_a_day(absorbed):
+    lai, _ = raster(39.0)
+    given = {"canopy": CANOPY, "atmosphere": AIR, "weather": WEATHER}
+    day = lai.assign_coords(time=np.datetime64("2022-06-21")).fifesim.gpp(**given)
+    times = [f"2022-06-21T{hour:02d}:30Z" for hour in range(4, 18)]
+    instants = [lai.fifesim.gpp(**given, time=time) for time in times]
+    assert day.attrs["units"] == "g m-2 d-1" and instants[0].attrs["units"] == "g m-2 s-1"
+    np.testing.assert_allclose(3600 * sum(each.values for each in instants), day.values, rtol=0.01)
+    # Weather by cell leads to the same sum without a table.
+    cells = given["weather"].replace(temperature=(0 * lai + 300.0).drop_attrs().rename("temperature"))
+    by_cell = lai.assign_coords(time=np.datetime64("2022-06-21")).fifesim.gpp(**given | {"weather": cells})
+    np.testing.assert_allclose(by_cell, day, rtol=1e-4)
+
+
+def test_polar_night_is_zero_and_polar_day_has_24_hours():
+    lai, _ = raster(75.0, [np.nan, 0.5, 3.0])
+    given = {"canopy": CANOPY, "atmosphere": AIR, "weather": WEATHER.replace(day_length=24.0)}
+    with pytest.warns(UserWarning, match="does not rise on this day: gpp is 0"):
+        night = lai.assign_coords(time=np.datetime64("2022-12-21T12:00")).fifesim.gpp(**given)
+    np.testing.assert_array_equal(night.values[0], [np.nan, 0.0, 0.0])
+    with pytest.warns(UserWarning, match="below the horizon, sza 112.4"):
+        assert (lai.fifesim.evapotranspiration(**given, time="2022-03-01T00:00Z").values[0, 1:] == 0).all()
+    summer = lai.assign_coords(time=np.datetime64("2022-06-21T12:00")).fifesim.gpp(**given)
+    assert "24.00 h" in summer.history and summer.values[0, 2] > summer.values[0, 1] > 0
+    with pytest.warns(UserWarning, match="day_length 14.9 h, but the sun is over .* for 24.0 h"):
+        lai.fifesim.gpp(**given | {"weather": WEATHER}, time="2022-06-21T12:00Z")
+
+
+def test_declination_follows_from_the_sun_of_any_time():
+    for time in ("2022-06-21T09:14Z", "2022-10-15T14:00Z"):
+        sun = fifesim.sun_position(time, 45.0, 10.0)
+        assert declination(sun.sza, sun.saa, 45.0) == pytest.approx(23.44 if "06" in time else -8.6, abs=0.1)
+    with pytest.warns(UserWarning, match="never stands at sza 10 and saa 0 over latitude 39"):
+        assert declination(10.0, 0.0, 39.0) == 23.45
+
+
+def test_diffuse_fraction_keeps_the_mean_of_the_day():
+    day = Suns((20.0, 70.0), (0.6, 0.4), (1.3, 0.55), (0.1, 0.4), 0.6 * 1.3 * 0.1 + 0.4 * 0.55 * 0.4, 12.0)
+    for given in (0.0, 0.1, 0.5, 1.0):
+        assert day.weighted([day.diffuse_fraction(n, given) for n in (0, 1)]) == pytest.approx(given, rel=1e-12)
