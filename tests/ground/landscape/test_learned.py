@@ -183,22 +183,6 @@ def test_conditioned_cells_are_unknown_where_the_elevation_is(hills):
     np.testing.assert_allclose(means, pixels.where(np.isfinite(means)), rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda pixels, dem: (pixels + 6.0, dem), "cannot have: mask such pixels, or learn the landscape"),
-        (lambda pixels, dem: (pixels.assign_coords(x=pixels["x"] + 9000.0), dem), "the map does not overlap the grid"),
-        (lambda pixels, dem: (pixels, dem[:150]), "give an elevation that covers the grid"),
-        (lambda pixels, dem: (pixels * 100, dem), "where the numbers are scaled, type lai"),
-        (lambda pixels, dem: (KONZA.simulate(GRID)["lai"], dem), "a pixel must be a whole number of cells, 2 or more"),
-    ],
-)
-def test_maps_that_cannot_be_conditioned(hills, change, words):
-    image, dem = change(KONZA.simulate(GRID, seed=1)["lai"].fifesim.aggregate(30), hills)
-    with pytest.raises(ValueError, match=words):
-        KONZA.condition(image, GRID, dem)
-
-
 @pytest.fixture(scope="module")
 def large():
     grid = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 3000.0, 3000.0, 10.0)
@@ -300,49 +284,6 @@ def test_files(tmp_path):
         fifesim.ground.Landscape.read(path)
 
 
-def test_description_prints_in_ten_lines():
-    text = str(KONZA)
-    assert len(text.splitlines()) <= 10
-    assert "Copernicus Sentinel data 2022" in text
-
-
-def _map(values, name="lai"):
-    grid = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 10.0 * values.shape[1], 10.0 * values.shape[0], 10.0)
-    return grids.place(xr.DataArray(values, dims=("y", "x"), name=name), grid)
-
-
-_FIELD = np.random.default_rng(0).uniform(0.3, 0.8, (60, 60))
-
-
-@pytest.mark.parametrize(
-    ("image", "options", "words"),
-    [
-        (_map(_FIELD[:20]), {}, "1200 known cells, at least 2000"),
-        (_map(_FIELD, "red"), {}, "quantity of image 'red' is unknown"),
-        (_map(_FIELD * 1e4, "ndvi"), {}, "apply its scale"),
-        (_map(_FIELD, "ndvi"), {}, "needs instrument and geometry"),
-        (_map(_FIELD * 0.01), {}, "give a map of a date with leaves"),
-    ],
-)
-def test_maps_that_cannot_be_learned(image, options, words):
-    with pytest.raises(ValueError, match=words):
-        fifesim.learn_landscape(image, **options)
-
-
-def test_elevation_elsewhere():
-    far = _map(_FIELD).assign_coords(x=lambda each: each["x"] + 5000.0)
-    with pytest.raises(ValueError, match="dem does not overlap the grid"):
-        fifesim.learn_landscape(_map(_FIELD), far.rename("dem"))
-    with pytest.raises(ValueError, match="give an elevation that covers the grid"):
-        KONZA.simulate(GRID, far)
-
-
-def test_saturated_ndvi_warns():
-    geometry = fifesim.Geometry(sza=25, saa=140)
-    with pytest.warns(UserWarning, match="NDVI is saturated in"):
-        fifesim.learn_landscape(_map(0.2 * _FIELD + 0.78, "ndvi"), instrument="MSI", geometry=geometry)
-
-
 def test_terrain_beyond_the_learned_range_warns(hills):
     with pytest.warns(UserWarning, match="of the cells are higher, lower or steeper"):
         land = KONZA.simulate(GRID, hills + 500.0)
@@ -354,29 +295,10 @@ def test_terrain_beyond_the_learned_range_warns(hills):
     assert KONZA.simulate(GRID, just_above - 2.0)["lai"].attrs["beyond_learned"] == 0.0
 
 
-def test_elevation_of_a_landscape_that_was_learned_without_one(hills):
-    flat = KONZA.model_copy(update={"terrain": (), "beds": None, "residual": (), "properties": {}})
-    with pytest.raises(ValueError, match="learned without an elevation"):
-        flat.simulate(GRID, hills)
-
-
 def test_lazy_elevation_is_not_computed(hills):
     with no_compute():
         land = KONZA.simulate(GRID, hills.chunk({"y": 100, "x": 100}))
     assert "beyond_learned" not in land["lai"].attrs
-
-
-def test_cells_that_lose_the_forms_of_the_land():
-    with pytest.warns(UserWarning, match="larger than twice the 10 m of the learned map"):
-        KONZA.simulate(fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 900.0, 900.0, 30.0))
-    with pytest.raises(ValueError, match="give a grid of square cells"):
-        KONZA.simulate(fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 900.0, 900.0, (10.0, 15.0)))
-
-
-def test_maps_are_compared_on_the_cells_of_the_elevation():
-    here = _map(_FIELD)
-    with pytest.raises(ValueError, match="different grids"):
-        fifesim.ground.compare_landscapes(here, here, here.assign_coords(x=here["x"] + 5000.0))
 
 
 def test_normal_scores_are_zero_where_unknown():
