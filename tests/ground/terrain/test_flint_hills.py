@@ -13,7 +13,7 @@ from fifesim.grids import grid as grids
 from fifesim.grids.grid import as_carried
 from fifesim.ground.terrain import flint_hills
 from fifesim.ground.terrain import labels as terrain_labels
-from fifesim.ground.terrain.flint_hills import BASE, NODES, SADDLE, StreamPower, erode, least_ways, upland
+from fifesim.ground.terrain.flint_hills import BASE, NODES, SADDLE, upland
 from fifesim.ground.terrain.labels import light_on_slopes
 from fifesim.ground.terrain.sky_labels import horizon
 from fifesim.ground.terrain.source_labels import beside_altitude
@@ -164,103 +164,6 @@ def test_elevation_around_equals_the_elevation_of_its_cells():
     found = flint_hills.elevation_around(5, (30.0, 29.6), row, column, (20, 30))
     northing, easting = -30.0 * (row + np.arange(20) + 0.5), 29.6 * (column + np.arange(30) + 0.5)
     np.testing.assert_array_equal(found, flint_hills.hills_elevation(5, northing, easting))
-
-
-LAW = StreamPower(steps=50, area_exponent=0.5, uplift=30.0, creep=0.0, node=25.0)
-
-
-def without_preference(size):
-    return np.ones((8, size * size))
-
-
-def test_least_cost_paths():
-    """Uniform cost: distance to the border. From the centre of a ring of high cost: through its only gap."""
-    i, j = np.indices((11, 11))
-    found = least_ways(np.full((11, 11), 2.5))
-    np.testing.assert_allclose(found, 2.5 * np.minimum(np.minimum(i, 10 - i), np.minimum(j, 10 - j)), rtol=1e-13)
-    cost = np.ones((9, 9))
-    cost[2:7, 2:7], cost[3:6, 3:6], cost[2, 4] = 1e3, 1.0, 1.0
-    assert least_ways(cost)[4, 4] == pytest.approx(4.0)
-
-
-def test_ground_without_erosion_rises_by_its_uplift():
-    """The border stays."""
-    start = np.random.default_rng(1).uniform(300, 310, (12, 12))
-    found = erode(start, np.zeros_like(start), without_preference(12), LAW)
-    expected = start.copy()
-    expected[1:-1, 1:-1] += 30.0
-    np.testing.assert_allclose(found, expected, rtol=1e-13)
-
-
-def test_creep_without_streams_is_diffusion():
-    """A wave with fixed borders decays as exp(-2 D k**2 t); explicit steps are accurate to 0.1 %."""
-    size, law = 41, LAW._replace(uplift=0.0, creep=2000.0)
-    across = np.sin(np.pi * np.arange(size) / (size - 1))
-    wave = across[:, None] * across
-    k = np.pi / ((size - 1) * law.node)
-    found = erode(100 + wave, np.zeros((size, size)), without_preference(size), law)
-    np.testing.assert_allclose(found - 100, wave * np.exp(-2 * law.creep * k**2), rtol=0, atol=1e-3)
-    # Far from the border, creep does not change the uplift, also in parts of a step.
-    size, law = 81, LAW._replace(creep=20_000.0)
-    risen = erode(np.full((size, size), 100.0), np.zeros((size, size)), without_preference(size), law)
-    assert risen[40, 40] == pytest.approx(130.0, abs=1e-3)
-
-
-def test_ridge_is_eroded_by_one_implicit_step():
-    """Each line drains from the ridge to its ends, so drained area grows by one node per node."""
-    size, law, rock = 9, LAW._replace(steps=1, uplift=0.0), 0.02
-    ridge = np.tile(10.0 * (4 - np.abs(np.arange(size) - 4)), (size, 1))
-    found = erode(ridge, np.full((size, size), rock), without_preference(size), law)
-    below = 0.0
-    for column, nodes in zip((1, 2, 3, 4), (4, 3, 2, 1), strict=True):
-        factor = rock * np.sqrt(nodes * law.node**2) / law.node
-        below = (10.0 * column + factor * below) / (1 + factor)
-        assert found[4, column] == pytest.approx(below, rel=1e-12)
-
-
-def test_water_flows_to_the_preferred_neighbour():
-    """On a plane that falls to the east, the weight of the north-eastern neighbour is larger."""
-    size, law = 7, LAW._replace(steps=1, uplift=0.0)
-    plane = np.tile(-10.0 * np.arange(size), (size, 1))
-    preference = without_preference(size)
-    preference[2] = 2.0  # north-east is the third of eight neighbours, counted by row from the north-west
-    found = erode(plane, np.full((size, size), 0.02), preference, law)
-    factor = 0.02 * law.node / (law.node * np.sqrt(2))
-    # The corner node drains to the border, and nothing through it.
-    assert found[5, 1] == pytest.approx((plane[5, 1] + factor * found[4, 2]) / (1 + factor), rel=1e-12)
-
-
-def test_drained_area_sums_over_tributaries():
-    """Two lines of different length meet in a third; the area counts all nodes, not the longest path."""
-    size, law, rock = 9, LAW._replace(steps=1, uplift=0.0), 0.02
-    ground = np.full((size, size), 100.0)
-    ground[:, 0] = 0.0
-    # Water flows along row 4; three nodes of column 4 from the north and one from the south flow into it.
-    ground[4, 1:5] = [10.0, 20.0, 30.0, 40.0]
-    ground[1:4, 4] = [70.0, 60.0, 50.0]
-    ground[5, 4] = 55.0
-    found = erode(ground, np.full((size, size), rock), without_preference(size), law)
-    drained = _drained_by_hand(ground, law.node)
-    factor = rock * np.sqrt(drained[4, 1] * law.node**2) / law.node
-    assert drained[4, 1] > 8
-    assert found[4, 1] == pytest.approx((10.0 + factor * 0.0) / (1 + factor), rel=1e-12)
-
-
-def _drained_by_hand(ground, node):
-    """Number of nodes that drain through each node, by following the path of each node."""
-    size, drained = ground.shape[0], np.zeros(ground.shape, int)
-    around = [(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1) if a or b]
-    for i in range(1, size - 1):
-        for j in range(1, size - 1):
-            y, x = i, j
-            while 0 < y < size - 1 and 0 < x < size - 1:
-                drained[y, x] += 1
-                falls = [(ground[y, x] - ground[y + a, x + b]) / (node * np.hypot(a, b)) for a, b in around]
-                if max(falls) <= 0:
-                    break
-                a, b = around[int(np.argmax(falls))]
-                y, x = y + a, x + b
-    return drained
 
 
 def test_uplands_are_cached_and_higher_than_the_rivers_at_their_edges():
