@@ -13,7 +13,7 @@ import fifesim
 from fifesim.grids import cf
 from fifesim.grids import grid as grids
 from fifesim.ground.landscape.downscaling import kriging_block_means
-from fifesim.ground.landscape.downscaling_labels import PIXEL_MARGIN, PixelReads, pixel_lattice
+from fifesim.ground.landscape.downscaling_labels import pixel_lattice
 
 # The map crosses the edge of two tiles of 504 cells.
 SOURCE = fifesim.grid_at("EPSG:32614", 1680 * 400 - 300, 1680 * 2600 - 200, 700, 500, 10)
@@ -72,21 +72,16 @@ def test_scene_has_the_same_bits_in_any_chunks(scene, lai_map, chunks):
 
 @pytest.mark.parametrize(("arp", "short"), [(0.15, False), (0.24, True)])
 def test_variation_below_the_requested_one_causes_a_warning(arp, short):
-    """At a high arp, the texture of the map leaves less variation for the cells."""
+    """At a high arp, the texture of the map leaves less variation for the cells; by whole pixels of the grid."""
     coarse = fifesim.lai_scene(fifesim.fife_site(10, window=((0, 80), (0, 90))), "burned-ungrazed", arp=0.24, seed=7)
-    grid = fifesim.fife_site(10 / 3, window=((0, 240), (0, 270)))
-    for chunks in (None, 120):
-        with warnings.catch_warnings(record=True, action="always", category=UserWarning) as caught:
-            cells = fifesim.ground.downscale(coarse, grid, cv=0.4, arp=arp, seed=1, chunks=chunks).compute()
-        assert any("cv=0.4 was requested" in str(each.message) for each in caught) == short
-        blocks = cells.values.reshape(80, 3, 90, 3)
-        realised = np.sqrt(np.mean(blocks.var(axis=(1, 3)) / blocks.mean(axis=(1, 3)) ** 2))
-        if chunks is None:
-            np.testing.assert_allclose(cells.attrs["cv_within_pixels"], realised, rtol=1e-12)
-    part = fifesim.ground.downscale(coarse, grid[1:, 2:], cv=0.3, arp=0.1, seed=1)
-    inside = part.values[2:, 1:].reshape(79, 3, 89, 3)
+    grid = fifesim.fife_site(10 / 3, window=((1, 240), (2, 270)))
+    with warnings.catch_warnings(record=True, action="always", category=UserWarning) as caught:
+        cells = fifesim.ground.downscale(coarse, grid, cv=0.4, arp=arp, seed=1)
+        fifesim.ground.downscale(coarse, grid, cv=0.4, arp=arp, seed=1, chunks=120).compute()
+    assert sum("cv=0.4 was requested" in str(each.message) for each in caught) == 2 * short
+    inside = cells.values[2:, 1:].reshape(79, 3, 89, 3)
     realised = np.sqrt(np.mean(inside.var(axis=(1, 3)) / inside.mean(axis=(1, 3)) ** 2))
-    np.testing.assert_allclose(part.attrs["cv_within_pixels"], realised, rtol=1e-12)
+    np.testing.assert_allclose(cells.attrs["cv_within_pixels"], realised, rtol=1e-12)
 
 
 def test_window_within_a_pixel_equals_a_slice_and_cells_outside_the_map_are_nan(scene, lai_map):
@@ -176,26 +171,12 @@ def test_scaled_integers_and_rows_from_south_to_north_are_accepted(lai_map, scen
     np.testing.assert_allclose(cells, scene, rtol=0.02, atol=1e-3)
 
 
-PIXELS = fifesim.grid_at("EPSG:32614", 699960, 4400040, 1000, 800, 10)
-ONES = grids.place(xr.DataArray(np.ones(PIXELS.shape), dims=("y", "x"), name="lai"), PIXELS)
-
-
-def test_tiles_hold_whole_pixels_and_start_at_the_origin_of_the_crs():
-    lattice = pixel_lattice(ONES, PIXELS.zoom_out(1 / 3))
-    assert lattice.ratio == (3, 3) and lattice.tile == 504 and lattice.pixels == (168, 168)
-    assert lattice.pixel == (-440004, 69996) and lattice.cell == (-440004 * 3, 69996 * 3)
-    assert lattice.shift == (0, 0)
-    tiles = lattice.tiles(slice(0, 240), 0)
-    assert tiles.start * 504 <= -440004 * 3 and tiles.stop * 504 >= -440004 * 3 + 240 and len(tiles) <= 2
-    window = PixelReads(np.ones(PIXELS.shape), lattice).window(slice(0, 240), slice(0, 300))[0]
-    assert window.start == tiles.start * 168 - PIXEL_MARGIN + 440004
-    assert window.stop == tiles.stop * 168 + PIXEL_MARGIN + 440004
-
-
 @pytest.mark.parametrize("cells, tile", [((2, 3), 504), ((7, 7), 504), ((100, 100), 800)])
 def test_tiles_hold_at_least_8_pixels_of_any_size(cells, tile):
+    source = fifesim.grid_at("EPSG:32614", 699960, 4400040, 1000, 1000, 10)
+    pixels = grids.place(xr.DataArray(np.ones((100, 100)), dims=("y", "x"), name="lai"), source)
     grid = fifesim.grid_at("EPSG:32614", 699960, 4400040, 1000, 1000, (10 / cells[0], 10 / cells[1]))
-    lattice = pixel_lattice(ONES, grid)
+    lattice = pixel_lattice(pixels, grid)
     assert lattice.ratio == cells and lattice.tile == tile
     assert all(count * number == tile and count >= 8 for count, number in zip(lattice.pixels, cells, strict=True))
 

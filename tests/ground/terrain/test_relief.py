@@ -103,29 +103,17 @@ def test_horizon_agrees_with_ray_marching(cells):
 
 
 def test_horizon_is_exact_along_axes_and_diagonals():
+    """Also across a gap, which hides no sky."""
     dem, azimuths = hills((40, 40), seed=4), np.arange(8) * 45.0
+    dem[[24, 14], [17, 24]] = np.nan
     found = tangents_of(dem, 10.0, 10.0, azimuths, 200.0)
     for direction, (down, right) in enumerate([(-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1)]):
         expected, row, column = 0.0, 21, 17
         for k in range(1, 21):
             i, j, distance = row + k * down, column + k * right, 10.0 * k * np.hypot(down, right)
-            if 0 <= i < 40 and 0 <= j < 40 and distance <= 200 + 1e-9:
+            if 0 <= i < 40 and 0 <= j < 40 and distance <= 200 + 1e-9 and np.isfinite(dem[i, j]):
                 expected = max(expected, (dem[i, j] - dem[row, column]) / distance)
         assert found[direction, row, column] == pytest.approx(expected, abs=1e-14)
-
-
-def test_wall_is_visible_up_to_the_reach():
-    """Distant samples are up to 1/32 of the distance apart; gaps and the edge hide no sky."""
-    dem = np.zeros((3, 200))
-    dem[:, 150:] = 10.0
-    dem[:, 146] = np.nan
-    found = tangents_of(dem, 3.0, 3.0, [90.0, 270.0, 0.0], 150.0)
-    distance = (150 - np.arange(200)) * 3.0
-    seen = (distance > 0) & (distance <= 150) & (np.arange(200) != 146)
-    np.testing.assert_allclose(found[0, 1][seen], 10.0 / distance[seen], rtol=1 / 31)
-    near = seen & (distance <= 31 * 3)
-    np.testing.assert_allclose(found[0, 1][near], 10.0 / distance[near], rtol=1e-12)
-    assert (found[0, 1][~seen] == 0).all() and (found[1:] == 0).all()
 
 
 def test_horizon_has_the_same_bits_in_every_window():
@@ -198,47 +186,20 @@ def test_length_of_the_shadow_of_a_plateau(elevation, oblique, turn):
     assert np.diff(line.astype(int)).clip(0).sum() == 1  # one run
 
 
-def pit(depth, size=121, radius=100.0):
-    """Pit of a sphere: elevation, size of cells, and distance from the centre over the radius of the rim."""
+def test_light_that_enters_a_pit_is_conserved():
+    """For rho = 0, Kt times the area of the walls sums to the light that passes the opening of a part of a sphere."""
+    radius, depth, size = 100.0, 0.4, 121
     rim = radius * np.sqrt(depth * (2 - depth))
     cell = 2.4 * rim / size
-    y, x = (np.mgrid[:size, :size] - size // 2) * cell
-    wall = radius * (1 - depth) - np.sqrt(np.maximum(radius**2 - x**2 - y**2, 0))
-    return np.minimum(np.where(np.hypot(x, y) < rim, wall, 0.0), 0.0), cell, np.hypot(x, y) / rim
-
-
-@pytest.mark.parametrize("depth", [0.2, 0.8])
-def test_sky_factor_and_terrain_view_in_a_spherical_pit(depth):
-    """In a pit of a sphere of radius R, Vd = 1 - depth / 2R everywhere, since entering light is spread evenly."""
-    dem, cell, distance = pit(depth, 321)
-    light, inside = light_of(dem, cell, Geometry(30.0, 0.0), 210.0), distance < 0.7
-    np.testing.assert_allclose(light.sky_view[inside].mean(), 1 - depth / 2, rtol=5e-3)
-    # Cells approximate the rim, which matters for single directions.
-    np.testing.assert_allclose(light.sky_view[inside], 1 - depth / 2, rtol=0.012)
-    # Ct of Eq. 4 equals the part of the sky above the plane of the slope that terrain hides.
-    view = horizon_terrain_view(light.sky_view, light.cosine)
-    np.testing.assert_allclose(view[inside], ((1 + light.cosine) / 2)[inside] - 1 + depth / 2, atol=0.012)
-
-
-def test_light_that_enters_a_pit_is_conserved():
-    """For rho = 0, Kt times the area of the walls sums to the light that passes the opening."""
-    dem, cell, distance = pit(0.4)
-    opening = np.pi * (121 * cell / 2.4) ** 2
+    distance = np.hypot(*(np.mgrid[:size, :size] - size // 2)) * cell
+    dem = np.where(distance < rim, radius * (1 - depth) - np.sqrt(np.maximum(radius**2 - distance**2, 0)), 0.0)
+    opening = np.pi * rim**2
     for geometry in (Geometry(20.0, 30.0), Geometry(50.0, 200.0), Geometry(70.0, 310.0)):
         light = light_of(dem, cell, geometry)
         # Cells approximate the rim: 2 % of the opening is within half a cell of it.
         for direct in (0.0, 0.5, 0.9):
             flux = kt_of(light, 0.0, geometry, direct) * cell**2 / light.cosine
-            assert flux[distance < 1].sum() == pytest.approx(opening, rel=0.02)
-
-
-def test_rotating_terrain_and_directions_rotates_the_light():
-    dem = hills((41, 41), seed=3, relief=60.0)
-    before = light_of(dem, 10.0, Geometry(60.0, 35.0, 25.0, 290.0))
-    # `rot90` rotates counterclockwise, from east to north: azimuths decrease by 90 degrees.
-    after = light_of(np.rot90(dem), 10.0, Geometry(60.0, 305.0, 25.0, 200.0))
-    np.testing.assert_allclose(np.rot90(before, axes=(1, 2)), after, rtol=0, atol=1e-9)
-    assert before.sky_view.std() > 1e-3 and (before.mu_s_local == 0).any()
+            assert flux[distance < rim].sum() == pytest.approx(opening, rel=0.02)
 
 
 @pytest.mark.parametrize("upwelling", [True, False])
