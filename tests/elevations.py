@@ -60,12 +60,6 @@ def labelled(grid, values=None, **attrs):
     return grids.place(xr.DataArray(values, dims=("y", "x"), name="dem", attrs={"units": "m"} | attrs), grid)
 
 
-def plane_gradient(slope, aspect):
-    """Rise eastward and northward of a plane that falls by a slope toward an aspect [degree]."""
-    steep, azimuth = np.tan(np.radians(slope)), np.radians(aspect)
-    return -steep * np.sin(azimuth), -steep * np.cos(azimuth)
-
-
 def plane(shape, cell_y, cell_x, slope, aspect):
     """Elevation of a plane that falls by a slope toward an aspect [degree]."""
     i, j = np.mgrid[: shape[0], : shape[1]].astype(float)

@@ -3,7 +3,6 @@
 import re
 import warnings
 
-import dask.array as da
 import numpy as np
 import pytest
 import xarray as xr
@@ -13,7 +12,6 @@ import fifesim
 from fifesim.grids import cf
 from fifesim.grids import grid as grids
 from fifesim.ground.landscape.downscaling import kriging_block_means
-from fifesim.ground.landscape.downscaling_labels import pixel_lattice
 
 # The map crosses the edge of two tiles of 504 cells.
 SOURCE = fifesim.grid_at("EPSG:32614", 1680 * 400 - 300, 1680 * 2600 - 200, 700, 500, 10)
@@ -102,21 +100,6 @@ def test_tiles_have_no_seams(lai_map):
     np.testing.assert_allclose(there.values, here.values, rtol=1e-4)
 
 
-def test_only_the_needed_part_of_a_map_is_read(lai_map):
-    large = fifesim.grid_at("EPSG:32614", 168 * 10 * 400, 168 * 10 * 2600, 10080, 10080, 10)
-    read = []
-
-    def block(block_info=None):
-        read.append(block_info[None]["chunk-location"])
-        return np.full(block_info[None]["chunk-shape"], 1.5)
-
-    lazy = da.map_blocks(block, chunks=((168,) * 6,) * 2, dtype=float, meta=np.empty((0, 0)))
-    pixels = grids.place(xr.DataArray(lazy, dims=("y", "x"), name="lai"), large)
-    cells = fifesim.ground.downscale(pixels, large.zoom_out(1 / 3), chunks=504)
-    cells[504 * 2 + 5 : 504 * 2 + 9, 504 * 3 + 5 : 504 * 3 + 9].compute()
-    assert sorted(set(read)) == [(i, j) for i in (1, 2, 3) for j in (2, 3, 4)]
-
-
 def test_dates_are_downscaled_one_by_one(lai_map):
     days = xr.Variable("time", np.array(["2022-06-03", "2022-07-03"], "M8[ns]"))
     cube = xr.concat([lai_map, 2 * lai_map], dim=days)
@@ -169,16 +152,6 @@ def test_scaled_integers_and_rows_from_south_to_north_are_accepted(lai_map, scen
     cells = packed[::-1].fifesim.downscale(GRID, arp=0.2, cv=0.3, seed=7)
     np.testing.assert_allclose(means(cells), np.round(lai_map, 3), rtol=1e-9)
     np.testing.assert_allclose(cells, scene, rtol=0.02, atol=1e-3)
-
-
-@pytest.mark.parametrize("cells, tile", [((2, 3), 504), ((7, 7), 504), ((100, 100), 800)])
-def test_tiles_hold_at_least_8_pixels_of_any_size(cells, tile):
-    source = fifesim.grid_at("EPSG:32614", 699960, 4400040, 1000, 1000, 10)
-    pixels = grids.place(xr.DataArray(np.ones((100, 100)), dims=("y", "x"), name="lai"), source)
-    grid = fifesim.grid_at("EPSG:32614", 699960, 4400040, 1000, 1000, (10 / cells[0], 10 / cells[1]))
-    lattice = pixel_lattice(pixels, grid)
-    assert lattice.ratio == cells and lattice.tile == tile
-    assert all(count * number == tile and count >= 8 for count, number in zip(lattice.pixels, cells, strict=True))
 
 
 @pytest.mark.parametrize("cv", [0.4, lambda mean: 0.4 + 0 * mean], ids=["number", "function"])

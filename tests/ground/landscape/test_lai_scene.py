@@ -7,7 +7,7 @@ import rioxarray
 import xarray as xr
 from elevations import write
 from lazy import ODD_CHUNKS, check_place, no_compute
-from scipy import fft, integrate, stats
+from scipy import integrate, stats
 
 import fifesim
 from fifesim.base import files
@@ -18,10 +18,8 @@ from fifesim.ground.landscape.autoregression import (
     LARGEST_STREAMING_ARP,
     autocorrelation,
     field_seed,
-    field_variance,
     margin,
     periodic_field,
-    response,
     streaming_field,
     white_noise,
     window_field,
@@ -62,20 +60,6 @@ def test_noise_windows_equal_slices_at_any_column(column):
     whole = white_noise(2**63, -2, column, (6, 21))
     for skip in range(5):
         np.testing.assert_array_equal(white_noise(2**63, 0, column + skip, (3, 8)), whole[2:5, skip : skip + 8])
-
-
-@pytest.mark.parametrize("arp", [0.05, 0.24])
-def test_errors_of_single_precision(arp):
-    """The same noise on the same torus, filtered in double precision; rms and largest error."""
-    around = margin(arp)
-    size = fft.next_fast_len(FIELD_TILE + 2 * around, real=True)
-    noise = white_noise(3, -around, -around, (size, size)).astype(float)
-    u = 2 * np.pi * np.fft.fftfreq(size)
-    double = np.fft.ifft2(np.fft.fft2(noise) * response(arp, u[:, None], u)).real / np.sqrt(field_variance(arp))
-    double = double[around : around + FIELD_TILE, around : around + FIELD_TILE]
-    single = streaming_field(3, arp, 0, 0, (FIELD_TILE, FIELD_TILE))
-    assert np.sqrt(np.mean((single - double) ** 2)) < 3e-7
-    np.testing.assert_allclose(single, double, rtol=0, atol=2e-6)
 
 
 @pytest.mark.parametrize("arp", [0.0, 0.15, LARGEST_STREAMING_ARP])

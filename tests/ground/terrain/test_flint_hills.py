@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from lazy import check_place, no_compute
-from scipy import interpolate, ndimage
+from scipy import interpolate
 
 import fifesim
 from fifesim.base.geometry import Geometry
@@ -67,16 +67,6 @@ def test_quantiles_of_elevation_agree_with_the_watershed(landscapes):
     found = np.quantile(landscapes, [0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1])
     expected = np.array([334, 341, 352, 379, 400, 412, 434, 440, 443.5])
     np.testing.assert_allclose(found, expected, rtol=0, atol=0.06 * 110)
-
-
-def test_few_cells_are_pits(landscapes):
-    """Fraction of 30 m cells without a lower neighbour."""
-    shares = []
-    for values in map(means_30m, landscapes):
-        inner = values[1:-1, 1:-1]
-        lowest = ndimage.minimum_filter(values, footprint=[[1, 1, 1], [1, 0, 1], [1, 1, 1]])[1:-1, 1:-1]
-        shares.append(np.mean(inner <= lowest))
-    assert np.mean(shares) < 0.015
 
 
 def test_elevation_has_the_same_bits_in_windows():

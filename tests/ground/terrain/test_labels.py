@@ -6,7 +6,6 @@ import xarray as xr
 from elevations import hills, labelled, plane
 from lazy import check_raster_function, in_chunks, no_compute
 from pyproj import Transformer
-from scipy import ndimage
 
 import fifesim
 from fifesim.base.geometry import Geometry
@@ -128,23 +127,6 @@ def test_coarse_horizons_agree_with_horizons_at_every_cell():
     assert float(fifesim.terrain.sky_view(fine).std()) > 0.003
     assert float(abs(difference).max()) < 0.004
     assert float(difference.std()) < 5e-4
-
-
-@pytest.mark.parametrize(("size", "cell"), [(41, 10.0), (64, 1.0)])
-@pytest.mark.parametrize("azimuth", [0.0, 117.3])
-def test_rotating_scene_and_sun_by_90_degrees_rotates_the_result(size, cell, azimuth):
-    """Only rounding may differ: a model of unknown source has places at all its cells."""
-    grid = fifesim.grid_at("EPSG:26914", 700000, 4330000, size * cell, size * cell, cell)
-    z = 500 + cell * ndimage.gaussian_filter(np.random.default_rng(5).normal(size=(size, size)), 3) * 12
-    found = []
-    for turns in (0, 1):
-        dem = labelled(grid, np.rot90(z, -turns).copy())
-        lai = (2 + dem.copy(data=np.cos(dem.values))).assign_attrs(units="1", site="FIFE").rename("lai")
-        angles = Geometry(50.0, azimuth + 90 * turns, 20.0, 40.0 + 90 * turns)
-        rho = fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"], dem=dem, geometry=angles)
-        found.append(np.rot90([*rho.values, fifesim.terrain.sky_view(dem).values], turns, axes=(1, 2)))
-    assert found[0][2].std() > 0.003
-    np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-12)
 
 
 def test_sun_below_the_horizon_of_all_slopes_is_refused(site):

@@ -325,23 +325,6 @@ def test_message_for_a_model_that_ends_within_the_grid_has_distances_and_the_cov
         fifesim.fine_dem(path, fifesim.grid_at("EPSG:26914", more, north, width + 30, height, 30 / 9))
 
 
-def test_message_for_a_hole_has_its_location_and_size(tmp_path):
-    """For a lazy array when it is computed."""
-    values, affine = model()
-    values[30:33, 28:32] = np.nan
-    where = write(tmp_path / "hole.tif", values, affine)
-    lazy = fifesim.fine_dem(rioxarray.open_rasterio(where, masked=True, chunks={"y": 20, "x": 20}), grid())
-    for make in (lambda: fifesim.fine_dem(where, grid()), lazy.compute):
-        with pytest.raises(ValueError, match="a hole of") as error:
-            make()
-        found = re.search(r"a hole of (\d+) x (\d+) m at (\d+) E (\d+) N: fill=(\d+)", str(error.value)).groups()
-        tall, wide, east, north, fill = map(float, found)
-        assert (tall, wide) == (pytest.approx(90, abs=16), pytest.approx(120, abs=16))
-        assert (east, north) == (pytest.approx(WEST + 300, abs=20), pytest.approx(NORTH - 345, abs=20))
-    dem = fifesim.fine_dem(where, grid(), fill=fill)
-    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=0.1 * AMPLITUDE)
-
-
 def test_terraces_cause_a_warning(tmp_path, path):
     """A plane that rises by 2 m from cell to cell has none."""
     with pytest.warns(UserWarning, match="vertical resolution of 1 m") as caught:
