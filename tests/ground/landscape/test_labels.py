@@ -1,7 +1,5 @@
 """Tests of landscapes: variables and fields, maps of cover, same bits in windows and chunks, and errors."""
 
-import logging
-
 import numpy as np
 import pyproj
 import pytest
@@ -129,17 +127,13 @@ def test_drawn_cover_has_the_codes_of_its_patches(site):
 
 def test_cover_map_on_the_same_grid_is_read_unchanged(tmp_path, site, codes):
     path = write(tmp_path / "cover.tif", codes, site.affine)
-    cover = cover_map(path, site, TABLE)
-    np.testing.assert_array_equal(cover, codes)
-    check_place(cover, site.crs)
     opened = rioxarray.open_rasterio(path)
-    for raster in (opened, opened.chunk({"x": 13}), opened[:, ::-1], opened.astype(float)):
+    for raster in (path, opened, opened.chunk({"x": 13}), opened[:, ::-1], opened.astype(float)):
         np.testing.assert_array_equal(cover_map(raster, site, TABLE), codes)
-    for chunks in (ODD_CHUNKS, "auto"):
-        for source in (path, opened):
-            with no_compute():
-                lazy = cover_map(source, site, TABLE, chunks)
-            np.testing.assert_array_equal(lazy.compute(), codes)
+        with no_compute():
+            lazy = cover_map(raster, site, TABLE, ODD_CHUNKS)
+        check_place(lazy, site.crs)
+        np.testing.assert_array_equal(lazy.compute(), codes)
 
 
 def test_cover_map_is_resampled_by_nearest_or_most_frequent_class(tmp_path, site, codes):
@@ -161,13 +155,11 @@ def test_cover_map_is_resampled_by_nearest_or_most_frequent_class(tmp_path, site
         assert set(np.unique(found)) <= set(CODES)
 
 
-def test_reprojected_cells_have_the_class_with_the_largest_area(tmp_path, site, codes, caplog):
+def test_reprojected_cells_have_the_class_with_the_largest_area(tmp_path, site, codes):
     """Compare with the areas of the classes, from 400 points of each cell transformed by pyproj."""
     path = write(tmp_path / "cover.tif", codes, site.affine)
     degrees = rioxarray.open_rasterio(path, masked=True).rio.reproject("EPSG:4326")[0]
-    with caplog.at_level(logging.WARNING):
-        found = cover_map(degrees, site, TABLE).values
-    assert caplog.messages == []
+    found = cover_map(degrees, site, TABLE).values
     along = 20
     rows, columns = (np.mgrid[: 45 * along, : 54 * along] + 0.5) / along
     to_degrees = pyproj.Transformer.from_crs(site.crs.proj, 4326, always_xy=True)
