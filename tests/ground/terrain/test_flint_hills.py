@@ -1,4 +1,4 @@
-"""Tests of synthetic Flint Hills against a real watershed, of the erosion model, and of labelled rasters."""
+"""Tests of synthetic Flint Hills against a real watershed, of their tiles and benches, and of light on them."""
 
 import numpy as np
 import pytest

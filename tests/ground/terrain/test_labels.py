@@ -95,14 +95,6 @@ def test_aspect_has_the_same_bits_in_windows():
     assert (fifesim.terrain.aspect(dem * 0 + 300.0) == 0).all()
 
 
-def test_wide_scene_with_varying_grid_north_causes_a_warning():
-    """400 km at 85 degrees north, where grid north rotates by 23 degrees from the centre to a corner."""
-    wide = fifesim.grid_at("EPSG:3413", -600000, -200000, 400000, 400000, 10000)
-    dem = labelled(wide, 1000 + plane(tuple(wide.shape), 10000.0, 10000.0, 5.0, 70.0) / 40)
-    with pytest.warns(UserWarning, match=r"grid north rotates by up to \d+\.\d degrees"):
-        fifesim.terrain.illumination(dem, fifesim.Geometry(60.0, 120.0))
-
-
 def test_wetness_at_a_coarser_resolution_is_interpolated(around):
     """Every ninth cell, as in `horizon`, has the index of the coarse elevation; the index between them is linear."""
     found, places = fifesim.terrain.wetness(around, resolution=30.0), fifesim.horizon(around, resolution=30.0)
@@ -127,13 +119,6 @@ def test_coarse_horizons_agree_with_horizons_at_every_cell():
     assert float(fifesim.terrain.sky_view(fine).std()) > 0.003
     assert float(abs(difference).max()) < 0.004
     assert float(difference.std()) < 5e-4
-
-
-def test_sun_below_the_horizon_of_all_slopes_is_refused(site):
-    steep = labelled(site, plane(tuple(site.shape), 10 / 3, 10 / 3, 40.0, 0.0))
-    for function in (fifesim.terrain.shadow, fifesim.terrain.illumination):
-        with pytest.raises(ValueError, match=r"sza 60, 178.* from grid north.*below the horizon of every slope"):
-            function(steep, Geometry(60.0, 180.0))
 
 
 @pytest.mark.parametrize(
