@@ -254,8 +254,8 @@ def test_plausible_elevations_cause_no_warning(east):
         np.testing.assert_allclose(fifesim.fine_dem(factor * dem, there, vertical_units=unit), fine, rtol=1e-9)
     steep = fifesim.fine_dem(dem.mean() + 3 * (dem - dem.mean()), there)
     np.testing.assert_allclose(steep.std(), 3 * fine.std(), rtol=1e-6)
-    if east:
-        fifesim.fine_dem(dem - float(dem[48, 48]), there)
+    coast = fifesim.fine_dem(dem - float(dem[25, 25]), there)
+    np.testing.assert_allclose(coast, fine - float(dem[25, 25]), rtol=0, atol=1e-9)
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
