@@ -243,11 +243,13 @@ def test_learning_finds_the_response_to_the_terrain(hills):
     position = forms["position_80"] / np.std(forms["position_80"])
     northing, easting = hills["y"].values, hills["x"].values
     noise = spline_noise(1, 20.0, northing, easting)
-    lai = xr.DataArray(np.exp(0.3 * (noise - position)), hills.coords, name="lai")
+    part = np.s_[60:220, 60:250]
+    lai = xr.DataArray(np.exp(0.3 * (noise - position)), hills.coords, name="lai")[part]
     learned = fifesim.learn_landscape(lai, hills)
     assert learned.explained == pytest.approx(0.5, abs=0.08)
     made = learned.simulate(grids.geobox(lai), hills, seed=1)["lai"]
-    assert np.corrcoef(np.log(made.values.ravel()), -position.ravel())[0, 1] == pytest.approx(np.sqrt(0.5), abs=0.08)
+    found = np.corrcoef(np.log(made.values.ravel()), -position[part].ravel())[0, 1]
+    assert found == pytest.approx(np.sqrt(0.5), abs=0.08)
 
 
 def test_files(tmp_path):

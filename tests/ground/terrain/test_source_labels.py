@@ -19,6 +19,7 @@ from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
 from fifesim.grids.opening import RasterFile
 from fifesim.ground.terrain import spline
+from fifesim.ground.terrain.elevation_labels import source_dem
 from fifesim.ground.terrain.source_labels import beside_altitude, source_resolution
 
 
@@ -133,7 +134,7 @@ def test_only_the_part_of_a_file_near_the_grid_is_read(tmp_path, monkeypatch):
     windows = RasterFile.read
     monkeypatch.setattr(RasterFile, "read", lambda *given: read.extend(given[2:]) or windows(*given))
     fifesim.fine_dem(where, grid(), chunks="auto").compute()
-    fifesim.terrain.source_dem(where, grid(), 900.0)
+    source_dem(where, grid(), 900.0)
     # In cells of the model: tiles of a margin of 30 have 504, and the spline needs 37 on each side.
     first, around = corner + 1500 // 30, 30 + 504 + 37
     assert min(part.start for part in read) > first - around and max(part.stop for part in read) < first + 30 + around
@@ -210,7 +211,7 @@ def test_fine_dem_has_the_same_bits_in_chunks_and_windows(path, chunks, options)
 
 def test_source_dem_has_a_margin_around_the_grid(path):
     """Cells of about the source's size; the corner of the grid is a corner of these cells."""
-    dem, reach = fifesim.terrain.source_dem(path, grid(), 450.0)
+    dem, reach = source_dem(path, grid(), 450.0)
     assert dem.odc.geobox.affine == Affine(30, 0, WEST - 450, 0, -30, NORTH + 450)
     assert dem.shape == (60, 60)
     np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-6)
@@ -224,12 +225,12 @@ def test_source_dem_ends_at_the_edge_of_its_data_with_the_same_bits_in_chunks(tm
     values[:, :15], values[3, 40] = np.nan, np.nan
     for crs, fill, chunks in (("EPSG:32614", None, "auto"), (CRS, 60.0, {"y": 31, "x": 27})):
         where = write(tmp_path / "cut.tif", values, affine, crs)
-        whole, reach = fifesim.terrain.source_dem(where, grid(), 6000.0, fill=fill)
+        whole, reach = source_dem(where, grid(), 6000.0, fill=fill)
         with no_compute():
-            lazy, same_reach = fifesim.terrain.source_dem(where, grid(), 6000.0, fill=fill, chunks=chunks)
+            lazy, same_reach = source_dem(where, grid(), 6000.0, fill=fill, chunks=chunks)
         assert lazy.chunks is not None and reach == same_reach
         xr.testing.assert_identical(lazy.compute(), whole)
-    dem, reach = fifesim.terrain.source_dem(write(tmp_path / "cut.tif", values, affine), grid(), 6000.0)
+    dem, reach = source_dem(write(tmp_path / "cut.tif", values, affine), grid(), 6000.0)
     assert reach == {"north": 480, "east": 600, "south": 600, "west": 150}
     assert dem.odc.geobox.affine == Affine(30, 0, WEST - 150, 0, -30, NORTH + 600)
     assert dem.shape == (70, 55) and int(dem.isnull().sum()) == 1
@@ -237,7 +238,7 @@ def test_source_dem_ends_at_the_edge_of_its_data_with_the_same_bits_in_chunks(tm
     values, affine = model()
     values[45, 37] = np.nan
     tall = fifesim.grid_at(CRS, WEST, NORTH, 300.0, 900.0, 30 / 9)
-    _, reach = fifesim.terrain.source_dem(write(tmp_path / "hole.tif", values, affine), tall, 600.0)
+    _, reach = source_dem(write(tmp_path / "hole.tif", values, affine), tall, 600.0)
     assert reach == {"north": 600, "east": 210, "south": 600, "west": 600}
 
 
