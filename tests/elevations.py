@@ -1,10 +1,9 @@
-"""Elevation models of analytic surfaces, as files and labelled rasters."""
+"""Elevation of analytic surfaces and random hills, as arrays, files and labelled rasters."""
 
 import numpy as np
 import rasterio
 import xarray as xr
 from affine import Affine
-from oracles_terrain import hills
 
 import fifesim
 from fifesim.grids import grid as grids
@@ -56,12 +55,25 @@ def truth(dem, function=surface):
     return function(dem["x"].values[None, :], dem["y"].values[:, None])
 
 
-def with_hole(tmp_path, tall=3, wide=4):
-    values, affine = model()
-    values[30 : 30 + tall, 28 : 28 + wide] = np.nan
-    return write(tmp_path / "hole.tif", values, affine)
-
-
 def labelled(grid, values=None, **attrs):
     values = hills(tuple(grid.shape), seed=1, relief=40.0) if values is None else values
     return grids.place(xr.DataArray(values, dims=("y", "x"), name="dem", attrs={"units": "m"} | attrs), grid)
+
+
+def plane(shape, cell_y, cell_x, slope, aspect):
+    """Elevation of a plane that falls by a slope toward an aspect [degree]."""
+    i, j = np.mgrid[: shape[0], : shape[1]].astype(float)
+    north, east = -i * cell_y, j * cell_x
+    a = np.radians(aspect)
+    return 1000 - np.tan(np.radians(slope)) * (east * np.sin(a) + north * np.cos(a))
+
+
+def hills(shape, seed=0, relief=30.0, length=9.0):
+    """Smooth random ground: waves of several lengths [cells]."""
+    rng = np.random.default_rng(seed)
+    i, j = np.mgrid[: shape[0], : shape[1]].astype(float)
+    z = np.full(shape, 400.0)
+    for wave in length * 1.6 ** np.arange(5):
+        angle, phase = rng.uniform(0, 2 * np.pi, 2)
+        z += relief * wave / (10 * length) * np.sin(2 * np.pi / wave * (i * np.cos(angle) + j * np.sin(angle)) + phase)
+    return z

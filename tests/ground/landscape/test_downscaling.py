@@ -1,13 +1,10 @@
-"""Tests of cells within map pixels: means, semivariograms, trends, kriging, residuals, and pixels without leaves."""
-
-from math import factorial
+"""Tests of cells within pixels: means, semivariograms, variance, trends, kriging, residuals, pixels without leaves."""
 
 import numpy as np
 import pytest
-from oracles_field import covariances
 from scipy import stats
 
-from fifesim.ground.landscape.autoregression import periodic_field
+from fifesim.ground.landscape.autoregression import pair_correlations, periodic_field, response
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
 from fifesim.ground.landscape.downscaling import (
     Kriging,
@@ -23,12 +20,19 @@ from fifesim.ground.landscape.downscaling import (
     kriging_filter,
     level_deviations,
     map_trend,
+    pixel_sample,
     residual_shift,
     weighed,
 )
 
 RATIO, SHAPE = (3, 3), (60, 60)
 CELLS = (180, 180)
+
+
+def covariances(arp, size=512):
+    """Covariances by lag from the two-dimensional spectrum on a torus that is many correlation lengths wide."""
+    u = 2 * np.pi * np.fft.fftfreq(size)
+    return np.fft.ifft2(response(arp, u[:, None], u) ** 2).real
 
 
 def log_normal(arp, cv, trend=0.0):
@@ -51,45 +55,25 @@ def semivariances(cells):
     return np.array(found)
 
 
-def theory(cells, arp):
-    """Semivariances of a function of the process, from its Hermite polynomials."""
-    nodes, weights = np.polynomial.hermite_e.hermegauss(100)
-    values, weights = cells(nodes), weights / np.sqrt(2 * np.pi)
-    orders = np.arange(1, 25)
-    polynomials = [np.polynomial.hermite_e.hermeval(nodes, [0] * order + [1]) for order in orders]
-    power = [
-        np.sum(weights * values * each) ** 2 / factorial(order) for order, each in zip(orders, polynomials, strict=True)
-    ]
-    correlation = covariances(arp)[0] / covariances(arp)[0, 0]
-    one, two = (np.sum(power * (1 - correlation[lag] ** orders)) for lag in (1, 2))
-    return np.array([one, one, two, two])
-
-
-def model_of_variation(arp, cv):
-    """Log-normal cells whose mean variance within pixels is cv**2 times their squared mean."""
-    deviation = log_normal(arp, cv)[2]
-    return lambda field: np.exp(deviation * field)
-
-
-def of_quantiles(arp, name):
-    table = quantile_table(lai_distribution(name))
-    return lambda field: quantile_map(field, table)
-
-
 CASES = {
-    "cv 0.4": (0.05, model_of_variation, log_normal, 0.4),
-    "cv 0.4, arp 0.24": (0.24, model_of_variation, log_normal, 0.4),
-    "burned-grazed, arp 0.24": (0.24, of_quantiles, of_distribution, "burned-grazed"),
-    "unburned-ungrazed": (0.24, of_quantiles, of_distribution, "unburned-ungrazed"),
+    "cv 0.4": (0.05, log_normal, 0.4),
+    "cv 0.4, arp 0.24": (0.24, log_normal, 0.4),
+    "burned-grazed": (0.24, of_distribution, "burned-grazed"),
+    "unburned-ungrazed": (0.24, of_distribution, "unburned-ungrazed"),
 }
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_downscaled_cells_have_the_semivariogram_of_the_model(name):
     """The map is the mean over pixels of a scene of the model; both semivariances agree within 3 standard errors."""
-    arp, model, options, value = CASES[name]
+    arp, options, value = CASES[name]
+    _, transform, deviation = options(arp, value)
+    table = quantile_table(lai_distribution(value)) if options is of_distribution else None
+
+    def model(field):
+        return np.exp(deviation * field) if table is None else quantile_map(field, table)
+
     # Differences from the scene have a smaller sampling error, since both semivariances share a part of it.
-    model, (_, transform, deviation) = model(arp, value), options(arp, value)
     of_levels = level_deviations(transform, [deviation], arp, RATIO)[0]
     shape, cells = (112, 112), (336, 336)
     ground, found = [], []
@@ -102,20 +86,9 @@ def test_downscaled_cells_have_the_semivariogram_of_the_model(name):
         np.testing.assert_allclose(kriging_block_means(drawn, RATIO), pixels, rtol=1e-12)
         ground.append(semivariances(truth))
         found.append(semivariances(drawn) - ground[-1])
-    expected = theory(model, arp)
-    error = np.std(found, axis=0) / np.sqrt(len(found) - 1)
+    error, expected = np.std(found, axis=0) / np.sqrt(len(found) - 1), np.mean(ground, axis=0)
     assert np.all(error < 0.007 * expected)
     assert np.all(np.abs(np.mean(found, axis=0)) < 3 * error)
-    np.testing.assert_allclose(np.mean(ground, axis=0), expected, rtol=0.03)
-
-
-def test_downscaling_without_variation_is_smooth_interpolation():
-    y, x = np.mgrid[:60, :60] / 60
-    pixels = 2.0 + np.sin(2 * np.pi * x) * np.cos(2 * np.pi * y)
-    kriging = Kriging.of(0.15, np.inf, RATIO, SHAPE)
-    cells = downscaled(pixels, periodic_field(1, 0.15, CELLS), kriging, LogNormal(), 0.0)
-    y, x = (np.mgrid[:180, :180] + 0.5) / 180 - 0.5 / 60
-    np.testing.assert_allclose(cells, 2.0 + np.sin(2 * np.pi * x) * np.cos(2 * np.pi * y), atol=5e-3)
 
 
 def test_pixels_without_leaves_or_data_affect_only_nearby_cells():
@@ -139,14 +112,6 @@ def test_pixels_without_leaves_or_data_affect_only_nearby_cells():
     assert nearest / further == pytest.approx(whole[60:72, 89].mean() / whole[60:72, 87].mean(), rel=0.1)
 
 
-def test_map_without_leaves_has_cells_without_leaves():
-    pixels = np.zeros(SHAPE)
-    pixels[0, 0] = np.nan
-    kriging, transform, deviation = log_normal(0.15, 0.3)
-    cells = downscaled(pixels, periodic_field(1, 0.15, CELLS), kriging, transform, deviation)
-    np.testing.assert_array_equal(cells, by_pixel(pixels, RATIO))
-
-
 def test_variation_may_differ_between_pixels():
     pixels = np.full(SHAPE, 2.0)
     kriging, transform, _ = log_normal(0.0, 0.3)
@@ -168,32 +133,12 @@ def test_level_of_a_skewed_distribution_inverts_the_mean_of_cells():
     assert Marginal.of(density, 0.3).level(mean) == pytest.approx(0.4, abs=0.006)
 
 
-@pytest.mark.parametrize("mean", [0.4, 2.4])
-def test_means_outside_the_distribution_are_refused(mean):
-    kriging, transform, deviation = of_distribution(0.15, "burned-ungrazed")
-    pixels = np.full(SHAPE, 1.5)
-    pixels[3, 4] = mean
-    said = rf"mean LAI {mean}, which cells .* from 0.475 to 2.345 cannot have: give .* cv="
-    with pytest.raises(ValueError, match=said):
-        downscaled(pixels, np.zeros(CELLS), kriging, transform, deviation)
-
-
 def test_means_near_the_limits_of_a_distribution_are_exact():
     kriging, transform, deviation = of_distribution(0.15, "burned-grazed")
     pixels = np.random.default_rng(1).choice([0.01, 0.7, 2.17], SHAPE)
     cells = downscaled(pixels, periodic_field(1, 0.15, CELLS), kriging, transform, deviation)
     np.testing.assert_allclose(kriging_block_means(cells, RATIO), pixels, rtol=1e-12)
     assert cells.min() >= 0 and cells.max() < 2.2 * 1.0015
-
-
-def test_fife_variation_agrees_with_the_treatments():
-    """Three treatments at arp 0.15 in pixels of 3 x 3 cells, within 10 % on average."""
-    inside = np.sqrt(1 - kept_variance(0.15, (3, 3)))
-    densities = [lai_distribution(name) for name in ("burned-grazed", "burned-ungrazed", "unburned-ungrazed")]
-    deviations = [inside * each.std() for each in densities]
-    assert np.mean(deviations) == pytest.approx(0.4, rel=0.1)
-    assert max(inside * each.std() / each.mean() for each in densities) == pytest.approx(0.6, rel=0.1)
-    np.testing.assert_allclose(fife_variation(np.array([0.2, 4.0])), [0.6, 0.1])
 
 
 def on_torus(row):
@@ -228,16 +173,15 @@ def weights(arp, trend, ratio, shape):
     return np.array([kriged(each, response, ratio).ravel() for each in pixels]).T
 
 
-def test_block_means_invert_by_pixel():
-    pixels = np.arange(6.0).reshape(2, 3)
-    np.testing.assert_array_equal(kriging_block_means(by_pixel(pixels, (4, 2)), (4, 2)), pixels)
-    cells = np.arange(24.0).reshape(4, 6)
-    np.testing.assert_array_equal(
-        kriging_block_means(cells, (2, 3))[0], [(0 + 1 + 2 + 6 + 7 + 8) / 6, (3 + 4 + 5 + 9 + 10 + 11) / 6]
-    )
+def test_block_means_and_by_pixel():
+    cells, means = np.arange(24.0).reshape(4, 6), [[4.0, 7.0], [16.0, 19.0]]
+    np.testing.assert_array_equal(kriging_block_means(cells, (2, 3)), means)
+    np.testing.assert_array_equal(by_pixel(np.array(means), (2, 3))[:3, 2:4], [[4.0, 7.0], [4.0, 7.0], [16.0, 19.0]])
 
 
-@pytest.mark.parametrize("arp, trend, ratio", [(0.0, 0.3, (3, 3)), (0.15, 0.75, (3, 2)), (0.2, 0.2, (2, 4))])
+@pytest.mark.parametrize(
+    "arp, trend, ratio", [(0.0, 0.3, (3, 3)), (0.15, 0.75, (3, 2)), (0.2, 0.2, (2, 4)), (0.24, 0.0, (3, 3))]
+)
 def test_kriging_filter_is_the_best_linear_estimate(arp, trend, ratio):
     """Compare with C B' (B C B')^-1 by matrices; the filter has single precision."""
     shape = 8, 6
@@ -262,23 +206,6 @@ def test_weighed_is_the_transpose_of_kriged(ratio, shape):
     cells = np.random.default_rng(1).standard_normal(np.multiply(shape, ratio))
     found = weighed(cells, kriging_filter(0.2, 0.3, ratio, shape), ratio)
     np.testing.assert_allclose(found.ravel(), weights(0.2, 0.3, ratio, shape).T @ cells.ravel(), rtol=0, atol=2e-5)
-
-
-@pytest.mark.parametrize("arp", [0.05, 0.24])
-def test_conditioned_field_has_the_covariance_of_the_process(arp):
-    """Covariance of z + K (B z' - B z) by matrices, within pixels and across their edges, within 0.5 %."""
-    ratio, shape = (3, 3), (14, 14)
-    covariance = on_torus(process(arp, (42, 42)))
-    spread = weights(arp, 0.0, ratio, shape) @ averaging(shape, ratio)
-    left = np.eye(len(covariance)) - spread
-    found = left @ covariance @ left.T + spread @ covariance @ spread.T
-    variances = np.diag(found).reshape(42, 42)[18:24, 18:24]
-    np.testing.assert_allclose(variances, covariance[0, 0], rtol=5e-3)
-    cells = np.arange(42 * 42).reshape(42, 42)
-    for lag in (1, 2, 3, 4):
-        one, other = cells[18:21, 18:21].ravel(), cells[18:21, 18 + lag : 21 + lag].ravel()
-        half = (found[one, one] + found[other, other]) / 2 - found[one, other]
-        np.testing.assert_allclose(half, covariance[0, 0] - covariance[0, lag], rtol=1e-2)
 
 
 @pytest.mark.parametrize("arp, trend", [(0.05, 0.3), (0.15, 0.75), (0.24, 3.0), (0.24, np.inf)])
@@ -306,14 +233,6 @@ def known(levels):
     return np.ones(levels.shape, bool)
 
 
-@pytest.mark.parametrize("arp", [0.0, 0.15, 0.24])
-def test_map_of_the_process_has_a_small_trend(arp):
-    """A trend of 0.5 adds 3 % to the variance of second differences, which is their standard error."""
-    for seed in range(5):
-        levels = kriging_block_means(0.2 * periodic_field(seed, arp, CELLS), RATIO)
-        assert map_trend(levels, known(levels), 0.2, arp, RATIO) <= 1.0
-
-
 @pytest.mark.parametrize("ratio", [(3, 3), (2, 4)])
 @pytest.mark.parametrize("strength", [4.0, 16.0])
 def test_trend_is_estimated_in_the_presence_of_the_process(strength, ratio):
@@ -323,7 +242,7 @@ def test_trend_is_estimated_in_the_presence_of_the_process(strength, ratio):
 
 
 def test_trend_of_gentle_hills_is_found_at_long_lags():
-    """Second differences of the hills over one pixel are 1 % of the process."""
+    """Second differences of the hills over one pixel are 1 % of the process. Without hills, the trend is small."""
     hills = kriging_block_means(np.broadcast_to(np.sin(2 * np.pi * np.arange(180) / 180), CELLS), RATIO)
     levels = hills + kriging_block_means(0.2 * periodic_field(1, 0.15, CELLS), RATIO)
     assert map_trend(levels, known(levels), 0.2, 0.15, RATIO) >= 0.5
@@ -346,42 +265,9 @@ def test_trend_is_infinite_without_variation_of_the_process():
     assert map_trend(1e6 * trend(1)[:8, :8], known(levels), 1.0, 0.15, RATIO) == np.inf
 
 
-PAIR = (1, 2)
-
-
 def matrix(function, shape):
     """Matrix of a linear function of arrays of a shape."""
     return np.array([function(each.reshape(shape)).ravel() for each in np.eye(np.prod(shape))]).T
-
-
-def pairs(deviation):
-    """Half differences of two independent cells, at evenly spaced quantiles in random order."""
-    ranks = (np.random.default_rng(1).permutation(SHAPE[0] * SHAPE[1]) + 0.5) / (SHAPE[0] * SHAPE[1])
-    return deviation / np.sqrt(2) * stats.norm.ppf(ranks).reshape(SHAPE)
-
-
-@pytest.mark.parametrize("level, ratio", [(-0.15, 0.85), (0.15, 1.11)])
-def test_residuals_have_the_density_given_the_mean(level, ratio):
-    """Two independent log-normal cells y + a and y - a of mean m, so that y = ln m - ln cosh a, by quadrature."""
-    deviation, half = 0.3, pairs(0.3)
-    offset = np.mean(np.log(np.cosh(half)))
-    # The density of a, given m, is the product of the densities of a and y; its variance differs by -15 % or 11 %.
-    a = np.linspace(-3, 3, 20001)
-    density = np.exp(-((a / deviation) ** 2) - ((level + offset - np.log(np.cosh(a))) / deviation) ** 2)
-    expected = np.sum(density * a**2) / np.sum(density) / (deviation**2 / 2)
-    assert expected == pytest.approx(ratio, abs=0.005)
-
-    # Pixels of the opposite level alternate with these, so that the mean around each pixel is zero.
-    sign = np.where(np.add.outer(np.arange(60), np.arange(60)) % 2, -1, 1)
-    cells = np.stack([half, -half], axis=-1).reshape(60, 120).astype(np.float32)
-    kriging, shift, inside = Kriging.of(0.0, 0.0, PAIR, SHAPE), np.float32(0.0), half
-    for _ in range(2):
-        known = sign * level + offset - np.log(np.cosh(inside))
-        shift = residual_shift(cells, known, shift, kriging, LogNormal(), deviation)
-        inside = (cells + shift - by_pixel(kriging_block_means(cells + shift, PAIR), PAIR))[:, ::2]
-    found = np.mean(inside[sign == 1] ** 2) / np.mean(half[sign == 1] ** 2)
-    # The error is of third order in the curvature; after one shift it would be 0.03 for the lower level.
-    assert found == pytest.approx(expected, abs=0.004)
 
 
 @pytest.mark.parametrize("arp, trend", [(0.0, 0.0), (0.2, 0.0), (0.2, 0.5)])
@@ -446,3 +332,44 @@ def test_shift_is_limited_to_one_standard_deviation():
     shift = np.abs(residual_shift(field, pixels, np.float32(0.0), kriging, LogNormal(), deviation))
     assert np.all(shift <= deviation) and shift[:, :30].max() == pytest.approx(0.1)
     assert np.isfinite(shift).all() and shift[:, 30:].max() > 0.3
+
+
+@pytest.mark.parametrize("arp, ratio", [(0.0, (3, 3)), (0.15, (3, 3)), (0.24, (2, 5))])
+def test_variance_of_means_is_the_mean_correlation_of_all_pairs(arp, ratio):
+    correlation = covariances(arp) / covariances(arp)[0, 0]
+    places = list(np.ndindex(*ratio))
+    pairs = [correlation[abs(i - k), abs(j - m)] for i, j in places for k, m in places]
+    assert kept_variance(arp, ratio) == pytest.approx(np.mean(pairs), rel=1e-10)
+    assert pair_correlations(arp, ratio)[1].sum() == pytest.approx(1.0, rel=1e-14)
+    sample = pixel_sample(arp, ratio)
+    assert sample.mean(axis=1).var() == pytest.approx(kept_variance(arp, ratio), rel=1e-12)
+    assert (sample**2).mean() == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("arp", [0.0, 0.2])
+def test_variation_of_two_cells_equals_quadrature(arp):
+    """Mean of tanh(s d / 2)^2 over the normal distribution of the difference d of two cells."""
+    variations, deviations = deviation_table(arp, (1, 2))
+    nodes, weights = np.polynomial.hermite_e.hermegauss(80)
+    spread = np.sqrt(2 * (1 - covariances(arp)[0, 1] / covariances(arp)[0, 0]))
+    squared = np.tanh(deviations[:, None] * spread * nodes / 2) ** 2 @ weights / np.sqrt(2 * np.pi)
+    # The sample of 127000 pixels has the exact variance; the tolerance covers the sampling error of its fourth moment.
+    np.testing.assert_allclose(variations, np.sqrt(squared), rtol=5e-3, atol=1e-12)
+
+
+def test_level_deviations_of_a_normal_distribution_and_limits_of_the_variation_of_fife():
+    np.testing.assert_allclose(fife_variation(np.array([0.2, 1.0, 4.0])), [0.6, 0.4, 0.1])
+    normal = Marginal.of(stats.norm(10.0, 0.5), kept_variance(0.15, (3, 3)))
+    np.testing.assert_allclose(level_deviations(normal, [0.5, 1.0], 0.15, (3, 3)), [0.5, 1.0], rtol=1e-4)
+
+
+def test_level_deviations_of_two_log_normal_cells():
+    """ln m = y + ln cosh a with independent y and a, whose variances are summed."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(80)
+    inside = np.log(np.cosh(0.8 * np.sqrt(0.5) * nodes))
+    weights = weights / weights.sum()
+    variance = 0.8**2 / 2 + weights @ inside**2 - (weights @ inside) ** 2
+    found = level_deviations(LogNormal(), [0.8], 0.0, (1, 2))
+    # The sample of 127000 pixels has the exact variance of means.
+    np.testing.assert_allclose(found, np.sqrt(2 * variance), rtol=2e-3)
+    assert found > 0.81

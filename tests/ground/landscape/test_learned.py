@@ -50,14 +50,6 @@ def test_finer_cells_read_the_same_forms(cell):
     np.testing.assert_array_equal(KONZA.simulate(fine[7:33, 5:41], dem, seed=7)["lai"].values, whole[7:33, 5:41])
 
 
-def test_leaf_area_is_unknown_where_the_elevation_is(hills):
-    holed = hills.copy()
-    # The grid begins 110 cells from the corner of the hills.
-    holed[140, 155] = np.nan
-    lai = KONZA.simulate(GRID, holed, seed=7)["lai"]
-    np.testing.assert_array_equal(np.argwhere(lai.isnull().values), [[30, 45]])
-
-
 def test_spline_noise_has_the_autocorrelation_of_its_spline():
     place = np.arange(0.5, 4000.0, 2.0)
     fields = [spline_noise(seed, 8.0, -place[:40], place) for seed in range(30)]
@@ -173,30 +165,16 @@ def test_conditioned_windows_and_chunks_have_the_bits_of_the_whole(hills, level)
     assert np.all(whole.values[18:21, 21:24] == 0)
 
 
-def test_conditioned_cells_are_unknown_where_the_elevation_is(hills):
+def test_cells_are_unknown_where_the_elevation_is(hills):
+    """The grid begins 110 cells from the corner of the hills."""
     holed = hills.copy()
     holed[140, 155], holed[150:160, 200:210] = np.nan, np.nan
     pixels = KONZA.simulate(GRID, hills, seed=1)["lai"].fifesim.aggregate(30)
     cells = KONZA.condition(pixels, GRID, holed, seed=7)["lai"].values
-    np.testing.assert_array_equal(np.isnan(cells), np.isnan(holed.values[110:170, 110:200]))
+    for each in (cells, KONZA.simulate(GRID, holed, seed=7)["lai"]):
+        np.testing.assert_array_equal(np.isnan(each), np.isnan(holed.values[110:170, 110:200]))
     means = np.nanmean(cells.reshape(20, 3, 30, 3).swapaxes(1, 2).reshape(20, 30, 9), axis=2)
     np.testing.assert_allclose(means, pixels.where(np.isfinite(means)), rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda pixels, dem: (pixels + 6.0, dem), "cannot have: mask such pixels, or learn the landscape"),
-        (lambda pixels, dem: (pixels.assign_coords(x=pixels["x"] + 9000.0), dem), "the map does not overlap the grid"),
-        (lambda pixels, dem: (pixels, dem[:150]), "give an elevation that covers the grid"),
-        (lambda pixels, dem: (pixels * 100, dem), "where the numbers are scaled, type lai"),
-        (lambda pixels, dem: (KONZA.simulate(GRID)["lai"], dem), "a pixel must be a whole number of cells, 2 or more"),
-    ],
-)
-def test_maps_that_cannot_be_conditioned(hills, change, words):
-    image, dem = change(KONZA.simulate(GRID, seed=1)["lai"].fifesim.aggregate(30), hills)
-    with pytest.raises(ValueError, match=words):
-        KONZA.condition(image, GRID, dem)
 
 
 @pytest.fixture(scope="module")
@@ -265,11 +243,13 @@ def test_learning_finds_the_response_to_the_terrain(hills):
     position = forms["position_80"] / np.std(forms["position_80"])
     northing, easting = hills["y"].values, hills["x"].values
     noise = spline_noise(1, 20.0, northing, easting)
-    lai = xr.DataArray(np.exp(0.3 * (noise - position)), hills.coords, name="lai")
+    part = np.s_[60:220, 60:250]
+    lai = xr.DataArray(np.exp(0.3 * (noise - position)), hills.coords, name="lai")[part]
     learned = fifesim.learn_landscape(lai, hills)
     assert learned.explained == pytest.approx(0.5, abs=0.08)
     made = learned.simulate(grids.geobox(lai), hills, seed=1)["lai"]
-    assert np.corrcoef(np.log(made.values.ravel()), -position.ravel())[0, 1] == pytest.approx(np.sqrt(0.5), abs=0.08)
+    found = np.corrcoef(np.log(made.values.ravel()), -position[part].ravel())[0, 1]
+    assert found == pytest.approx(np.sqrt(0.5), abs=0.08)
 
 
 def test_files(tmp_path):
@@ -277,70 +257,9 @@ def test_files(tmp_path):
     KONZA.save(path)
     assert fifesim.ground.Landscape.read(path) == KONZA
     assert path.stat().st_size < 2**20
-    path.write_text(path.read_text().replace('"cell": 10.0', '"cell": -10.0'))
-    with pytest.raises(ValueError, match=r"land\.json is not a landscape: cell"):
-        fifesim.ground.Landscape.read(path)
-    for old, new, words in (
-        ('"form": "elevation"', '"form": "height"', "the form 'height' is unknown"),
-        ('"fine"', '"finest"', "gusts and level_gusts have the keys"),
-        (f"{KONZA.scores[1]}", "-99.0", "ascending numbers"),
-        ('"above_400": 0.2', '"above_500": 0.2', "brown follows above_500, which the terrain lacks"),
-        ('"above_400": -0.5', '"above_400": -1.5', "sum to 1 at most"),
-        ('"sd": 0.02', '"sd": 0.8', "its sd must be above 0 and below"),
-        (f'"scores": [\n  {KONZA.scores[0]},', '"scores": [', "needs a value"),
-    ):
-        KONZA.save(path)
-        text = path.read_text()
-        assert old in text, old
-        path.write_text(text.replace(old, new))
-        with pytest.raises(ValueError, match=words):
-            fifesim.ground.Landscape.read(path)
     path.write_text("{")
     with pytest.raises(ValueError, match="is not a landscape"):
         fifesim.ground.Landscape.read(path)
-
-
-def test_description_prints_in_ten_lines():
-    text = str(KONZA)
-    assert len(text.splitlines()) <= 10
-    assert "Copernicus Sentinel data 2022" in text
-
-
-def _map(values, name="lai"):
-    grid = fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 10.0 * values.shape[1], 10.0 * values.shape[0], 10.0)
-    return grids.place(xr.DataArray(values, dims=("y", "x"), name=name), grid)
-
-
-_FIELD = np.random.default_rng(0).uniform(0.3, 0.8, (60, 60))
-
-
-@pytest.mark.parametrize(
-    ("image", "options", "words"),
-    [
-        (_map(_FIELD[:20]), {}, "1200 known cells, at least 2000"),
-        (_map(_FIELD, "red"), {}, "quantity of image 'red' is unknown"),
-        (_map(_FIELD * 1e4, "ndvi"), {}, "apply its scale"),
-        (_map(_FIELD, "ndvi"), {}, "needs instrument and geometry"),
-        (_map(_FIELD * 0.01), {}, "give a map of a date with leaves"),
-    ],
-)
-def test_maps_that_cannot_be_learned(image, options, words):
-    with pytest.raises(ValueError, match=words):
-        fifesim.learn_landscape(image, **options)
-
-
-def test_elevation_elsewhere():
-    far = _map(_FIELD).assign_coords(x=lambda each: each["x"] + 5000.0)
-    with pytest.raises(ValueError, match="dem does not overlap the grid"):
-        fifesim.learn_landscape(_map(_FIELD), far.rename("dem"))
-    with pytest.raises(ValueError, match="give an elevation that covers the grid"):
-        KONZA.simulate(GRID, far)
-
-
-def test_saturated_ndvi_warns():
-    geometry = fifesim.Geometry(sza=25, saa=140)
-    with pytest.warns(UserWarning, match="NDVI is saturated in"):
-        fifesim.learn_landscape(_map(0.2 * _FIELD + 0.78, "ndvi"), instrument="MSI", geometry=geometry)
 
 
 def test_terrain_beyond_the_learned_range_warns(hills):
@@ -348,35 +267,9 @@ def test_terrain_beyond_the_learned_range_warns(hills):
         land = KONZA.simulate(GRID, hills + 500.0)
     assert land["lai"].attrs["beyond_learned"] == 1.0
     highest = next(each.nodes[-1] for each in KONZA.terrain if each.form == "elevation")
-    just_above = hills * 0 + highest + 1.0
+    assert KONZA.simulate(GRID, hills * 0 + highest - 1.0)["lai"].attrs["beyond_learned"] == 0.0
     with pytest.warns(UserWarning, match="of the cells are higher, lower or steeper"):
-        KONZA.simulate(GRID, just_above)
-    assert KONZA.simulate(GRID, just_above - 2.0)["lai"].attrs["beyond_learned"] == 0.0
-
-
-def test_elevation_of_a_landscape_that_was_learned_without_one(hills):
-    flat = KONZA.model_copy(update={"terrain": (), "beds": None, "residual": (), "properties": {}})
-    with pytest.raises(ValueError, match="learned without an elevation"):
-        flat.simulate(GRID, hills)
-
-
-def test_lazy_elevation_is_not_computed(hills):
-    with no_compute():
-        land = KONZA.simulate(GRID, hills.chunk({"y": 100, "x": 100}))
-    assert "beyond_learned" not in land["lai"].attrs
-
-
-def test_cells_that_lose_the_forms_of_the_land():
-    with pytest.warns(UserWarning, match="larger than twice the 10 m of the learned map"):
-        KONZA.simulate(fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 900.0, 900.0, 30.0))
-    with pytest.raises(ValueError, match="give a grid of square cells"):
-        KONZA.simulate(fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 900.0, 900.0, (10.0, 15.0)))
-
-
-def test_maps_are_compared_on_the_cells_of_the_elevation():
-    here = _map(_FIELD)
-    with pytest.raises(ValueError, match="different grids"):
-        fifesim.ground.compare_landscapes(here, here, here.assign_coords(x=here["x"] + 5000.0))
+        KONZA.simulate(GRID, hills * 0 + highest + 1.0)
 
 
 def test_normal_scores_are_zero_where_unknown():

@@ -1,10 +1,19 @@
-"""Tests of patches of land cover: location, size and fractions of classes."""
+"""Tests of cover classes: location, size and fractions of patches, codes, stored tables, and fields of properties."""
+
+import json
+from dataclasses import fields
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.spatial import cKDTree
-from scipy.stats import norm
 
+from fifesim.ground.canopy.description import Canopy
+from fifesim.ground.canopy.properties import PROPERTIES
+from fifesim.ground.canopy.prospect import Leaf
+from fifesim.ground.canopy.spectra import Background, Spectrum
+from fifesim.ground.landscape.classes import SHARES as SHARE_NAMES
+from fifesim.ground.landscape.classes import CoverClass, Field, class_table, read_table, table_text
 from fifesim.ground.landscape.cover import (
     PATTERNS,
     Patches,
@@ -17,6 +26,7 @@ from fifesim.ground.landscape.cover import (
     smooth_field,
     voronoi,
 )
+from fifesim.ground.landscape.distribution import kernel_density
 
 SHARES = (0.2, 0.3, 0.5)
 
@@ -59,19 +69,6 @@ def test_neighbouring_levels_differ_by_one_class():
     assert np.unique(classes).size == 3
 
 
-@pytest.mark.parametrize(
-    "arguments, message",
-    [
-        (("voronoi", 0), "a number above 0, in metres, got 0"),
-        (("voronoi", "300 m"), "a number above 0, in metres, got '300 m'"),
-        (("voronoi", 300, (0.5, 0.4)), r"must sum to 1, got 0.9 of 0.5, 0.4"),
-    ],
-)
-def test_impossible_patches_are_refused(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        Patches(*arguments)
-
-
 def test_fractions_are_matched_by_name_or_order():
     named = Patches("voronoi", 10, {"wood": 0.75, "grass": 0.25})
     assert named.shares_of(["grass", "wood"]) == (0.25, 0.75)
@@ -80,19 +77,6 @@ def test_fractions_are_matched_by_name_or_order():
         named.shares_of(["grass", "water"])
     with pytest.raises(ValueError, match="2 shares for 3 classes"):
         Patches("levels", 10, [0.5, 0.5]).shares_of(["a", "b", "c"])
-
-
-@pytest.mark.parametrize("make", [voronoi, pastures])
-def test_patches_have_unit_mean_area(make):
-    """Within 4 standard errors, for patches that the edge does not cut; 1600 patches and more along the edge."""
-    place = (np.arange(1200) + 0.5) / 30
-    numbers = make(5, place, place)
-    assert 1600 < np.unique(numbers).size < 1600 + 4 * 40 * 1.3
-    inner = np.unique(numbers[60:-60, 60:-60])
-    cut = np.unique(np.concatenate([numbers[0], numbers[-1], numbers[:, 0], numbers[:, -1]]))
-    areas = np.array([np.sum(numbers == each) for each in np.setdiff1d(inner, cut)[:200]]) / 900
-    assert abs(areas.mean() - 1) < 4 * areas.std() / np.sqrt(areas.size)
-    assert areas.std() > 0.15
 
 
 def test_voronoi_cells_agree_with_a_kd_tree():
@@ -131,7 +115,7 @@ def test_smooth_field_is_standard_normal_with_gaussian_correlation():
         expected = np.exp(-((lag / 4) ** 2))
         found = np.mean(field[:, lag:] * field[:, :-lag]), np.mean(field[lag:] * field[:-lag])
         np.testing.assert_allclose(found, expected, rtol=0, atol=4 / np.sqrt(independent))
-    assert abs(np.mean(field < norm.ppf(0.2)) - 0.2) < 4 * np.sqrt(0.16 / independent)
+    assert abs(np.mean(field < stats.norm.ppf(0.2)) - 0.2) < 4 * np.sqrt(0.16 / independent)
 
 
 def test_pastures_are_rectangles_that_fill_their_block():
@@ -145,3 +129,72 @@ def test_pastures_are_rectangles_that_fill_their_block():
     for (top, left, bottom, right), number in _fenced(7, 3, -4):
         rows, columns = ((place >= 3 * low) & (place < 3 * high) for low, high in ((top, bottom), (left, right)))
         assert (inside[np.ix_(rows, columns)] == number).all()
+
+
+def test_codes_are_given_or_count_from_one():
+    assert [each.code for each in class_table([CoverClass("a"), CoverClass("b")])] == [1, 2]
+    assert [each.code for each in class_table({"a": CoverClass(code=0), "b": CoverClass("b", code=7)})] == [0, 7]
+    assert class_table(CoverClass("a"))[0].code == 1
+
+
+FULL = CoverClass(
+    "wood",
+    lai=stats.gamma(4, scale=0.4),
+    arp=0.2,
+    canopy=Canopy(
+        leaf_optics=Leaf(chlorophyll=40),
+        brown_leaf={"TM3": (0.1, 0.2), "TM4": (0.3, np.float64(0.4))},
+        background=Background({"soil_dry": 0.5, "shade": 0.5}),
+        leaf_angles=np.full(13, 1 / 13),
+        hotspot=0.05,
+        brown=0.1,
+        dissociation=1.0,
+        crown_cover=0.7,
+        crown_shape=0.4,
+    ),
+    code=np.int64(41),
+)
+
+
+def test_stored_class_table_is_read_back():
+    """Distributions of samples are not stored."""
+    (read,) = read_table(table_text([FULL]))
+    for each in fields(CoverClass):
+        was, now = getattr(FULL, each.name), getattr(read, each.name)
+        if each.name == "lai":
+            np.testing.assert_array_equal(now.ppf([0.1, 0.9]), was.ppf([0.1, 0.9]))
+        elif each.name != "canopy":
+            assert now == was, each.name
+    assert read.canopy.given == FULL.canopy.given
+    for name in PROPERTIES:
+        was, now = getattr(FULL.canopy, name), getattr(read.canopy, name)
+        assert np.array_equal(now, was) if name == "leaf_angles" else now == was, name
+    for given in (0.2, "dead_grass", {"TM3": 0.1}, Spectrum((0.4, 2.5), (0.1, 0.3))):
+        (read,) = read_table(
+            table_text([CoverClass("a", canopy=Canopy(background=given, leaf_optics=(0.1, (0.2, 0.3))))])
+        )
+        assert read.canopy.background == given and read.canopy.leaf_optics == (0.1, (0.2, 0.3))
+        assert read.canopy.given == {"background", "leaf_optics"}
+    text = table_text([CoverClass("a", lai=kernel_density([1.0, 2.0, 2.5, 3.0, 3.1]))])
+    assert json.loads(text) == [{"name": "a"}]
+
+
+@pytest.mark.parametrize("text", ["grass", "[1]", '[{"height": 3}]'])
+def test_invalid_stored_tables_are_refused(text):
+    with pytest.raises(ValueError, match="class table of the cover is invalid"):
+        read_table(text)
+
+
+@pytest.mark.parametrize("name", SHARE_NAMES)
+@pytest.mark.parametrize(("mean", "sd"), [(0.2, 0.1), (0.2, 0.3999), (0.9, 0.05), (0.01, 0.005)])
+def test_share_has_the_given_mean_and_deviation(name, mean, sd):
+    found = Field(mean=mean, sd=sd).distribution(name)
+    assert found.support() == (0, 1)
+    assert (found.mean(), found.std()) == pytest.approx((mean, sd), rel=1e-12)
+    assert Field(mean=mean, sd=sd, arp=0.24).distribution(name) is found
+
+
+def test_default_field_and_limits_of_its_numbers():
+    assert Field() == Field(mean=0.0, sd=0.0, arp=0.15)
+    limits = ({"mean": 1}, {"mean": -1}, {"sd": np.int64(0)}, {"arp": 0}, {"arp": 0.2498}, {"sd": np.float32(3)})
+    assert all(getattr(Field(**limit), name) == value for limit in limits for name, value in limit.items())
