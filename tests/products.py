@@ -2,12 +2,11 @@
 Small products in the formats of the agencies.
 
 The images have few pixels. Metadata are shortened from these products:
-LT05_L1TP_058014_20110312_20200823_02_T1 and LC08_L2SP_047027_20201204_20210313_02_T1 (USGS),
+LT05_L1TP_058014_20110312_20200823_02_T1 and LC08_L1TP_047027_20201204_20210313_02_T1 (USGS),
 S2A_MSIL1C_20210908T042701_N0301_R133_T46RER_20210908T070248 and
 S2A_MSIL2A_20221005T115411_N0400_R023_T29UNU_20221005T164454 (ESA).
 """
 
-import json
 import re
 from pathlib import Path
 
@@ -56,54 +55,34 @@ def write(path, values, crs, corner, pixel, driver="GTiff", **options):
     return values
 
 
-def landsat_groups(kind, level=1):
-    """Metadata by group, as text."""
-    product = kind["product"].replace("L1TP", "L2SP") if level == 2 else kind["product"]
+def landsat_groups(kind, changes=None):
+    """Metadata by group, as text, with changed values by group; None removes a key or a group."""
     groups = {}
-    for line in (DATA / f"{product}_MTL.txt").read_text().splitlines()[1:-2]:
+    for line in (DATA / f"{kind['product']}_MTL.txt").read_text().splitlines()[1:-2]:
         key, value = line.strip().split(" = ")
         if key == "GROUP":
             group = groups[value] = {}
         elif key != "END_GROUP":
             group[key] = value.strip('"')
+    for name, values in (changes or {}).items():
+        merged = groups.pop(name, {}) | (values or {})
+        if values:
+            groups[name] = {key: value for key, value in merged.items() if value is not None}
     return groups
 
 
-def surface_by_hand(toa, terms):
-    """Surface reflectance from top-of-atmosphere reflectance, shape (band, y, x)."""
-    names = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
-    path, down, up, albedo, gas = (np.asarray(getattr(terms, name))[:, None, None] for name in names)
-    below = (toa / gas - path) / (down * up)
-    return below / (1 + albedo * below)
-
-
-def mtl(groups, form="txt", root="LANDSAT_METADATA_FILE"):
-    """Metadata text in one of the three USGS formats."""
-    if form == "json":
-        return json.dumps({root: groups}, indent=2)
-    opening, item, closing, end = {
-        "xml": ("<{}>", "<{0}>{1}</{0}>", "</{}>", ""),
-        "txt": ("GROUP = {}", "{} = {}", "END_GROUP = {}", "END\n"),
-    }[form]
-    lines = [opening.format(root)]
+def mtl(groups):
+    """Text of metadata."""
+    lines = ["GROUP = LANDSAT_METADATA_FILE"]
     for group, values in groups.items():
-        lines += [opening.format(group)]
-        lines += [item.format(key, value if form == "xml" else _quoted(key, value)) for key, value in values.items()]
-        lines += [closing.format(group)]
-    return "\n".join([*lines, closing.format(root), end])
+        lines += [f"GROUP = {group}", *(f'{key} = "{value}"' for key, value in values.items()), f"END_GROUP = {group}"]
+    return "\n".join([*lines, "END_GROUP = LANDSAT_METADATA_FILE", "END\n"])
 
 
-def _quoted(key, value):
-    """Text in quotes; numbers and dates have none."""
-    plain = key in ("DATE_ACQUIRED", "COLLECTION_NUMBER") or re.fullmatch(r"-?[\d.]+(e-?\d+)?", value)
-    return value if plain else json.dumps(value)
-
-
-def landsat(folder, kind, level=1, groups=None):
+def landsat(folder, kind, changes=None):
     """Write a Landsat product and return the values of its files: bands, quality, saturation and angles."""
-    groups, place = groups or landsat_groups(kind, level), kind["place"]
+    groups, place, dtype = landsat_groups(kind, changes), kind["place"], kind["dtype"]
     contents, files = groups["PRODUCT_CONTENTS"], {}
-    dtype = "uint16" if level == 2 else kind["dtype"]
     (west, north), numbers = place["corner"], re.findall(r"FILE_NAME_BAND_(\d)\b", " ".join(contents))
     fine = {"crs": place["crs"], "corner": (west + 7.5, north - 7.5), "pixel": 15.0}
     for number in numbers:
@@ -136,7 +115,6 @@ SENTINEL2 = {
     2: ("S2A_MSIL2A_20221005T115411_N{}_R023_T29UNU_20221005T164454", "MTD_MSIL2A.xml"),
 }
 CORNER, UTM = (499980.0, 5900040.0), "EPSG:32629"
-U = "0.983841990384341"
 
 
 def product_xml(level, baseline="04.00"):
