@@ -218,20 +218,6 @@ def test_operations_on_a_lazy_scan_are_lazy_and_equal():
         xr.testing.assert_identical(lazy.compute(), verb(image))
 
 
-def test_scan_that_is_not_seen_or_used_as_a_map_raises():
-    image = lit()[1]
-    height = grids.place(xr.DataArray(np.full((60, 66), 400.0), dims=("y", "x")), grids.geobox(scene((60, 66))))
-    for call, said in (
-        (lambda: fifesim.sense_swath(scene(), NARROW, nadir_offset=4e5), "does not see the scene"),
-        (lambda: image.fifesim.to_surface(elevation=height), "does not fit the lines and samples"),
-        (lambda: image.fifesim.to_surface(adjacency=True), "does not fit the lines and samples"),
-        (lambda: fifesim.regress(*[image.fifesim.ndvi()] * 2), r"\.fifesim\.grid_swath\(grid\)"),
-        (lambda: fifesim.to_geotiff(image, "scan.tif"), r"map the scan with .grid_swath\(grid\)"),
-    ):
-        with pytest.raises(ValueError, match=said):
-            call()
-
-
 def test_varying_sun_is_sampled_at_each_pixel():
     toa, _ = lit()
     angles = np.linspace(20.0, 40.0, 66)
@@ -240,17 +226,6 @@ def test_varying_sun_is_sampled_at_each_pixel():
     column = ((image["x"] - toa["x"][0]) / (10 / 3)).round().astype(int).clip(0, 65)
     np.testing.assert_allclose(image["sza"], angles[column], rtol=0, atol=0.32)
     np.testing.assert_allclose(image.fifesim.to_reflectance().mean(), toa.mean(), rtol=1e-4, atol=0)
-
-
-def test_scan_round_trips_through_netcdf(tmp_path):
-    _, image = lit()
-    image.to_netcdf(tmp_path / "scan.nc")
-    with xr.open_dataarray(tmp_path / "scan.nc", decode_coords="all", mask_and_scale=False) as back:
-        xr.testing.assert_equal(back, image)
-        xr.testing.assert_identical(back.fifesim.to_radiance().drop_attrs(), image.fifesim.to_radiance().drop_attrs())
-        assert back.rio.crs == image.rio.crs
-    with xr.open_dataset(tmp_path / "scan.nc") as plain:
-        assert {"latitude", "longitude"} <= set(plain["dn"].encoding["coordinates"].split())
 
 
 # ------------------------------------------------------------------------------------------ sweeps
@@ -286,25 +261,6 @@ def swept(name, angle):
 def scan_angle_of(image, name):
     altitude = instrument(name).altitude
     return np.degrees(np.arcsin(np.sin(np.radians(image["vza"])) * 6371e3 / (6371e3 + altitude)))
-
-
-@pytest.mark.parametrize(
-    ("name", "angle", "along", "across"), [("MODIS", 55, 501.5, 1207.5), ("VIIRS", 30, 437.4, 555.0)]
-)
-def test_pixel_spacing_agrees_with_published_values(name, angle, along, across):
-    """
-    MODIS: Ichoku and Kaufman (2005). VIIRS: nadir sizes of the ATBD.
-
-    For 30 and 55 degrees the VIIRS sizes are scaled with slant range, incidence angle and aggregation (3 to 1 samples).
-    """
-    image = swept(name, angle)
-    near = (abs(scan_angle_of(image, name) - angle) < 0.3).values
-    assert near.any()
-    steps = {axis: np.hypot(image["x"].diff(axis), image["y"].diff(axis)).values for axis in ("line", "sample")}
-    swept_together = (image["sweep"].diff("line") == 0).values
-    down, right = steps["line"][swept_together], steps["sample"]
-    assert np.median(down[near[1:][swept_together]]) == pytest.approx(along, rel=0.03)
-    assert np.median(right[near[:, 1:]]) == pytest.approx(across, rel=0.03)
 
 
 @pytest.mark.parametrize(("name", "height"), [("MODIS", 10_000.0), ("VIIRS", 11_871.0)])
@@ -427,20 +383,3 @@ def test_image_of_a_swath_has_pixel_angles(lai, swath):
     one_sun = toa.drop_vars(["sza", "vza", "vaa"]).fifesim.sense(PAPER, quantise=False).fifesim.to_reflectance()
     count = (image["gain"] / image["solar_irradiance"]).values[:, None, None] * np.pi * 1.04 / np.cos(np.radians(31))
     assert np.all(np.abs(image.fifesim.to_reflectance() - one_sun).values <= 0.5 * count + 1e-9)
-
-
-def test_constant_angle_raster_equals_a_single_geometry(lai):
-    level, one = by_cell(28.5, 117.0, ramp(lai, 20.0, 20.0), 200.0), fifesim.Geometry(28.5, 117.0, 20.0, 200.0)
-    images = [reflected(lai, geometry).fifesim.to_toa().fifesim.sense("TM").astype(int) for geometry in (level, one)]
-    assert np.abs(images[0] - images[1]).max() <= 1
-
-
-def test_functions_of_one_geometry_and_views_below_the_horizon_raise(lai, swath):
-    low = by_cell(28.5, 117.0, ramp(lai, 20.0, 95.0), 200.0)
-    for call, said in (
-        (lambda: lai.fifesim.fpar(geometry=swath), "needs one direction of sun and sensor, got rasters of sza, vza, v"),
-        (lambda: reflected(lai, swath, dem=ramp(lai, 0, 10)), "needs one direction of sun and sensor"),
-        (lambda: reflected(lai, low), r"vza must be in \[0, 90\) degrees in every cell, got"),
-    ):
-        with pytest.raises(ValueError, match=said):
-            call()
