@@ -109,20 +109,19 @@ def landsat(folder, kind, changes=None):
     return files
 
 
-# By level: name of the product and its metadata file.
+# By level: name of the product, and text of its metadata.
 SENTINEL2 = {
-    1: ("S2A_MSIL1C_20210908T042701_N{}_R133_T46RER_20210908T070248", "MTD_MSIL1C.xml"),
-    2: ("S2A_MSIL2A_20221005T115411_N{}_R023_T29UNU_20221005T164454", "MTD_MSIL2A.xml"),
+    1: "S2A_MSIL1C_20210908T042701_N0400_R133_T46RER_20210908T070248.SAFE",
+    2: "S2A_MSIL2A_20221005T115411_N0400_R023_T29UNU_20221005T164454.SAFE",
 }
+PRODUCTS = {
+    1: (DATA / "MTD_MSIL1C.xml").read_text(encoding="utf-8"),
+    2: (DATA / "MTD_MSIL2A.xml").read_text(encoding="utf-8"),
+}
+# Sun: 58.38 - 0.0448 row - 0.006 column, and 171.9 + 0.0865 column, in steps of 5 km. View of bands 3 and 7: zenith
+# 5.5 + 0.3 column + 0.1 row; azimuth 281.4 of the detector on the left, and 110 on the right. [degree]
+TILE = (DATA / "MTD_TL.xml").read_text(encoding="utf-8")
 CORNER, UTM = (499980.0, 5900040.0), "EPSG:32629"
-
-
-def product_xml(level, baseline="04.00"):
-    """Text of MTD_MSIL1C.xml or MTD_MSIL2A.xml; offsets began with baseline 04.00."""
-    text = (DATA / SENTINEL2[level][1]).read_text(encoding="utf-8")
-    if baseline < "04.00":
-        text = re.sub(r"(?s)<(Radiometric_Offset_List|BOA_ADD_OFFSET_VALUES_LIST)>.*</\1>", "", text)
-    return text.replace("N0400", f"N{baseline.replace('.', '')}").replace(">04.00<", f">{baseline}<")
 
 
 def safe_files(text):
@@ -136,52 +135,11 @@ def safe_files(text):
     return files
 
 
-def sun_grid():
-    """Solar zenith and azimuth at the nodes of the 5 km grid. [degree]"""
-    rows, columns = np.indices((23, 23))
-    return 58.38 - 0.0448 * rows - 0.006 * columns, 171.9 + 0.0865 * columns
-
-
-def grids_xml(*zenith_and_azimuth):
-    """Text of a grid of zenith and, if given, a grid of azimuth."""
-    text = ""
-    for name, grid in zip(("Zenith", "Azimuth"), zenith_and_azimuth, strict=False):
-        rows = [" ".join(f"{value:g}" if np.isfinite(value) else "NaN" for value in row) for row in grid]
-        values = "".join(f"<VALUES>{row}</VALUES>\n" for row in rows)
-        steps = '<COL_STEP unit="m">5000</COL_STEP>\n<ROW_STEP unit="m">5000</ROW_STEP>\n'
-        text += f"<{name}>{steps}<Values_List>\n{values}</Values_List>\n</{name}>\n"
-    return text
-
-
-def tile_xml(level=1):
-    """Text of MTD_TL.xml, with views of two detectors (left and right of the tile) for two bands."""
-    rows, columns = np.indices((23, 23))
-    zenith, views = 5.5 + 0.3 * columns + 0.1 * rows, ""
-    for band in ("3", "7"):
-        for detector, seen, azimuth in (("9", columns <= 10, 281.4), ("10", (columns >= 10) & (columns < 20), 110.0)):
-            angles = grids_xml(*(np.where(seen, each, np.nan) for each in (zenith, azimuth)))
-            name = "Viewing_Incidence_Angles_Grids"
-            views += f'<{name} bandId="{band}" detectorId="{detector}">\n{angles}</{name}>\n'
-    kind = "Level-1C" if level == 1 else "Level-2A"
-    template = (DATA / "MTD_TL.xml").read_text(encoding="utf-8")
-    return template.format(kind=kind, sun=grids_xml(*sun_grid()), views=views)
-
-
-# Mean zenith and azimuth of the view by number of the band. [degree]
-MEAN_VIEWS = {
-    number: (float(zenith), float(azimuth))
-    for number, zenith, azimuth in re.findall(
-        r'Mean_Viewing_Incidence_Angle bandId="(\d+)">\s*<ZENITH\D*([\d.]+)\D*([\d.]+)', tile_xml()
-    )
-}
-
-
-def sentinel2(folder, level=1, baseline="04.00", width=120):
+def sentinel2(folder, level=1, width=120):
     """Write a .SAFE folder of JPEG 2000 files; return its path, and digital numbers by band and pixel size."""
-    product, metadata = SENTINEL2[level]
-    path, text = folder / f"{product.format(baseline.replace('.', ''))}.SAFE", product_xml(level, baseline)
-    files, place = {}, {"crs": UTM, "corner": CORNER, "driver": "JP2OpenJPEG"}
-    for (band, size), file in safe_files(text).items():
+    path, place = folder / SENTINEL2[level], {"crs": UTM, "corner": CORNER, "driver": "JP2OpenJPEG"}
+    files = {}
+    for (band, size), file in safe_files(PRODUCTS[level]).items():
         shape = (width // size, width // size)
         random = np.random.default_rng([size, len(band), ord(band[-1])])
         if band == "SCL":
@@ -191,11 +149,11 @@ def sentinel2(folder, level=1, baseline="04.00", width=120):
             dn[0, 0], dn[-1, -1] = 0, 65535
         files[band, size] = write(path / f"{file}.jp2", dn, pixel=float(size), **place)
     granule = path / Path(file).parents[-3]
-    if level == 1 and baseline >= "04.00":
+    if level == 1:
         masks = np.random.default_rng(9).integers(0, 2, (3, width // 60, width // 60)).astype(np.uint8)
         files["masks"] = write(granule / "QI_DATA" / "MSK_CLASSI_B00.jp2", masks, pixel=60.0, **place)
-    (path / metadata).write_text(text, encoding="utf-8")
-    (granule / "MTD_TL.xml").write_text(tile_xml(level), encoding="utf-8")
+    (path / f"MTD_MSIL{level}{'CA'[level - 1]}.xml").write_text(PRODUCTS[level])
+    (granule / "MTD_TL.xml").write_text(TILE)
     return path, files
 
 

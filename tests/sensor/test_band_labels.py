@@ -246,14 +246,6 @@ def test_gaps_are_determined_by_fwhm_and_refused_or_without_weight(leaf):
         assert len(str(error.value)) <= 500
 
 
-def test_packed_cubes_are_unpacked(leaf):
-    whole = (leaf * 10000).round().fillna(-1).astype("int16").drop_attrs(deep=False)
-    packed = whole.assign_attrs(scale_factor=1e-4, _FillValue=-1).assign_coords(wavelength=leaf["wavelength"])
-    unpacked = (whole * 1e-4).drop_attrs(deep=False).assign_coords(wavelength=leaf["wavelength"])
-    found, known = (each.fifesim.to_bands("OLI", bands="OLI4") for each in (packed, unpacked))
-    np.testing.assert_allclose(found, known, rtol=1e-12)
-
-
 def spectra(wavelength, units=None, dim="band", **coords):
     attrs = {} if units is None else {"units": units}
     found = xr.DataArray(np.zeros((2, len(wavelength))), dims=("sample", dim))
