@@ -12,7 +12,7 @@ import fifesim
 from fifesim.base.geometry import Geometry, earth_sun_distance, sun_positions
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.products import metadata
-from fifesim.sensor.products.labels import open_layer, reflectance
+from fifesim.sensor.products.labels import open_layer
 from fifesim.sensor.response.calibration import ProductBand
 
 SUN = Geometry(35.0, 130.0, earth_sun_distance=1.0148)
@@ -132,17 +132,6 @@ def test_file_that_is_no_layer_of_numbers_raises(tmp_path):
     ):
         with pytest.raises(ValueError, match=said):
             open_layer(tmp_path, name, None, "")
-
-
-def test_layers_of_different_grids_raise():
-    one, two = (
-        products.labelled(np.ones((1, *GRID.shape), np.uint8), grid, ["TM3"], {})[0].rename(name)
-        for name, grid in (("a.tif", GRID), ("b.tif", GRID.translate_pix(0.5, 0)))
-    )
-    bands = [ProductBand(name, "a.tif", 1e-3, 0.0, 255, None) for name in ("TM3", "TM4")]
-    assert reflectance([one, one], bands).dims == ("band", "y", "x")
-    with pytest.raises(ValueError, match=r"^b\.tif and a\.tif have different grids, .*bands="):
-        reflectance([one, two], bands)
 
 
 # ------------------------------------------------------------------------------------------- metadata

@@ -163,15 +163,6 @@ def test_scene_has_the_values_and_labels_of_a_fifesim_image(folders):
     np.testing.assert_allclose(scene.sel(band=bands), expected, rtol=1e-7, atol=1e-9)
 
 
-@pytest.mark.parametrize("chunks", [None, {"y": 5, "x": 7}])
-@pytest.mark.parametrize("angles", ["centre", "pixel"])
-def test_scene_does_not_depend_on_chunks(folders, chunks, angles):
-    folder, _ = folders["OLI"]
-    found = fifesim.open_landsat(folder, angles=angles, chunks=chunks)
-    assert (found.chunks is None) == (chunks is None)
-    assert found.compute().identical(fifesim.open_landsat(folder, angles=angles).compute())
-
-
 def test_angles_by_pixel_use_the_solar_zenith_of_each_pixel(folders):
     folder, files = folders["OLI"]
     scene = fifesim.open_landsat(folder, angles="pixel")
@@ -183,6 +174,9 @@ def test_angles_by_pixel_use_the_solar_zenith_of_each_pixel(folders):
     # West of the track the stored azimuth is negative.
     assert float(scene["vaa"][0, -1]) == 285.0
     assert scene["sza"].attrs["units"] == "degree"
+    for angles in ("centre", "pixel"):
+        found, whole = (fifesim.open_landsat(folder, angles=angles, chunks=each) for each in ({"y": 5, "x": 7}, None))
+        assert found.chunks is not None and whole.chunks is None and found.compute().identical(whole)
 
 
 def test_panchromatic_band_is_opened_by_name(folders):
