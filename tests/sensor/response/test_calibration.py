@@ -124,31 +124,6 @@ MODEL = NoiseModel(0.4, 0.01, detectors=16, gain_spread=0.004, offset_spread=0.2
 ALL = ("shot", "thermal", "fixed-pattern")
 
 
-def test_model_reproduces_published_snr():
-    """OLI red by hand, from (22 / 230)^2 and (150 / 950)^2: b = 1.233e-4 and c0 = 0.0802 W m-2 sr-1 um-1."""
-    model = NoiseModel.from_snr([22.0, 150.0], [230.0, 950.0], detectors=6)
-    np.testing.assert_allclose(model.snr([22.0, 60.0, 150.0]), [230, 510.3, 950], rtol=1e-3)
-    np.testing.assert_allclose([model.thermal, model.shot, model.detectors], [0.0802, 1.233e-4, 6], rtol=1e-3)
-    for share in (0.0, 0.4, 1.0, None):
-        model = NoiseModel.from_snr(80.0, 200.0, share)
-        # A quarter of the signal has half the shot noise and all other noise. By default, all is shot noise.
-        shot = 1.0 if share is None else share
-        expected = 0.4**2 * (shot / 4 + 1 - shot)
-        assert float(model.noise_equivalent_radiance(20.0)) ** 2 == pytest.approx(expected, rel=1e-12)
-    assert model.kinds == ("shot",)
-
-
-def test_noise_of_one_detector_has_the_requested_variance_and_fixed_pattern():
-    """Standard deviation within three standard errors; rows of one detector have equal fixed-pattern noise."""
-    for kinds, variance in ((["thermal"], 0.16), (["shot"], 0.6), (["shot", "thermal"], 0.76)):
-        noise = add_noise(np.full((150, 400), 60.0), MODEL, kinds, seed=5, band=2) - 60.0
-        assert abs(noise.std() / np.sqrt(variance) - 1) < 3 / np.sqrt(2 * noise.size)
-    noise = add_noise(np.full((40, 9), 100.0), MODEL, ["fixed-pattern"], seed=5, band=2)
-    np.testing.assert_array_equal(noise, noise[:, :1] + np.zeros(9))
-    np.testing.assert_array_equal(noise[16:], noise[:-16])
-    assert np.unique(noise[:, 0].round(12)).size == 16
-
-
 @pytest.mark.parametrize("radiance", [2.0, 40.0, 300.0])
 def test_propagated_noise_agrees_with_a_sample_of_detectors(radiance):
     """1 %: the standard error of 90,000 detectors is 0.24 %, after rounding to digital steps."""

@@ -10,7 +10,6 @@ from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response.spatial import (
     Difference,
     GaussianSpread,
-    LowPass,
     Mixture,
     SystemSpread,
     TableSpread,
@@ -38,18 +37,6 @@ def test_image_has_the_whole_response_and_is_not_mirrored():
     # The midpoint rule is accurate to 1e-6.
     np.testing.assert_allclose(found, density.reshape(-1, 100).sum(axis=1), rtol=0, atol=1e-6)
     assert found.sum() == pytest.approx(1.0, abs=1e-6) and abs(found - found[::-1]).max() > 0.001
-
-
-def test_system_mtf_is_the_product_of_its_parts():
-    """Optics, detector, smear and electronics of a scanner; the truncated share is at most `truncation`."""
-    frequency = np.linspace(0, 1 / 30, 40)
-    for truncation in (1e-3, 1e-4):
-        parts = GaussianSpread(12.0), Boxcar(30.0), Boxcar(9.0), LowPass(0.05, 2)
-        spread = SystemSpread(parts, truncation)
-        assert spread.truncated_share <= truncation
-        expected = np.prod([part.mtf(frequency) for part in parts], axis=0)
-        np.testing.assert_allclose(spread.mtf(frequency), expected, rtol=0, atol=4 * truncation)
-        np.testing.assert_allclose(spread.product(frequency), expected, rtol=1e-12)
 
 
 def sampled_contrast(spread, frequency, recorded, cell=10.0, pixel=30.0):
