@@ -17,7 +17,7 @@ from fifesim.grids import grid as grids
 from fifesim.sensor.description.instrument_file import Scan
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response.noise import NoiseModel
-from fifesim.sensor.response.scan import growth, place_beside, view_components, view_from_ground, view_from_scan
+from fifesim.sensor.response.scan import growth, place_beside, view_from_ground, view_from_scan
 from fifesim.sensor.scan_labels import latitude_longitude, seen_alike
 
 # ------------------------------------------------------------------------------------------ view angles

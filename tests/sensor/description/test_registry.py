@@ -15,7 +15,7 @@ from fifesim.sensor.description.listing import blur_in_words, instrument_in_word
 from fifesim.sensor.description.plausibility import check_instrument_units
 from fifesim.sensor.description.provenance import band_provenance
 from fifesim.sensor.response.calibration import gain_offset
-from fifesim.sensor.response.scan import swath_width
+from fifesim.sensor.response.scan import EARTH_RADIUS, ground_of_detector, swath_width, view_from_scan
 
 DATA = Path(__file__).parents[2] / "data"
 FILES = sorted(files.path("instruments").glob("*.toml"))
@@ -60,6 +60,16 @@ def radiance_of(item, each, count):
     return count * gain + offset
 
 
+def pixel_size(item, each, scan_angle):
+    """Pixel size along track (between the two middle lines) and across track (between sample edges). [m]"""
+    pattern = item.scan_pattern(each)
+    edges = pattern.scan_angle(np.floor(pattern.position(scan_angle)) + np.array([0, 1]))
+    across = np.diff(np.radians(view_from_scan(edges, item.altitude)[1])) * EARTH_RADIUS
+    lines = pattern.track_angle()[pattern.lines // 2 - 1 :][:2]
+    ahead, aside = ground_of_detector(lines, edges.mean(), item.altitude)
+    return float(np.diff(ahead)[0] * np.cos(np.radians(aside[0]))), float(across[0])
+
+
 MEASURES = {
     "wavelength": lambda item, each, at: 1000 * each.wavelength,
     "wavenumber": lambda item, each, at: mean_wavenumber(each.response),
@@ -73,6 +83,7 @@ MEASURES = {
     "swath": lambda item, each, at: swath_width(item.altitude, item.scan.max_angle) / 1000,
     "reflectance": lambda item, each, at: np.pi * np.array(ends_of(each)) / each.solar_irradiance,
     "albedo": lambda item, each, at: 100 * np.pi * radiance_of(item, each, at) / each.solar_irradiance,
+    "pixel": pixel_size,
 }
 
 

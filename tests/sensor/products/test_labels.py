@@ -7,6 +7,7 @@ import products
 import pytest
 import xarray as xr
 from lazy import check_raster_function, in_chunks
+from mistakes import mistakes
 
 import fifesim
 from fifesim.base.geometry import Geometry, earth_sun_distance, sun_positions
@@ -195,18 +196,16 @@ SECRET = "not for anybody"
 ENTITY = '<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        ('<!DOCTYPE a [<!ENTITY b SYSTEM "{file}">]><a>&b;</a>', "declares a document type"),
-        ('<!DOCTYPE a SYSTEM "{file}"><a/>', "declares a document type"),
-        # A parser sees declarations in UTF-16, but a search for ASCII text does not.
-        (f'<?xml version="1.0" encoding="UTF-16"?>{ENTITY}'.encode("utf-16"), "is no text"),
-        ("<a>" + " " * 2000 + "</a>", "has 2007 bytes: metadata has at most 2000"),
-        *((text, "is not valid XML") for text in ("<a>", "<a></b>", "", "<a>" * 100)),
-        (None, "is a pipe"),
-    ],
-)
+XML = [each[1:] for each in mistakes("xml", name="sensor_mistakes")]
+XML += [
+    # A parser sees declarations in UTF-16, but a search for ASCII text does not.
+    (f'<?xml version="1.0" encoding="UTF-16"?>{ENTITY}'.encode("utf-16"), "is no text"),
+    ("<a>" + " " * 2000 + "</a>", "has 2007 bytes: metadata has at most 2000"),
+    (None, "is a pipe"),
+]
+
+
+@pytest.mark.parametrize(("content", "said"), XML)
 def test_unsafe_or_invalid_xml_raises_in_one_line(tmp_path, monkeypatch, content, said):
     """Entities are not followed, and large files and pipes not read."""
     monkeypatch.setattr(metadata, "_LARGEST", 2000)

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import products
 import pytest
+from mistakes import mistakes
 
 import fifesim
 from fifesim.sensor.products.landsat_labels import read_scene
@@ -146,22 +147,18 @@ def test_sentinel2_products_agree_with_expected_values(metadata, tmp_path, produ
         assert "quality" not in fifesim.open_sentinel2(path, 10).coords, "cloud masks began with baseline 04.00"
 
 
-REFUSED = {
-    "LC08_L1TP_026200_20240502_20240513_02_T2": r"the sun is below the horizon, .*taken at night.*take one of the day",
-    "LC80100202015018LGN00": "is of Collection 1 or older: take the scene's Collection-2 product",
-    # Its file name ends in _MTL.TXT.
-    "LE07_L1TP_160031_20110416_20161210_01_T1": "is of Collection 1 or older: take the scene's Collection-2 product",
-}
+REFUSED = mistakes("refused product", name="sensor_mistakes")
 
 
 def test_every_product_is_tested():
-    assert set(REFUSED) == set(EXPECTED) - set(OPENED) and len(EXPECTED) == 26
+    assert {product for _, product, _ in REFUSED} == set(EXPECTED) - set(OPENED) and len(EXPECTED) == 26
 
 
-@pytest.mark.parametrize("product", REFUSED)
+@pytest.mark.parametrize(("stage", "product", "said"), REFUSED, ids=str)
 @pytest.mark.parametrize("angles", ["centre", "pixel"])
-def test_unsupported_products_raise_with_reason_and_remedy(metadata, product, angles):
+def test_unsupported_products_raise_with_reason_and_remedy(metadata, stage, product, said, angles):
+    """Also where the file name ends in _MTL.TXT."""
     folder = metadata / "landsat" / product
     for path in (folder, *folder.iterdir()):
-        with pytest.raises(ValueError, match=REFUSED[product]):
+        with pytest.raises(ValueError, match=said):
             fifesim.open_landsat(path, angles=angles)

@@ -16,7 +16,6 @@ from fifesim.sensor.response.scan import (
     Track,
     apply_operator,
     footprint_operator,
-    ground_of_detector,
     ground_track,
     passes,
     swath_width,
@@ -24,6 +23,8 @@ from fifesim.sensor.response.scan import (
     view_from_scan,
 )
 from fifesim.sensor.response.spatial import CosineSpread
+
+VIIRS = instrument("VIIRS")
 
 # ------------------------------------------------------------------------------------------ sweeps
 
@@ -35,54 +36,10 @@ def test_view_beyond_the_horizon_is_missing():
     assert np.isnan(swath_width(705e3, horizon + 0.01)) and np.isfinite(swath_width(705e3, horizon - 0.01))
 
 
-def pattern_of(name, band):
-    item = instrument(name)
-    (found,) = item.select([band])
-    return item.scan_pattern(found), item.altitude
-
-
-def pixel_size(name, band, scan_angle):
-    """Pixel size along track (between the two middle lines) and across track (between sample edges). [m]"""
-    pattern, altitude = pattern_of(name, band)
-    sample = np.floor(pattern.position(scan_angle))
-    edges = pattern.scan_angle(np.array([sample, sample + 1]))
-    across = np.diff(np.radians(view_from_scan(edges, altitude)[1])) * EARTH_RADIUS
-    lines = pattern.track_angle()[pattern.lines // 2 - 1 :][:2]
-    ahead, aside = ground_of_detector(lines, edges.mean(), altitude)
-    return float(np.diff(ahead)[0] * np.cos(np.radians(aside[0]))), float(across[0])
-
-
-def modis_by_ichoku_and_kaufman(scan_angle, size=1000.0):
-    """Pixel size along and across track, IEEE TGRS 43 (2005), doi:10.1109/TGRS.2005.857328. [m]"""
-    radius, orbit, step = 6378.137e3, 6378.137e3 + 705e3, size / 705e3
-    theta, ratio = np.radians(scan_angle), 6378.137 / (6378.137 + 705)
-    root = np.sqrt(ratio**2 - np.sin(theta) ** 2)
-    return step * orbit * (np.cos(theta) - root), step * radius * (np.cos(theta) / root - 1)
-
-
-MODIS = [
-    ("MODIS", band, scan_angle, modis_by_ichoku_and_kaufman(scan_angle, size), 0.01)
-    for band, size in (("MODIS1", 250.0), ("MODIS3", 500.0))
-    for scan_angle in (0.01, 30.0, -30.0, 54.9)
-]
-# Horizontal sampling intervals of Table 2.2-1, VIIRS geolocation ATBD (2014).
-VIIRS = [
-    ("VIIRS", "I1", 0.01, (371, 388), 0.02),
-    ("VIIRS", "I1", 56.06, (800, 789), 0.02),
-    ("VIIRS", "M5", 0.01, (742, 776), 0.02),
-    ("VIIRS", "M5", -56.06, (1600, 1580), 0.02),
-]
-
-
-@pytest.mark.parametrize(("name", "band", "scan_angle", "published", "rtol"), MODIS + VIIRS)
-def test_pixel_sizes_agree_with_published_values(name, band, scan_angle, published, rtol):
-    np.testing.assert_allclose(pixel_size(name, band, scan_angle), published, rtol=rtol)
-
-
 @pytest.mark.parametrize("band", ["I1", "M5"])
 def test_sample_positions_and_scan_angles_are_inverse(band):
     """Zones from the SDR User's Guide 1.2: 31.72, 44.86 and 56.28 degrees; samples from viirs_pxcvt.c of OCSSW."""
-    pattern, _ = pattern_of("VIIRS", band)
+    pattern = VIIRS.scan_pattern(VIIRS.select(band)[0])
     half = {"I1": (1184, 1920, 3200), "M5": (592, 960, 1600)}[band]
     np.testing.assert_allclose(pattern.scan_angle(np.array(half)), (31.72, 44.86, 56.28), rtol=0, atol=0.015)
     position = np.array([-half[2], -half[0] - 7.5, -0.5, 0.0, 0.5, half[0] + 7.5, half[1] + 3.5])
@@ -104,7 +61,7 @@ def test_deleted_pixels_agree_with_granules(band, lines, samples, zones):
     expected = np.zeros((lines, samples), bool)
     for rows, first, last in zones:
         expected[list(rows), :first] = expected[list(rows), last:] = True
-    pattern, _ = pattern_of("VIIRS", band)
+    pattern = VIIRS.scan_pattern(VIIRS.select(band)[0])
     line, sample = np.arange(-3 * lines, -2 * lines)[:, None], np.arange(samples) - samples // 2
     np.testing.assert_array_equal(pattern.is_deleted(line, sample), expected)
 
@@ -120,7 +77,7 @@ def test_pushbroom_and_single_detector_sweep_one_line():
 @pytest.mark.parametrize(("name", "sample"), [("I1", 0.35), ("M5", 0.25)])
 def test_viirs_mtf_is_sample_mtf_times_aggregation(name, sample):
     """At 0.5 cycles per n samples, a sample passes m^(1 / n^2) and the sum of samples 1 / (n sin(pi / 2 n))."""
-    item = instrument("VIIRS")
+    item = VIIRS
     (band,) = item.select(name)
     step = item.ground_intervals(band).across / 3
     for count in (1, 2, 3):
