@@ -45,7 +45,6 @@ OLD = "S2A_OPER_MTD_SAFL1C_PDMC_20151206T093912_R090_V20151206T043239.xml"
     ("names", "said"),
     [
         (["metadata.xml", "B01.jp2", "B8A.jp2", "tileInfo.json"], AWS),
-        (["R10m/B02.jp2", "R20m/B05.jp2"], AWS),
         (["granule_metadata.xml", "B04.tif", "SCL.tif"], AWS),
         ([OLD], "form of before December 2016"),
     ],
