@@ -256,7 +256,9 @@ def test_summary_has_the_values_of_the_instrument():
     """
     paper, dove, step = instrument("TM", "paper"), instrument("SuperDove"), 42.5e-6
     oli = instrument("OLI", "detector")
-    wide = replace(oli, interval=Angles(along=4 * step, across=8 * step), ifov=2 * step, bands=oli.bands[:1])
+    wide = replace(
+        oli, interval=Angles(along=4 * step, across=8 * step), ifov=2 * step, bands=instrument("OLI").bands[:1]
+    )
     (red,) = [line.split() for line in instrument_in_words(paper).splitlines() if line.startswith("  TM3")]
     assert red[5:8] == ["-1.20", "204.30", "0.8059"]
     for item, lines in (
