@@ -57,7 +57,7 @@ ONTO = {
 
 
 def plane(raster):
-    return 0.2 + 1e-3 * ((raster.x - 705600) + 0.3 * (raster.y - 4333900))
+    return 0.2 + 1e-3 * ((raster.x.drop_attrs() - 705600) + 0.3 * (raster.y.drop_attrs() - 4333900))
 
 
 @pytest.mark.parametrize("onto", ONTO.values(), ids=ONTO.keys())
