@@ -2,12 +2,11 @@
 Small products in the formats of the agencies.
 
 The images have few pixels. Metadata are shortened from these products:
-LT05_L1TP_058014_20110312_20200823_02_T1 and LC08_L2SP_047027_20201204_20210313_02_T1 (USGS),
+LT05_L1TP_058014_20110312_20200823_02_T1 and LC08_L1TP_047027_20201204_20210313_02_T1 (USGS),
 S2A_MSIL1C_20210908T042701_N0301_R133_T46RER_20210908T070248 and
 S2A_MSIL2A_20221005T115411_N0400_R023_T29UNU_20221005T164454 (ESA).
 """
 
-import json
 import re
 from pathlib import Path
 
@@ -56,54 +55,34 @@ def write(path, values, crs, corner, pixel, driver="GTiff", **options):
     return values
 
 
-def landsat_groups(kind, level=1):
-    """Metadata by group, as text."""
-    product = kind["product"].replace("L1TP", "L2SP") if level == 2 else kind["product"]
+def landsat_groups(kind, changes=None):
+    """Metadata by group, as text, with changed values by group; None removes a key or a group."""
     groups = {}
-    for line in (DATA / f"{product}_MTL.txt").read_text().splitlines()[1:-2]:
+    for line in (DATA / f"{kind['product']}_MTL.txt").read_text().splitlines()[1:-2]:
         key, value = line.strip().split(" = ")
         if key == "GROUP":
             group = groups[value] = {}
         elif key != "END_GROUP":
             group[key] = value.strip('"')
+    for name, values in (changes or {}).items():
+        merged = groups.pop(name, {}) | (values or {})
+        if values:
+            groups[name] = {key: value for key, value in merged.items() if value is not None}
     return groups
 
 
-def surface_by_hand(toa, terms):
-    """Surface reflectance from top-of-atmosphere reflectance, shape (band, y, x)."""
-    names = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
-    path, down, up, albedo, gas = (np.asarray(getattr(terms, name))[:, None, None] for name in names)
-    below = (toa / gas - path) / (down * up)
-    return below / (1 + albedo * below)
-
-
-def mtl(groups, form="txt", root="LANDSAT_METADATA_FILE"):
-    """Metadata text in one of the three USGS formats."""
-    if form == "json":
-        return json.dumps({root: groups}, indent=2)
-    opening, item, closing, end = {
-        "xml": ("<{}>", "<{0}>{1}</{0}>", "</{}>", ""),
-        "txt": ("GROUP = {}", "{} = {}", "END_GROUP = {}", "END\n"),
-    }[form]
-    lines = [opening.format(root)]
+def mtl(groups):
+    """Text of metadata."""
+    lines = ["GROUP = LANDSAT_METADATA_FILE"]
     for group, values in groups.items():
-        lines += [opening.format(group)]
-        lines += [item.format(key, value if form == "xml" else _quoted(key, value)) for key, value in values.items()]
-        lines += [closing.format(group)]
-    return "\n".join([*lines, closing.format(root), end])
+        lines += [f"GROUP = {group}", *(f'{key} = "{value}"' for key, value in values.items()), f"END_GROUP = {group}"]
+    return "\n".join([*lines, "END_GROUP = LANDSAT_METADATA_FILE", "END\n"])
 
 
-def _quoted(key, value):
-    """Text in quotes; numbers and dates have none."""
-    plain = key in ("DATE_ACQUIRED", "COLLECTION_NUMBER") or re.fullmatch(r"-?[\d.]+(e-?\d+)?", value)
-    return value if plain else json.dumps(value)
-
-
-def landsat(folder, kind, level=1, groups=None):
+def landsat(folder, kind, changes=None):
     """Write a Landsat product and return the values of its files: bands, quality, saturation and angles."""
-    groups, place = groups or landsat_groups(kind, level), kind["place"]
+    groups, place, dtype = landsat_groups(kind, changes), kind["place"], kind["dtype"]
     contents, files = groups["PRODUCT_CONTENTS"], {}
-    dtype = "uint16" if level == 2 else kind["dtype"]
     (west, north), numbers = place["corner"], re.findall(r"FILE_NAME_BAND_(\d)\b", " ".join(contents))
     fine = {"crs": place["crs"], "corner": (west + 7.5, north - 7.5), "pixel": 15.0}
     for number in numbers:
@@ -130,21 +109,19 @@ def landsat(folder, kind, level=1, groups=None):
     return files
 
 
-# By level: name of the product and its metadata file.
+# By level: name of the product, and text of its metadata.
 SENTINEL2 = {
-    1: ("S2A_MSIL1C_20210908T042701_N{}_R133_T46RER_20210908T070248", "MTD_MSIL1C.xml"),
-    2: ("S2A_MSIL2A_20221005T115411_N{}_R023_T29UNU_20221005T164454", "MTD_MSIL2A.xml"),
+    1: "S2A_MSIL1C_20210908T042701_N0400_R133_T46RER_20210908T070248.SAFE",
+    2: "S2A_MSIL2A_20221005T115411_N0400_R023_T29UNU_20221005T164454.SAFE",
 }
+PRODUCTS = {
+    1: (DATA / "MTD_MSIL1C.xml").read_text(encoding="utf-8"),
+    2: (DATA / "MTD_MSIL2A.xml").read_text(encoding="utf-8"),
+}
+# Sun: 58.38 - 0.0448 row - 0.006 column, and 171.9 + 0.0865 column, in steps of 5 km. View of bands 3 and 7: zenith
+# 5.5 + 0.3 column + 0.1 row; azimuth 281.4 of the detector on the left, and 110 on the right. [degree]
+TILE = (DATA / "MTD_TL.xml").read_text(encoding="utf-8")
 CORNER, UTM = (499980.0, 5900040.0), "EPSG:32629"
-U = "0.983841990384341"
-
-
-def product_xml(level, baseline="04.00"):
-    """Text of MTD_MSIL1C.xml or MTD_MSIL2A.xml; offsets began with baseline 04.00."""
-    text = (DATA / SENTINEL2[level][1]).read_text(encoding="utf-8")
-    if baseline < "04.00":
-        text = re.sub(r"(?s)<(Radiometric_Offset_List|BOA_ADD_OFFSET_VALUES_LIST)>.*</\1>", "", text)
-    return text.replace("N0400", f"N{baseline.replace('.', '')}").replace(">04.00<", f">{baseline}<")
 
 
 def safe_files(text):
@@ -158,52 +135,11 @@ def safe_files(text):
     return files
 
 
-def sun_grid():
-    """Solar zenith and azimuth at the nodes of the 5 km grid. [degree]"""
-    rows, columns = np.indices((23, 23))
-    return 58.38 - 0.0448 * rows - 0.006 * columns, 171.9 + 0.0865 * columns
-
-
-def grids_xml(*zenith_and_azimuth):
-    """Text of a grid of zenith and, if given, a grid of azimuth."""
-    text = ""
-    for name, grid in zip(("Zenith", "Azimuth"), zenith_and_azimuth, strict=False):
-        rows = [" ".join(f"{value:g}" if np.isfinite(value) else "NaN" for value in row) for row in grid]
-        values = "".join(f"<VALUES>{row}</VALUES>\n" for row in rows)
-        steps = '<COL_STEP unit="m">5000</COL_STEP>\n<ROW_STEP unit="m">5000</ROW_STEP>\n'
-        text += f"<{name}>{steps}<Values_List>\n{values}</Values_List>\n</{name}>\n"
-    return text
-
-
-def tile_xml(level=1):
-    """Text of MTD_TL.xml, with views of two detectors (left and right of the tile) for two bands."""
-    rows, columns = np.indices((23, 23))
-    zenith, views = 5.5 + 0.3 * columns + 0.1 * rows, ""
-    for band in ("3", "7"):
-        for detector, seen, azimuth in (("9", columns <= 10, 281.4), ("10", (columns >= 10) & (columns < 20), 110.0)):
-            angles = grids_xml(*(np.where(seen, each, np.nan) for each in (zenith, azimuth)))
-            name = "Viewing_Incidence_Angles_Grids"
-            views += f'<{name} bandId="{band}" detectorId="{detector}">\n{angles}</{name}>\n'
-    kind = "Level-1C" if level == 1 else "Level-2A"
-    template = (DATA / "MTD_TL.xml").read_text(encoding="utf-8")
-    return template.format(kind=kind, sun=grids_xml(*sun_grid()), views=views)
-
-
-# Mean zenith and azimuth of the view by number of the band. [degree]
-MEAN_VIEWS = {
-    number: (float(zenith), float(azimuth))
-    for number, zenith, azimuth in re.findall(
-        r'Mean_Viewing_Incidence_Angle bandId="(\d+)">\s*<ZENITH\D*([\d.]+)\D*([\d.]+)', tile_xml()
-    )
-}
-
-
-def sentinel2(folder, level=1, baseline="04.00", width=120):
+def sentinel2(folder, level=1, width=120):
     """Write a .SAFE folder of JPEG 2000 files; return its path, and digital numbers by band and pixel size."""
-    product, metadata = SENTINEL2[level]
-    path, text = folder / f"{product.format(baseline.replace('.', ''))}.SAFE", product_xml(level, baseline)
-    files, place = {}, {"crs": UTM, "corner": CORNER, "driver": "JP2OpenJPEG"}
-    for (band, size), file in safe_files(text).items():
+    path, place = folder / SENTINEL2[level], {"crs": UTM, "corner": CORNER, "driver": "JP2OpenJPEG"}
+    files = {}
+    for (band, size), file in safe_files(PRODUCTS[level]).items():
         shape = (width // size, width // size)
         random = np.random.default_rng([size, len(band), ord(band[-1])])
         if band == "SCL":
@@ -213,11 +149,11 @@ def sentinel2(folder, level=1, baseline="04.00", width=120):
             dn[0, 0], dn[-1, -1] = 0, 65535
         files[band, size] = write(path / f"{file}.jp2", dn, pixel=float(size), **place)
     granule = path / Path(file).parents[-3]
-    if level == 1 and baseline >= "04.00":
+    if level == 1:
         masks = np.random.default_rng(9).integers(0, 2, (3, width // 60, width // 60)).astype(np.uint8)
         files["masks"] = write(granule / "QI_DATA" / "MSK_CLASSI_B00.jp2", masks, pixel=60.0, **place)
-    (path / metadata).write_text(text, encoding="utf-8")
-    (granule / "MTD_TL.xml").write_text(tile_xml(level), encoding="utf-8")
+    (path / f"MTD_MSIL{level}{'CA'[level - 1]}.xml").write_text(PRODUCTS[level])
+    (granule / "MTD_TL.xml").write_text(TILE)
     return path, files
 
 

@@ -1,4 +1,4 @@
-"""Sensor on labelled rasters: images, calibration, digital numbers of products, and noise."""
+"""Images on labelled rasters: pixels, calibration, digital numbers of products, saturation, compression and noise."""
 
 import warnings
 from dataclasses import replace
@@ -11,17 +11,19 @@ import xarray as xr
 from lazy import ODD_CHUNKS, check_raster_function, in_chunks, no_compute
 
 import fifesim
-from fifesim.base.footprints import axis_operator, regularize
+from fifesim.base.footprints import Boxcar
 from fifesim.base.geometry import Geometry
 from fifesim.grids import cf, directions
 from fifesim.grids import grid as grids
+from fifesim.sensor.description import spatial_response as responses
 from fifesim.sensor.description.instrument_file import Noise
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.labels import noisy
+from fifesim.sensor.pixel_labels import check_scene, pixel_grid
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.noise import NoiseModel, add_noise
 
-TM, PAPER = instrument("TM"), instrument("TM", "paper")
+TM, PAPER, MSS = instrument("TM"), instrument("TM", "paper"), instrument("MSS")
 RED_NIR = TM.select(["TM3", "TM4"])
 SUN = Geometry(40.0, 120.0, earth_sun_distance=1.0148)
 # Arbitrary noise, not of a real instrument.
@@ -33,8 +35,6 @@ NOISY = replace(
     bands=tuple(replace(band, noise=FIGURES) for band in PAPER.bands),
 )
 ALL = ("shot", "thermal", "fixed-pattern")
-BARE = NoiseModel(0.5, 0.0)
-SILENT = replace(PAPER, bands=tuple(replace(band, noise=None) for band in TM.bands))
 
 
 def scene(grid, bands=("TM3", "TM4"), sun=SUN, seed=2, **coords):
@@ -48,30 +48,42 @@ def toa(site):
     return scene(site)
 
 
-def radiance_by_kernels(toa, pixels):
-    """Radiance of pixels from direct calls of the footprint and calibration kernels."""
-    cells = grids.geobox(toa)
-    rows, columns = (
-        axis_operator(
-            TM.line_spread, cell_origin=origin, cell_size=cell, n_cells=n, pixel_origin=start, pixel_size=size,
-            n_pixels=count,
-        )
-        for origin, cell, n, start, size, count in (
-            (cells.affine.f, cells.affine.e, cells.shape.y, pixels.affine.f, pixels.affine.e, pixels.shape.y),
-            (cells.affine.c, cells.affine.a, cells.shape.x, pixels.affine.c, pixels.affine.a, pixels.shape.x),
-        )
-    )  # fmt: skip
-    sun = np.array([band.solar_irradiance for band in RED_NIR])[:, None, None]
-    means = regularize(toa.values, rows, columns)
-    return calibration.reflectance_to_radiance(means, sun, SUN.mu_s, SUN.earth_sun_distance)
-
-
 ONTO = {
     "aligned": None,
     "offset": fifesim.grid_at("EPSG:26914", 705581.3, 4333911.9, 110.0, 95.0, 30.0),
     "own-interval": fifesim.grid_at("EPSG:26914", 705571.0, 4333919.0, 150.0, 130.0, 30.315),
     "beyond-the-scene": fifesim.grid_at("EPSG:26914", 705520.0, 4333960.0, 300.0, 300.0, 30.0),
 }
+
+
+def plane(raster):
+    return 0.2 + 1e-3 * ((raster.x.drop_attrs() - 705600) + 0.3 * (raster.y.drop_attrs() - 4333900))
+
+
+@pytest.mark.parametrize("onto", ONTO.values(), ids=ONTO.keys())
+def test_sense_follows_the_raster_rules_and_pixels_lie_at_their_coordinates(toa, site, onto):
+    image = check_raster_function(lambda toa: fifesim.sense(toa, "TM", onto=onto), toa, quantity="dn")
+    assert grids.same_grid(grids.geobox(image), grids.aligned_grid(site, 30.0) if onto is None else onto)
+    assert image.dtype == np.uint8 and (image > 0).any()
+    means = fifesim.sense(toa, "TM", onto=onto, quantise=False)
+    # Half a count, plus rounding of a division.
+    inside, gain = (image.values > 1) & (image.values < 255), image["gain"].values[:, None, None]
+    assert (np.abs(fifesim.sensor.to_radiance(image) - means).values <= 0.5 * gain * (1 + 1e-9))[inside].all()
+    np.testing.assert_array_equal(np.isnan(means), image == 0)
+    # The mean of a plane over a symmetric footprint is its value at the centre; steps of cells leave 0.06 m.
+    seen = fifesim.sense(toa * 0 + plane(toa), PAPER, onto=onto, quantise=False).fifesim.to_reflectance()
+    box = site.boundingbox
+    whole = (abs(seen.x - (box.left + box.right) / 2) < 74) & (abs(seen.y - (box.bottom + box.top) / 2) < 59)
+    assert whole.sum() >= 6 and float(abs(seen - plane(seen)).where(whole).max()) < 0.06e-3
+
+
+def test_digital_numbers_of_a_uniform_scene_by_hand(toa):
+    """Reflectances of 0.1 and 0.3: E cos(40 degrees) / (pi 1.0148^2) times them, on the scale of Table 1."""
+    uniform = toa * 0 + xr.DataArray([0.1, 0.3], dims="band", coords={"band": ["TM3", "TM4"]})
+    radiance = np.array([0.1 * 1536.0, 0.3 * 1031.0]) * np.cos(np.radians(40.0)) / (np.pi * 1.0148**2)
+    counts = np.rint((radiance - [-1.2, -1.5]) / [205.5 / 255, 207.7 / 255])
+    image = fifesim.sense(uniform, PAPER)
+    np.testing.assert_array_equal(image, np.broadcast_to(counts[:, None, None], image.shape))
 
 
 def test_offset_and_gain_drift_may_differ_by_date(toa):
@@ -86,24 +98,8 @@ def test_offset_and_gain_drift_may_differ_by_date(toa):
         plain = both.isel(time=number).fifesim.sense("TM", quantise=False, offset=(offset, 0.0))
         expected = plain.values * np.array(factors)[:, None, None]
         np.testing.assert_allclose(found.isel(time=number).values, expected, rtol=1e-12)
-    assert "gain drift" in found.attrs["history"]
     lazy = in_chunks(toa, ODD_CHUNKS).fifesim.sense("TM", gain_drift=0.9)
     np.testing.assert_array_equal(lazy.values, toa.fifesim.sense("TM", gain_drift=0.9).values)
-
-
-@pytest.mark.parametrize("onto", ONTO.values(), ids=ONTO.keys())
-def test_sense_follows_the_raster_rules_and_equals_the_kernels(toa, site, onto):
-    image = check_raster_function(lambda toa: fifesim.sense(toa, "TM", onto=onto), toa, quantity="dn")
-    pixels = grids.aligned_grid(site, 30.0) if onto is None else onto
-    assert grids.same_grid(grids.geobox(image), pixels)
-    full, low = ([getattr(band, f"{name}_radiance") for band in RED_NIR] for name in ("full_scale", "min"))
-    gain, offset = (each[:, None, None] for each in calibration.gain_offset(full, low, 8))
-    radiance = radiance_by_kernels(toa, pixels)
-    np.testing.assert_array_equal(image, calibration.radiance_to_dn(radiance, gain, offset, bits=8))
-    assert image.dtype == np.uint8 and (image > 0).any()
-    # Half a count, plus rounding of a division.
-    inside = (image.values > 1) & (image.values < 255)
-    assert (np.abs(fifesim.sensor.to_radiance(image).values - radiance) <= 0.5 * gain * (1 + 1e-9))[inside].all()
 
 
 def test_pixels_over_missing_cells_are_no_data(toa):
@@ -117,7 +113,6 @@ def test_radiance_and_reflectance_follow_the_raster_rules(toa):
     image = fifesim.sense(toa.where(toa["x"] > 705640), "TM")
     for name in ("gain", "offset", "wavelength", "solar_irradiance"):
         assert image[name].dims == ("band",) and cf.attributes(name).items() <= image[name].attrs.items()
-    assert image["solar_irradiance"].values.tolist() == [band.solar_irradiance for band in RED_NIR]
     assert image.attrs["instrument"] == "TM" and directions.geometry_of(image) == SUN
     assert image.attrs["_FillValue"] == 0 and image.attrs["_FillValue"].dtype == image.dtype
     radiance = check_raster_function(fifesim.sensor.to_radiance, image, quantity="toa_radiance")
@@ -127,102 +122,124 @@ def test_radiance_and_reflectance_follow_the_raster_rules(toa):
     np.testing.assert_array_equal(radiance, expected)
     known = calibration.radiance_to_reflectance(expected, sun, SUN.mu_s, SUN.earth_sun_distance)
     np.testing.assert_array_equal(reflectance, known)
-    assert (image == 0).any()
     np.testing.assert_array_equal(np.isnan(radiance), image == 0)
     np.testing.assert_array_equal(fifesim.to_reflectance(radiance), reflectance)
 
 
-def test_sensing_radiance_equals_sensing_reflectance(toa):
+def test_sensing_radiance_or_one_band_equals_sensing_reflectance(toa):
     """Digital numbers may differ by 1 where the values lie halfway between counts."""
-    sun = np.array([band.solar_irradiance for band in RED_NIR])[:, None, None]
+    image, sun = fifesim.sense(toa, "TM"), np.array([band.solar_irradiance for band in RED_NIR])[:, None, None]
     radiance = toa.copy(data=calibration.reflectance_to_radiance(toa.values, sun, SUN.mu_s, SUN.earth_sun_distance))
     radiance.attrs = {"units": "W m-2 sr-1 um-1"}
-    difference = fifesim.sense(radiance, "TM").astype(int) - fifesim.sense(toa, "TM").astype(int)
+    difference = fifesim.sense(radiance, "TM").astype(int) - image.astype(int)
     assert (difference == 0).mean() > 0.99 and np.abs(difference).max() <= 1
-
-
-def test_one_band_becomes_an_image_of_one_band(toa):
     one = fifesim.sense(toa.sel(band="TM3").assign_coords(band="tm3"), "TM")
     assert one.dims == ("band", "y", "x")
-    np.testing.assert_array_equal(one, fifesim.sense(toa, "TM").sel(band=["TM3"]))
+    np.testing.assert_array_equal(one, image.sel(band=["TM3"]))
+    low = Geometry(60.0, 120.0)
+    darker = fifesim.sense(toa, "TM", geometry=low)
+    assert directions.geometry_of(darker) == low and darker.astype(int).sum() < image.astype(int).sum()
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda toa: fifesim.sense(toa.assign_attrs(units="K"), "TM"), "units 'K', toa_reflectance needs '1' or 'W"),
-        (lambda toa: fifesim.sense(toa.drop_vars("band"), "TM"), "neither names of TM.*nor a wavelength"),
-        (
-            lambda toa: fifesim.sense(toa, "TM", scaling="product"),
-            "TM has no product scaled to reflectance, unlike OLI",
-        ),
-        (lambda toa: fifesim.sense(toa, "TM", scaling="product", quantise=False), "is one of digital numbers"),
-        (lambda toa: fifesim.sense(toa, "TM", gain_drift=0.0), "gain_drift must be a factor from 0.1 to 10, got 0"),
-        (lambda toa: fifesim.sense(toa, "TM", gain_drift={"TM3": 1.0}), "gain_drift has no number for TM4: it has TM3"),
-        (lambda toa: fifesim.sense(toa, "TM", gain_drift=[1.0, 2.0, 3.0]), "one for each of 2 bands, got a list of 3"),
-        (lambda toa: fifesim.sense(toa, SILENT, noise="shot"), "TM has no noise for TM3"),
-        (lambda toa: fifesim.sense(toa, NOISY, noise=["all", "shot"]), "'all' alone"),
-        (
-            lambda toa: fifesim.sense(toa, NOISY, noise=ALL, noise_models=BARE),
-            r"TM has no shot and no fixed-pattern noise for TM3.*noise_models=\{'TM3'",
-        ),
-        (lambda toa: fifesim.sense(toa, NOISY, noise="shot", noise_models={"TM4": BARE}), "no shot noise for TM4"),
-        (lambda toa: fifesim.sense(toa, NOISY, noise="all", noise_models={"TM33": BARE}), "'TM33': did you mean TM3"),
-        (
-            lambda toa: fifesim.sensor.to_radiance(fifesim.sense(toa, "TM").drop_vars("gain")),
-            r"no gain: .*fifesim\.open_image",
-        ),
-        (lambda toa: fifesim.sensor.to_radiance(fifesim.sense(toa, "TM").assign_attrs(units="m")), "'m', dn needs '1'"),
-    ],
-)
-def test_invalid_input_raises(toa, call, message):
-    with pytest.raises(ValueError, match=message):
-        call(toa)
-
-
-def test_pixels_of_another_size_warn_that_the_blur_stays(toa, site):
-    """Also in comparisons and adjustments. Native sampling, and one grid for bands of several sizes, are usual."""
-    box = site.boundingbox
-
-    def onto(cell):
-        return fifesim.grid_at(site.crs, box.left, box.top, 600, 600, cell=cell)
-
-    lai = fifesim.lai_scene(site, seed=7)
-    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
-    verbs = [
-        lambda cell: toa.fifesim.sense("TM", onto=onto(cell)),
-        lambda cell: toa.fifesim.sense("TM", interval=cell),
-        lambda cell: rho.fifesim.as_seen_by("OLI", bands=["OLI4", "OLI5"], onto=onto(cell)),
-        lambda cell: lai.fifesim.compare(["TM"], fifesim.Setup(onto=onto(cell))),
-    ]
-    for verb in verbs:
-        for cell in (20.0, 60.0):
-            with pytest.warns(UserWarning, match=f"pixels of {cell:g} m have the blur of (TM|OLI), .* of 30 m"):
-                verb(cell)
-        with warnings.catch_warnings():
-            warnings.filterwarnings("error", message="pixels of")
-            verb(25.0), verb(37.5)
+def test_pixels_of_another_size_warn_that_the_blur_stays(toa):
+    """Native sampling is usual."""
+    for cell in (20.0, 60.0):
+        with pytest.warns(UserWarning, match=f"pixels of {cell:g} m have the blur of TM, .* of 30 m"):
+            toa.fifesim.sense("TM", interval=cell)
     with warnings.catch_warnings():
         warnings.filterwarnings("error", message="pixels of")
-        toa.fifesim.sense("TM", interval="native")
+        for interval in (25.0, 37.5, "native"):
+            toa.fifesim.sense("TM", interval=interval)
 
 
-def test_geometry_argument_overrides_coordinates(toa):
-    low = Geometry(60.0, 120.0)
-    image = fifesim.sense(toa, "TM", geometry=low)
-    assert directions.geometry_of(image) == low
-    assert image.astype(int).sum() < fifesim.sense(toa, "TM").astype(int).sum()
+# ------------------------------------------------------------------------------------------ pixels
+
+INTERVAL = 43e-6 * 705e3
+WIDE = replace(PAPER, lsf=responses.CosineResponse("cosine", step=4.778e-5, count=90))
 
 
-# ------------------------------------------------------------------------------------------ several resolutions
+def light(shape=(180, 198), values=None, row=90, column=180):
+    grid = fifesim.fife_site(30 / 9, window=((row, row + shape[0]), (column, column + shape[1])))
+    values = np.random.default_rng(2).uniform(10.0, 90.0, (2, *shape)) if values is None else values
+    values = np.broadcast_to(values, (2, *shape))
+    return products.radiance(values, grid, ["TM3", "TM4"])
 
 
-@pytest.fixture
-def mixed(site):
-    return scene(site, ("MSI11", "MSI4", "MSI8"))
+def sensed(array, tm=PAPER, **options):
+    return fifesim.sense(array, tm, quantise=False, **options)
 
 
-def test_bands_of_different_pixel_sizes_form_a_tree(mixed):
+def test_native_interval_sets_the_coordinates():
+    image = check_raster_function(lambda toa: sensed(toa, interval="native"), light(), quantity="toa_radiance")
+    np.testing.assert_allclose(np.diff(image["x"]), INTERVAL, rtol=0, atol=1e-6)
+    corner = grids.geobox(light()).affine
+    np.testing.assert_allclose([image["x"][0], image["y"][0]], [corner.c + INTERVAL / 2, corner.f - INTERVAL / 2])
+    onto = fifesim.grid_at("EPSG:26914", corner.c, corner.f, 21 * INTERVAL, 19 * INTERVAL, INTERVAL)
+    xr.testing.assert_allclose(image, sensed(light(), onto=onto), rtol=1e-9)
+    # The interval may differ between rows and columns.
+    assert grids.cell_size(grids.geobox(sensed(light(), interval=(60.0, 22.0)))) == (60.0, 22.0)
+
+
+@pytest.mark.parametrize("offset", [(0.0, 0.25), (0.5, 0.0), (-0.3, 1.2)])
+def test_offset_shifts_the_image_but_not_the_coordinates(offset):
+    """A ramp shifts by slope times offset, exactly for an offset of whole cells."""
+    y, x = np.meshgrid(np.arange(180) * 10 / 3, np.arange(198) * 10 / 3, indexing="ij")
+    ramp = light(values=np.stack([0.01 * y + x] * 2))
+    nominal, moved = sensed(ramp), sensed(ramp, offset=offset)
+    np.testing.assert_array_equal(moved["x"], nominal["x"])
+    np.testing.assert_array_equal(moved["y"], nominal["y"])
+    inside = np.s_[:, 2:-2, 2:-2]
+    # The ramp is constant within a cell: 0.01 cells.
+    shift = 30 * (0.01 * offset[0] + offset[1])
+    np.testing.assert_allclose((moved - nominal).values[inside], shift, rtol=0, atol=0.06)
+    exact = sensed(ramp, offset=(0.0, 10 / 30)) - nominal
+    np.testing.assert_allclose(exact.values[inside], 10.0, rtol=1e-10)
+
+
+def test_offset_may_differ_by_column():
+    """Pixels at the native interval on the product grid drift by 0.315 m per pixel."""
+    steps = (np.arange(20) + 0.5) * (INTERVAL - 30) / 30
+    drifting = sensed(light(), offset=(0.0, np.append(steps, [0.0, 0.0])), interval=30.0)
+    onto = grids.geobox(sensed(light(), interval=(30.0, INTERVAL)))
+    np.testing.assert_allclose(drifting[..., :20], sensed(light(), onto=onto)[..., :20], rtol=1e-10)
+    jitter = np.random.default_rng(1).normal(0, 1.5, 20), -0.2
+    check_raster_function(lambda toa: sensed(toa, offset=jitter), light(), quantity="toa_radiance")
+
+
+def test_rows_use_the_along_track_response():
+    """A point is smeared by a wide boxcar southward and by a narrow one eastward."""
+    along, across = (responses.BoxcarResponse("boxcar", width=width / 705e3) for width in (90, 30))
+    values = np.zeros((2, 180, 198))
+    values[:, 94, 94] = 1000.0
+    image = sensed(light(values=values), replace(PAPER, lsf=responses.TwoAxesResponse(along, across))).values
+    assert (image[0] > 1e-9).sum(axis=0).max() == 3 and (image[0] > 1e-9).sum(axis=1).max() == 1
+
+
+def test_bands_may_have_different_spatial_responses():
+    other = replace(PAPER.bands[3], lsf=responses.GaussianResponse("gaussian", fwhm=60 / 705e3))
+    mixed = replace(PAPER, bands=(*PAPER.bands[:3], other, *PAPER.bands[4:]))
+    small = light((90, 99))
+    image = check_raster_function(lambda toa: sensed(toa, mixed), small, quantity="toa_radiance")
+    np.testing.assert_array_equal(image.sel(band="TM3"), sensed(small).sel(band="TM3"))
+    np.testing.assert_array_equal(image.sel(band="TM4"), sensed(small, replace(PAPER, lsf=other.lsf)).sel(band="TM4"))
+    turned = sensed(small.isel(band=[1, 0]), mixed)
+    np.testing.assert_array_equal(turned.isel(band=[1, 0]), image)
+
+
+def test_point_spread_must_mostly_lie_in_the_scene():
+    assert np.isfinite(sensed(light(), WIDE, min_valid=0.01)).all()
+    with pytest.raises(ValueError, match=r"point spread of TM TM3, TM4, 3031\.6 x 3031\.6 m, is wider than the scene"):
+        sensed(light(), WIDE)
+    boxes, pixels = (Boxcar(200.0), Boxcar(100.0)), fifesim.fife_site(30.0, ((0, 4), (0, 5)))
+    check_scene(boxes, pixels, 0.6, "TM")
+    with pytest.raises(ValueError, match="wider than the scene of 120 x 150 m, which holds 60% of it"):
+        check_scene(boxes, pixels, 0.61, "TM")
+
+
+def test_bands_of_different_pixel_sizes_form_a_tree_or_share_a_given_grid(site):
+    mixed, msi = scene(site, ("MSI11", "MSI4", "MSI8")), instrument("MSI")
+    with pytest.raises(ValueError, match=r"10 x 10 m: MSI4.*20 x 20 m: MSI11.*sense each group separately.*onto="):
+        pixel_grid(site, msi, msi.select(["MSI4", "MSI11"]))
     noise = {"noise": "thermal", "seed": 3, "noise_models": NoiseModel(thermal=2.0, shot=0.01)}
     tree = fifesim.sense(mixed, "MSI", **noise)
     assert [node.path for node in tree.leaves] == ["/10m", "/20m"]
@@ -234,17 +251,8 @@ def test_bands_of_different_pixel_sizes_form_a_tree(mixed):
     xr.testing.assert_identical(lazy.compute(), tree)
     native = fifesim.sense(mixed, "MSI", interval="native", quantise=False)
     assert all(set(node.data_vars) == {"toa_radiance"} for node in native.leaves) and len(native.leaves) == 2
-
-
-def test_one_resolution_or_a_given_grid_returns_an_array(mixed, site, tmp_path):
-    assert isinstance(fifesim.sense(mixed.sel(band=["MSI4", "MSI8"]), "MSI"), xr.DataArray)
     for where in ({"interval": 20.0}, {"onto": grids.aligned_grid(site, 30.0)}):
         assert fifesim.sense(mixed, "MSI", **where)["band"].values.tolist() == ["MSI11", "MSI4", "MSI8"]
-    tree = fifesim.sense(mixed, "MSI")
-    with pytest.raises(TypeError, match=r"got an xarray.DataTree of 10m, 20m: take one of its arrays, such as"):
-        fifesim.to_geotiff(tree, tmp_path / "image.tif")
-    path = fifesim.to_geotiff(tree["10m/dn"], tmp_path / "image_10m.tif")
-    np.testing.assert_array_equal(fifesim.open_image(path), tree["10m/dn"])
 
 
 # ------------------------------------------------------------------------------------------ digital numbers
@@ -261,97 +269,21 @@ def bright(name):
     return found.drop_vars("band")
 
 
-@pytest.mark.parametrize(
-    ("name", "gain", "mu_s"),
-    [("OLI", 2e-5, LOW_SUN.mu_s), ("OLI2", 2e-5, LOW_SUN.mu_s), ("MSI", 1e-4, 1.0), ("MSI-B", 1e-4, 1.0)],
-)
-def test_product_numbers_follow_the_handbook_formula(name, gain, mu_s, tmp_path):
-    """Decoding with the formula of the product handbook gives the reflectance within half a count."""
-    onto = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 240.0, 180.0, 30.0)
-    image = bright(name).fifesim.sense(name, scaling="product", onto=onto)
-    assert image.dtype == np.uint16
-    fine = bright(name).fifesim.sense(name, quantise=False, onto=onto).fifesim.to_reflectance()
-    by_hand = (image.astype(float).where(image > 0) * gain - 0.1) / mu_s
-    assert float(abs(by_hand - fine).max()) <= 0.5 * gain / mu_s * (1 + 1e-9)
-    np.testing.assert_allclose(image.fifesim.to_reflectance(), by_hand, rtol=0, atol=1e-12)
-    assert "scaling product" in image.attrs["history"] and "16 bits" in image.attrs["history"]
-    again = fifesim.open_image(image.fifesim.to_geotiff(tmp_path / "image.tif"))
-    np.testing.assert_array_equal(again, image)
-    np.testing.assert_array_equal(again.fifesim.ndvi(), image.fifesim.ndvi())
-
-
-def test_detector_scaling_is_the_default():
-    image = bright("OLI").fifesim.sense("OLI")
-    assert int(image.max()) <= 4095
-    xr.testing.assert_identical(image, bright("OLI").fifesim.sense("OLI", scaling="detector"))
-
-
-def test_msi_product_scaling_needs_one_solar_direction():
+@pytest.mark.parametrize(("name", "gain"), [("OLI", 2e-5), ("MSI-B", 1e-4)])
+def test_product_numbers_follow_the_handbook_formula(name, gain):
+    """Decoding with the formula gives the reflectance within half a count; numbers of OLI hold the solar cosine."""
     sza = ("y", "x"), np.linspace(40, 41, UTM.shape.y * UTM.shape.x).reshape(UTM.shape)
-    varying = bright("OLI").assign_coords(sza=sza)
-    image = varying.fifesim.sense("OLI", scaling="product")
-    fine = varying.fifesim.sense("OLI", quantise=False).fifesim.to_reflectance()
-    assert float(abs(image.fifesim.to_reflectance() - fine).max()) <= 0.5 * 2e-5 / np.cos(np.radians(41))
+    onto = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 240.0, 180.0, 30.0)
+    toa = bright(name).assign_coords(sza=sza) if name == "OLI" else bright(name)
+    image = toa.fifesim.sense(name, scaling="product", onto=onto)
+    assert image.dtype == np.uint16 and toa.fifesim.sense(name, onto=onto).max() <= 4095
+    fine = toa.fifesim.sense(name, quantise=False, onto=onto).fifesim.to_reflectance()
+    mu_s = np.cos(np.radians(image["sza"])) if name == "OLI" else xr.ones_like(image[0])
+    by_hand = (image.astype(float).where(image > 0) * gain - 0.1) / mu_s
+    assert float(abs(by_hand - fine).max()) <= 0.5 * gain / float(mu_s.min()) * (1 + 1e-9)
+    np.testing.assert_allclose(image.fifesim.to_reflectance(), by_hand, rtol=0, atol=1e-12)
     with pytest.raises(ValueError, match="scaling='product' of MSI needs one direction of sun"):
         bright("MSI").assign_coords(sza=sza).fifesim.sense("MSI", scaling="product")
-
-
-@pytest.fixture(scope="module")
-def image():
-    dn = np.random.default_rng(8).integers(1, 256, (2, *UTM.shape)).astype(np.uint8)
-    dn[:, 1, 1] = 0
-    return fifesim.calibrate(products.labelled(dn, UTM, ["TM3", "TM4"], {}), "TM", geometry=LOW_SUN)
-
-
-CHANGES = {
-    "radiance": lambda image: image * image.gain + image.offset,
-    "half": lambda image: image * 0.5,
-    "doubled": lambda image: image.astype(np.int32) * 2,
-    "negative": lambda image: image.astype(np.int16) - 100,
-    "wider": lambda image: image.astype(np.uint16) * np.uint16(2),
-}
-VERBS = {
-    "radiance": fifesim.sensor.to_radiance,
-    "reflectance": fifesim.to_reflectance,
-    "ndvi": fifesim.ndvi,
-    "index": lambda image: fifesim.index(image, "EVI2"),
-    "surface": lambda image: fifesim.to_surface(image, fifesim.Atmosphere()),
-}
-
-
-@pytest.mark.parametrize("verb", VERBS)
-@pytest.mark.parametrize("change", CHANGES)
-def test_values_that_are_not_digital_numbers_raise(image, change, verb):
-    with xr.set_options(keep_attrs=True):
-        changed = CHANGES[change](image).assign_attrs(units="1")
-    with pytest.raises(ValueError, match=r"is not a whole number from 0 to (255|65535): calibrate with .*drop_vars"):
-        VERBS[verb](changed)
-    with no_compute():
-        lazy = VERBS[verb](in_chunks(changed, {"y": 5, "x": 7}))
-    with pytest.raises(ValueError, match="is not a whole number"):
-        lazy.compute()
-
-
-@pytest.mark.parametrize("change", ["kept", "dropped"])
-def test_radiance_computed_by_hand_is_not_calibrated_again(image, change):
-    """Arithmetic keeps attributes since xarray 2025.11; before, it dropped them."""
-    with xr.set_options(keep_attrs=change == "kept"):
-        radiance = image * image.gain + image.offset
-    radiance = radiance.assign_attrs(units="W m-2 sr-1 um-1") if change == "kept" else radiance
-    with pytest.raises(ValueError, match=r"type \.drop_vars\(\['gain', 'offset'\]\)\.assign_attrs"):
-        fifesim.ndvi(radiance.rio.write_crs(image.rio.crs))
-    remedied = radiance.where(image > 0).drop_vars(["gain", "offset"]).assign_attrs(units="W m-2 sr-1 um-1")
-    np.testing.assert_allclose(fifesim.ndvi(remedied.rio.write_crs(image.rio.crs)), fifesim.ndvi(image), rtol=1e-12)
-
-
-@pytest.mark.parametrize("dtype", [np.uint16, np.int16, np.float32, np.float64])
-def test_digital_numbers_of_another_type_are_calibrated(image, dtype):
-    np.testing.assert_array_equal(fifesim.sensor.to_radiance(image.astype(dtype)), fifesim.sensor.to_radiance(image))
-    masked = image.astype(np.float32).where(image > 0)
-    np.testing.assert_array_equal(fifesim.sensor.to_radiance(masked), fifesim.sensor.to_radiance(image))
-
-
-# ------------------------------------------------------------------------------------ saturation
 
 
 def clouded(bands):
@@ -366,32 +298,24 @@ def clouded(bands):
     ("name", "bands", "options", "largest"),
     [
         ("TM", ["TM3", "TM4"], {}, 255),
-        (replace(instrument("TM"), bits=10), ["TM3", "TM4"], {}, 1023),
         ("MSS", ["MSS5", "MSS7"], {"onto": fifesim.fife_site(60, window=((1, 9), (1, 9)))}, 63),
-        # Their ranges include white clouds.
-        ("OLI", ["OLI4", "OLI5"], {}, 4095),
+        # Its range includes white clouds.
         ("OLI", ["OLI4", "OLI5"], {"scaling": "product"}, 65535),
     ],
 )
-@pytest.mark.parametrize("way", ["memory", "lazy", "file", "netcdf", "float"])
+@pytest.mark.parametrize("way", ["memory", "lazy", "file", "float"])
 def test_saturated_pixels_are_no_data_in_derived_images(name, bands, options, largest, way, tmp_path):
-    toa = clouded(bands)
-    image = fifesim.sense(toa, name, geometry=LOW_SUN, min_valid=0.5, **options)
+    image = fifesim.sense(clouded(bands), name, geometry=LOW_SUN, min_valid=0.5, **options)
     assert image.attrs["saturated"] == largest
-    counts = image.values
+    full, missing = image.values == largest, image.values == 0
     if way == "lazy":
         with no_compute():
-            seen = fifesim.ndvi(in_chunks(image, {"y": 3, "x": 3}))
-        assert "saturated_pixels" not in seen.attrs
+            assert "saturated_pixels" not in fifesim.ndvi(in_chunks(image, {"y": 3, "x": 3})).attrs
     if way == "file":
         image = fifesim.open_image(image.fifesim.to_geotiff(tmp_path / "image.tif"))
-    if way == "netcdf":
-        image.to_netcdf(tmp_path / "image.nc")
-        image = xr.open_dataset(tmp_path / "image.nc", decode_coords="all")["dn"]
     if way == "float":
         image = image.where(image > 0)
-    full = counts == largest
-    gone = full | (counts == 0)
+    gone = full | missing
     for light in (fifesim.sensor.to_radiance(image), fifesim.to_reflectance(image)):
         np.testing.assert_array_equal(np.isnan(light), gone)
         assert light.attrs.get("saturated_pixels", 0) == full.any(0).sum()
@@ -400,69 +324,75 @@ def test_saturated_pixels_are_no_data_in_derived_images(name, bands, options, la
         assert index.attrs.get("saturated_pixels", 0) == full.any(0).sum()
 
 
-def test_saturated_cloud_is_no_grass_in_a_composite():
-    """On the second date the sky is clear over bare soil, with an NDVI of 0.1 that is below the 0.2 of the counts."""
-    toa = clouded(["TM3", "TM4"])
-    soil = toa.copy(data=np.broadcast_to(np.array([0.27, 0.33])[:, None, None], toa.shape))
-    times = xr.DataArray(np.array(["1987-06-06", "1987-06-22", "1987-07-08"], "M8[ns]"), dims="time", name="time")
-    images = fifesim.sense(xr.concat([toa, soil, toa], times), "TM", geometry=LOW_SUN, min_valid=0.5)
-    reflectance = fifesim.to_reflectance(images)
-    assert reflectance.attrs["saturated_pixels"] == (images == 255).any("band").sum()
-    best = fifesim.composite(reflectance)
-    assert (best.date.isel(x=slice(0, 9)) == times[1]).all() and (best.date.isel(x=slice(11, None)) == times[0]).all()
-    assert "saturated_pixels" not in best.attrs
+def test_counts_of_landsat_1_are_on_a_square_root_scale(tmp_path):
+    """Six bits from nearly dark to full scale; radiance round trips within half a count."""
+    full, names = np.array([band.full_scale_radiance for band in MSS.bands]), [band.name for band in MSS.bands]
+    grid = fifesim.fife_site(20.0, window=((0, 60), (0, 66)))
+    values = np.random.default_rng(4).uniform(0.02, 0.98, (4, *grid.shape)) * full[:, None, None]
+    radiance = products.radiance(values, grid, names)
+    image = check_raster_function(lambda toa: fifesim.sense(toa, "MSS"), radiance, quantity="dn")
+    assert image["compression"].values.tolist() == [63, 63, 63, 0]
+    means = fifesim.sense(radiance, "MSS", quantise=False).values
+    share = means / full[:, None, None]
+    counts = np.where(np.arange(4)[:, None, None] < 3, 63 * np.sqrt(share), 63 * share)
+    np.testing.assert_array_equal(image, np.nan_to_num(np.rint(counts)))
+    back = check_raster_function(fifesim.sensor.to_radiance, image, quantity="toa_radiance")
+    assert not {"gain", "offset", "compression"} & set(back.coords)
+    # The counts n - 1/2 and n + 1/2 are 2 n / 63 linear steps apart.
+    step = full[:, None, None] / 63 * np.where(np.arange(4)[:, None, None] < 3, 2 * image.values / 63, 1)
+    seen = image.values > 0
+    assert (np.abs(back.values - means) <= 0.5 * step * (1 + 1e-9))[seen].all() and np.isnan(back.values[~seen]).all()
+    assert "compression" not in fifesim.sense(back.isel(band=[3]), "MSS").coords
+    xr.testing.assert_identical(fifesim.open_image(fifesim.to_geotiff(image, tmp_path / "mss.tif")), image)
+    user = image.drop_vars(["gain", "offset", "compression"])
+    np.testing.assert_array_equal(fifesim.sensor.to_radiance(fifesim.calibrate(user, "MSS")), back)
+    linear = fifesim.calibrate(user, "MSS", gain=1.0, offset=0.0)
+    np.testing.assert_array_equal(fifesim.sensor.to_radiance(linear), user.where(user > 0))
 
 
 # ------------------------------------------------------------------------------------------ noise
 
 
-def uniform(shape, row=0, column=0):
-    """Radiance raster with one value per band."""
-    grid = fifesim.fife_site(30 / 9, window=((row, row + shape[0]), (column, column + shape[1])))
-    values = np.broadcast_to([[[40.0]], [[90.0]]], (2, *shape))
-    return products.radiance(values, grid, ["TM3", "TM4"])
+# Radiance of each band.
+UNIFORM = np.array([40.0, 90.0])[:, None, None]
 
 
 def test_noise_does_not_depend_on_chunks_windows_or_bands():
     for quantity, quantise in (("dn", True), ("toa_radiance", False)):
         options = {"noise": ALL, "seed": 3, "quantise": quantise}
         noisy_image = partial(fifesim.sense, instrument=NOISY, **options)
-        check_raster_function(noisy_image, uniform((90, 99)), quantity=quantity)
-    whole = fifesim.sense(uniform((180, 198)), NOISY, noise=ALL, seed=3)
-    window = fifesim.sense(uniform((90, 99), row=90, column=45), NOISY, noise=ALL, seed=3)
+        check_raster_function(noisy_image, light((90, 99), UNIFORM), quantity=quantity)
+    whole = fifesim.sense(light((180, 198), UNIFORM), NOISY, noise=ALL, seed=3)
+    window = fifesim.sense(light((90, 99), UNIFORM, row=180, column=225), NOISY, noise=ALL, seed=3)
     np.testing.assert_array_equal(window, whole.sel(y=window["y"], x=window["x"]))
     assert whole.attrs["history"].endswith("sense: TM, 8 bits, noise shot thermal fixed-pattern, seed 3")
-    assert fifesim.sense(uniform((90, 99)), NOISY).attrs["history"].endswith("sense: TM, 8 bits")
-    one = fifesim.sense(uniform((180, 198)).sel(band=["TM4"]), NOISY, noise=ALL, seed=3)
+    one = fifesim.sense(light((180, 198), UNIFORM).sel(band=["TM4"]), NOISY, noise=ALL, seed=3)
     np.testing.assert_array_equal(one, whole.sel(band=["TM4"]))
 
 
 def test_all_noise_uses_every_defined_kind_and_models_override():
     def seen(name=NOISY, noise="all", bands=("TM3", "TM4"), **options):
-        return fifesim.sense(uniform((270, 297)).sel(band=list(bands)), name, noise=noise, seed=3, **options)
+        return fifesim.sense(light((270, 297), UNIFORM).sel(band=list(bands)), name, noise=noise, seed=3, **options)
 
     np.testing.assert_array_equal(seen(), seen(noise=ALL))
-    models = {"noise_models": {"TM3": NoiseModel(0.8, 0.0)}}
+    models = {"noise_models": {"tm3": NoiseModel(0.8, 0.0)}}
     mixed = seen(**models)
     np.testing.assert_array_equal(mixed.sel(band="TM4"), seen().sel(band="TM4"))
     np.testing.assert_array_equal(mixed.sel(band=["TM3"]), seen(noise="thermal", bands=["TM3"], **models))
-    np.testing.assert_array_equal(seen(noise_models={"tm3": NoiseModel(0.8, 0.0)}), mixed)
     both = seen(PAPER, "thermal", noise_models=NoiseModel(0.8, 0.0), quantise=False)
     # 810 pixels: four standard errors.
     assert float(both.sel(band="TM3").std()) == pytest.approx(0.8, rel=0.1)
 
 
-@pytest.mark.parametrize("chunk", [1, 2, 3])
+@pytest.mark.parametrize("chunk", [1, 2])
 def test_noise_does_not_depend_on_band_chunks(chunk):
     """Each band uses its number in the instrument and its noise model, wherever its chunk begins."""
     names = ["TM5", "TM1", "TM4", "TM3", "TM2"]
     models = {name: NoiseModel(0.2 + 0.1 * k, 0.01) for k, name in enumerate(names)}
     radiance = xr.DataArray(np.full((5, 9, 11), 50.0), dims=("band", "y", "x"))
     bands, kinds = TM.select(names), ("shot", "thermal")
-    whole = noisy(radiance, TM, bands, kinds, 5, (3, 4), models)
     parts = noisy(radiance.chunk(band=chunk, y=4), TM, bands, kinds, 5, (3, 4), models)
-    np.testing.assert_array_equal(parts, whole)
     for layer, name in enumerate(names):
         number = [band.name for band in TM.bands].index(name)
         alone = add_noise(radiance.values[layer], models[name], kinds, seed=5, band=number, row=3, column=4)
-        np.testing.assert_array_equal(whole[layer], alone)
+        np.testing.assert_array_equal(parts[layer], alone)

@@ -1,4 +1,4 @@
-"""Scans on labelled rasters: view angles, view direction of the light, swath images, and sweeps."""
+"""Scans and varying angles on labelled rasters: view angles, light, swath images, sweeps, and images of a swath."""
 
 from dataclasses import replace
 from functools import cache
@@ -8,43 +8,26 @@ import numpy as np
 import products
 import pytest
 import xarray as xr
-from lazy import CHUNKS, ODD_CHUNKS, check_place, in_chunks, no_compute
+from lazy import CHUNKS, ODD_CHUNKS, check_place, check_raster_function, in_chunks, no_compute
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.grids import cf, projection
+from fifesim.grids import cf, directions, projection
 from fifesim.grids import grid as grids
 from fifesim.sensor.description.instrument_file import Scan
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response.noise import NoiseModel
-from fifesim.sensor.response.scan import growth, place_beside, view_components, view_from_ground, view_from_scan
+from fifesim.sensor.response.scan import growth, place_beside, view_from_ground, view_from_scan
 from fifesim.sensor.scan_labels import latitude_longitude, seen_alike
 
 # ------------------------------------------------------------------------------------------ view angles
 
 
-TM = instrument("TM")
+TM, PAPER = instrument("TM"), instrument("TM", "paper")
 SCANS = TM.sources | {"scan": "Friedl1995"}
 WIDE = replace(TM, name="wide", altitude=833e3, scan=Scan("whiskbroom", max_angle=55.4), sources=SCANS)
+NARROW = replace(PAPER, scan=Scan("whiskbroom", max_angle=7.7), sources=SCANS)
 SITE = fifesim.fife_site(30.0)
-
-
-def test_view_angles_are_computed_for_each_cell():
-    view = fifesim.sensor.scan_geometry(TM, SITE, nadir_offset=3e3, heading=193.0)
-    rows, columns = np.meshgrid(*(np.arange(size) + 0.5 for size in SITE.shape), indexing="ij")
-    track = fifesim.sensor.Track(
-        view.attrs["track_latitude"], view.attrs["track_longitude"], view.attrs["track_heading"]
-    )
-    east, north = view_components(track, *latitude_longitude(SITE, rows, columns), 705e3)
-    vza, vaa = np.radians(view["vza"].values), np.radians(view["vaa"].values)
-    np.testing.assert_allclose(np.sin(vza) * np.sin(vaa), east, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(np.sin(vza) * np.cos(vaa), north, rtol=0, atol=1e-9)
-    for name in ("vza", "vaa"):
-        check_place(view[name], SITE.crs)
-        assert cf.attributes(name).items() <= view[name].attrs.items()
-    with no_compute():
-        lazy = fifesim.sensor.scan_geometry(TM, SITE, nadir_offset=3e3, heading=193.0, chunks={"y": 130, "x": 77})
-    xr.testing.assert_identical(lazy.compute(), view)
 
 
 def test_track_may_cross_the_scene():
@@ -57,19 +40,23 @@ def test_track_may_cross_the_scene():
     west, east = middle.isel(x=5), middle.isel(x=-5)
     assert float(west["vaa"]) == pytest.approx(90, abs=1.5) and float(east["vaa"]) == pytest.approx(270, abs=1.5)
     assert float(west["vza"]) == pytest.approx(np.degrees(np.arctan(10.4 / 705)), abs=0.1)
+    for name in ("vza", "vaa"):
+        check_place(view[name], SITE.crs)
+        assert cf.attributes(name).items() <= view[name].attrs.items()
+    with no_compute():
+        lazy = fifesim.sensor.scan_geometry(TM, SITE, nadir_offset=3e3, chunks={"y": 130, "x": 77})
+    xr.testing.assert_identical(lazy.compute(), view)
 
 
 def test_cells_outside_a_wide_swath_are_missing():
     grid = fifesim.grid_at("EPSG:5070", -1.6e6, 2.2e6, 3.2e6, 4e5, 10e3)
-    track = fifesim.sensor.Track(39.5, -96.0, 190.0)
-    view = fifesim.sensor.scan_geometry(WIDE, grid, track)
+    view = fifesim.sensor.scan_geometry(WIDE, grid, fifesim.sensor.Track(39.5, -96.0, 190.0))
     seen = np.isfinite(view["vza"].values)
     assert 0.5 < seen.mean() < 0.95
     np.testing.assert_array_equal(seen, np.isfinite(view["vaa"].values))
     assert float(view["vza"].max()) == pytest.approx(68.55, abs=0.3)
-    rows, columns = np.meshgrid(*(np.arange(size) + 0.5 for size in grid.shape), indexing="ij")
-    sine = np.hypot(*view_components(track, *latitude_longitude(grid, rows, columns), 833e3))
-    np.testing.assert_allclose(np.sin(np.radians(view["vza"].values))[seen], sine[seen], rtol=0, atol=1e-5)
+    with pytest.raises(ValueError, match=r"the grid: it begins \d+ km from .*7\.7 degrees"):
+        fifesim.sensor.scan_geometry(NARROW, SITE, nadir_offset=2e5)
 
 
 # ------------------------------------------------------------------------------------------ view direction of the light
@@ -123,7 +110,6 @@ def test_missing_light_needs_no_matching_view():
 # ------------------------------------------------------------------------------------------ images
 
 
-PAPER = instrument("TM", "paper")
 ASIDE = {"nadir_offset": -36e3, "heading": 193.6, "view_tolerance": 180}
 
 
@@ -137,18 +123,6 @@ def scene(shape=(180, 198), plane=None):
 @cache
 def aside(quantise):
     return fifesim.sense_swath(scene(), PAPER, quantise=quantise, **ASIDE)
-
-
-def test_pixels_lie_at_their_coordinates():
-    """The mean of a plane over a symmetric footprint is its value at the centre; cell size leaves 0.01 cells."""
-    plane = scene(plane=lambda x, y: 0.02 * (x - 705600) - 0.03 * (y - 4333900))
-    image = fifesim.sense_swath(plane, PAPER, quantise=False, **ASIDE)
-    expected = 0.02 * (image["x"] - 705600) - 0.03 * (image["y"] - 4333900)
-    difference = (image.sel(band="TM3") - expected).values
-    x, y = projection.transform_points(~grids.geobox(plane).affine, image["x"], image["y"])
-    inside = (x > 9) & (x < 189) & (y > 9) & (y < 171)
-    assert inside.mean() > 0.5
-    assert np.abs(difference[inside]).max() < np.hypot(0.02, 0.03) * 0.01 * 10 / 3
 
 
 def test_swath_has_the_native_interval_and_the_track_heading():
@@ -171,12 +145,10 @@ def test_swath_has_the_native_interval_and_the_track_heading():
     assert (abs(image["vaa"] - 283.6) < 0.5).all()
 
 
-def test_swath_is_labelled_and_its_numbers_convert_to_radiance_and_reflectance():
+def test_swath_is_labelled_and_its_numbers_convert_to_radiance():
     image, radiance = aside(quantise=True), aside(quantise=False)
     assert image.dtype == np.uint8 and image.attrs["_FillValue"] == 0
     assert float(abs(fifesim.sensor.to_radiance(image) - radiance).max()) <= float(image["gain"].max()) / 2 * (1 + 1e-9)
-    reflectance = fifesim.to_reflectance(image)
-    assert reflectance.dims == ("band", "line", "sample") and "latitude" in reflectance.coords
     assert radiance["latitude"].attrs["units"] == "degrees_north" and radiance.attrs["units"] == "W m-2 sr-1 um-1"
     assert image["vza"].dims == ("line", "sample") and cf.attributes("vza").items() <= image["vza"].attrs.items()
     assert image.rio.crs == scene().rio.crs
@@ -235,52 +207,11 @@ def test_swath_is_corrected_to_the_original_surface():
 
 def test_operations_on_a_lazy_scan_are_lazy_and_equal():
     _, image = lit()
-    for verb in (
-        fifesim.sensor.to_radiance,
-        fifesim.to_surface,
-        lambda array: fifesim.index(array, "EVI2"),
-        fifesim.ndvi,
-    ):
+    for verb in (fifesim.sensor.to_radiance, fifesim.to_surface, fifesim.ndvi):
         with no_compute():
             lazy = verb(in_chunks(image, {"line": 2, "sample": 3}))
         assert lazy.chunks is not None and lazy.dims[-2:] == ("line", "sample")
         xr.testing.assert_identical(lazy.compute(), verb(image))
-
-
-HEIGHT = grids.place(xr.DataArray(np.full((60, 66), 400.0), dims=("y", "x")), grids.geobox(scene((60, 66))))
-NARROW = replace(PAPER, scan=Scan("whiskbroom", max_angle=7.7), sources=SCANS)
-
-
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (
-            lambda: fifesim.sensor.scan_geometry(NARROW, SITE, nadir_offset=2e5),
-            r"the grid: it begins \d+ km from .*7\.7 degrees",
-        ),
-        (
-            lambda: fifesim.sensor.scan_geometry(TM, SITE, fifesim.sensor.Track(39.0, -96.0, 190.0), nadir_offset=2e5),
-            "one of them",
-        ),
-        (lambda: fifesim.sense_swath(scene(), NARROW, nadir_offset=4e5), "does not see the scene"),
-        (lambda: fifesim.sense_swath(scene((6, 6)), PAPER), "simulate a larger one"),
-        (lambda: fifesim.sense_swath(scene(), PAPER, view_tolerance=-1.0), "view_tolerance must be"),
-        (lambda: lit()[1].fifesim.to_surface(elevation=HEIGHT), "does not fit the lines and samples"),
-        (lambda: lit()[1].fifesim.to_surface(adjacency=True), "does not fit the lines and samples"),
-        (lambda: fifesim.regress(*[lit()[1].fifesim.ndvi()] * 2), r"\.fifesim\.grid_swath\(grid\)"),
-        (lambda: fifesim.to_geotiff(lit()[1], "scan.tif"), r"map the scan with .grid_swath\(grid\)"),
-    ],
-)
-def test_scan_that_is_not_seen_or_used_as_a_map_raises(call, said):
-    with pytest.raises(ValueError, match=said):
-        call()
-
-
-def test_mapped_scan_is_written_to_a_file(tmp_path):
-    toa, image = lit()
-    with pytest.warns(UserWarning, match="lacks vza, vaa"):
-        image.fifesim.grid_swath(grids.aligned_grid(grids.geobox(toa), 30.0)).fifesim.to_geotiff(tmp_path / "map.tif")
-    assert fifesim.open_image(tmp_path / "map.tif").dtype == np.uint8
 
 
 def test_varying_sun_is_sampled_at_each_pixel():
@@ -291,18 +222,6 @@ def test_varying_sun_is_sampled_at_each_pixel():
     column = ((image["x"] - toa["x"][0]) / (10 / 3)).round().astype(int).clip(0, 65)
     np.testing.assert_allclose(image["sza"], angles[column], rtol=0, atol=0.32)
     np.testing.assert_allclose(image.fifesim.to_reflectance().mean(), toa.mean(), rtol=1e-4, atol=0)
-
-
-def test_scan_round_trips_through_netcdf(tmp_path):
-    _, image = lit()
-    image.to_netcdf(tmp_path / "scan.nc")
-    with xr.open_dataarray(tmp_path / "scan.nc", decode_coords="all", mask_and_scale=False) as back:
-        xr.testing.assert_equal(back, image)
-        xr.testing.assert_identical(back.fifesim.to_radiance().drop_attrs(), image.fifesim.to_radiance().drop_attrs())
-        assert back.rio.crs == image.rio.crs
-    with xr.open_dataset(tmp_path / "scan.nc") as plain:
-        assert {"latitude", "longitude"} <= set(plain["dn"].encoding["coordinates"].split())
-        assert plain["dn"].attrs["grid_mapping"] == "spatial_ref"
 
 
 # ------------------------------------------------------------------------------------------ sweeps
@@ -338,31 +257,6 @@ def swept(name, angle):
 def scan_angle_of(image, name):
     altitude = instrument(name).altitude
     return np.degrees(np.arcsin(np.sin(np.radians(image["vza"])) * 6371e3 / (6371e3 + altitude)))
-
-
-@pytest.mark.parametrize(
-    ("name", "angle", "along", "across"),
-    [
-        ("MODIS", 30, 294.2, 353.8),
-        ("MODIS", 55, 501.5, 1207.5),
-        ("VIIRS", 30, 437.4, 555.0),
-        ("VIIRS", 55, 769.0, 706.0),
-    ],
-)
-def test_pixel_spacing_agrees_with_published_values(name, angle, along, across):
-    """
-    MODIS: Ichoku and Kaufman (2005). VIIRS: nadir sizes of the ATBD.
-
-    For 30 and 55 degrees the VIIRS sizes are scaled with slant range, incidence angle and aggregation (3 to 1 samples).
-    """
-    image = swept(name, angle)
-    near = (abs(scan_angle_of(image, name) - angle) < 0.3).values
-    assert near.any()
-    steps = {axis: np.hypot(image["x"].diff(axis), image["y"].diff(axis)).values for axis in ("line", "sample")}
-    swept_together = (image["sweep"].diff("line") == 0).values
-    down, right = steps["line"][swept_together], steps["sample"]
-    assert np.median(down[near[1:][swept_together]]) == pytest.approx(along, rel=0.03)
-    assert np.median(right[near[:, 1:]]) == pytest.approx(across, rel=0.03)
 
 
 @pytest.mark.parametrize(("name", "height"), [("MODIS", 10_000.0), ("VIIRS", 11_871.0)])
@@ -422,7 +316,7 @@ def test_footprint_width_is_the_aggregated_sample_width():
     assert widths[31.2] / widths[32.3] == pytest.approx(1.5 * 0.97, rel=0.03)
 
 
-@pytest.mark.parametrize("chunks", [CHUNKS, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}])
+@pytest.mark.parametrize("chunks", [CHUNKS, ODD_CHUNKS | {"band": 1}])
 def test_bands_zones_and_sweeps_do_not_depend_on_chunks(chunks, monkeypatch):
     monkeypatch.setattr("fifesim.sensor.scan_labels._SWATH_BLOCK", 11)
     view = {"nadir_offset": 525e3, "view_tolerance": 180, "min_valid": 0.0}
@@ -433,3 +327,55 @@ def test_bands_zones_and_sweeps_do_not_depend_on_chunks(chunks, monkeypatch):
             lazy = fifesim.sense_swath(in_chunks(toa, chunks), name, **options)
         xr.testing.assert_identical(lazy.compute(), whole)
     assert len(set(np.unique(whole["deleted"].sum("line")))) == 2
+
+
+# ------------------------------------------------------------------------------------------ images of a swath
+
+
+def ramp(lai, low, high):
+    """Raster on the grid of `lai` that increases to the east."""
+    values = np.broadcast_to(np.linspace(low, high, lai.sizes["x"]), lai.shape)
+    return lai.copy(data=values).drop_attrs(deep=False)
+
+
+def by_cell(sza, saa, vza, vaa):
+    """Geometry with some angles as rasters."""
+    return xr.Dataset({"sza": sza, "saa": saa, "vza": vza, "vaa": vaa})
+
+
+@pytest.fixture
+def swath(lai):
+    return by_cell(ramp(lai, 25.0, 31.0), 117.0, ramp(lai, 0.0, 50.0), ramp(lai, 350.0, 370.0))
+
+
+def reflected(lai, geometry, **options):
+    return fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"], geometry=geometry, **options)
+
+
+def test_reflectance_uses_the_angles_of_each_cell(lai, swath):
+    """Compared with single geometries; the skylight fraction is interpolated over sza to 1e-6."""
+    rho = check_raster_function(lambda array: reflected(array, swath), lai, quantity="surface_reflectance")
+    assert directions.varying(directions.geometry_of(rho)) == ("sza", "vza", "vaa")
+    for column in (0, 20, lai.sizes["x"] - 1):
+        angles = (float(getattr(swath, name)[0, column]) if name != "saa" else 117.0 for name in swath)
+        alone = reflected(lai, fifesim.Geometry(*angles), exact=True)
+        np.testing.assert_allclose(rho[..., column], alone[..., column], rtol=0, atol=1e-6)
+    litter = (lai * 0 + 0.2).drop_attrs(deep=False)
+    mapped, uniform = (reflected(lai, swath, canopy=fifesim.Canopy(background=each)) for each in (litter, 0.2))
+    np.testing.assert_allclose(mapped, uniform, rtol=1e-14)
+
+
+def test_image_of_a_swath_has_pixel_angles(lai, swath):
+    toa = reflected(lai, swath).fifesim.to_toa()
+    image = check_raster_function(lambda array: array.fifesim.sense("TM"), toa, quantity="dn")
+    there = directions.geometry_of(image)
+    assert directions.varying(there) == ("sza", "vza", "vaa")
+    middle = toa["sza"].values.reshape(5, 9, 6, 9).mean((1, 3))
+    np.testing.assert_allclose(there.sza, middle, rtol=1e-12)
+    # The mean of azimuths between 350 and 10 degrees is north; an arithmetic mean would be south.
+    assert np.all((there.vaa < 10.1) | (there.vaa > 349.9))
+    # Planetary reflectance round trips within half a count: both conversions use the solar angle of the pixel.
+    image = toa.fifesim.sense(PAPER)
+    one_sun = toa.drop_vars(["sza", "vza", "vaa"]).fifesim.sense(PAPER, quantise=False).fifesim.to_reflectance()
+    count = (image["gain"] / image["solar_irradiance"]).values[:, None, None] * np.pi * 1.04 / np.cos(np.radians(31))
+    assert np.all(np.abs(image.fifesim.to_reflectance() - one_sun).values <= 0.5 * count + 1e-9)

@@ -381,10 +381,6 @@ class SystemSpread(LineSpread):
     def _mtf(self, frequency):
         return self.table.mtf(frequency)
 
-    def product(self, frequency):
-        """Product of the modulation transfer functions of the parts, before truncation. [1]"""
-        return _product(self.parts, frequency)
-
 
 def _product(parts, frequency):
     return np.prod([part.mtf(frequency) for part in parts], axis=0)

@@ -1,43 +1,27 @@
-"""Instruments by name and from files: error messages, units, short files and tables."""
+"""Instruments by name, from files and in Python: values, spatial and spectral responses, designs and mistakes."""
 
+import dataclasses
 import os
 import shutil
 
 import numpy as np
 import pytest
+from mistakes import mistakes
 from paper_file import paper_text
+from pyrsr.rsr import RSR_reader
 
-import fifesim
 from fifesim.base import files
-from fifesim.base.bands import solar_irradiance
-from fifesim.sensor.description.instruments import instrument, read_responses
+from fifesim.base.bands import GREEN, Band, solar_irradiance
+from fifesim.sensor.description.fields import band_called, false_colour_bands
+from fifesim.sensor.description.instrument_file import Noise
+from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument, read_responses
+from fifesim.sensor.description.provenance import band_provenance
+from fifesim.sensor.description.spatial_response import knows_blur, with_response
+from fifesim.sensor.description.spectral_response import PyrsrResponse, ResponseList, half_peak
 
-TM_FILE = files.path("instruments/tm.toml")
-
-
-def test_names_ignore_case_and_instruments_are_returned_unchanged():
-    tm = instrument("tm")
-    assert tm is instrument("TM") is instrument(tm)
-    with pytest.raises(ValueError, match=r"unknown instrument 'TN': did you mean TM\b.*\? There are .*TM"):
-        instrument("TN")
-    # A suffix alone is not a file name.
-    with pytest.raises(ValueError, match=r"unknown instrument '\.toml'"):
-        instrument(".toml")
-
-
-def test_toml_path_is_read_again_after_a_change(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(TM_FILE.read_text(encoding="utf-8"), encoding="utf-8")
-    assert instrument(str(path)) == instrument(path) == instrument("TM")
-    assert instrument(str(path)) is instrument(str(path))
-    path.write_text(TM_FILE.read_text(encoding="utf-8").replace("bits = 8 ", "bits = 11 "), encoding="utf-8")
-    assert instrument(str(path)).bits == 11
-
-
-FIRST = 'name = "TM1"'
+TM = instrument("TM")
 BITS = 'bits = "Friedl1995"'
-PYRSR = 'srf = { satellite = "Landsat-5", sensor = "TM", band = "3" }'
-LSF = paper_text()[paper_text().index('kind = "cosine"') : paper_text().index("[scan]")]
+IFOV = ("bits = 8 ", "ifov = 43.0e-6\nbits = 8 ", BITS, f'{BITS}\nifov = "Friedl1995"')
 HEAD = 'name = "Camera"\naltitude = 120.0\ngsd = 0.1\nbits = 12\n'
 CAMERA = f"""{HEAD}
 bands = [
@@ -46,152 +30,148 @@ bands = [
 ]
 """
 AVHRR, VIIRS = (files.path(f"instruments/{name}.toml").read_text(encoding="utf-8") for name in ("avhrr9", "viirs"))
-ZONES = VIIRS[VIIRS.index("[[scan.zones]]") : VIIRS.index("[origin]")]
-MTF = 'bits = 12\nmtf_at_nyquist = { along = 0.2, across = 0.3 }\norigin = { blur = { kind = "required" } }'
-FLAT = 'scan = {{ kind = "pushbroom", max_angle = {}, samples = 1000 }}'
-# Markham and Barker (1986) use mW cm-2 sr-1 um-1, i.e. one tenth of the values here.
-RADIANCES = ("152.10", "296.81", "204.3", "206.2", "27.19", "14.38")
-TENTHS = [f"full_scale_radiance = {each}" for text in RADIANCES for each in (text, float(text) / 10)]
-PRODUCT = "[product]\ngain = 2e-5\noffset = -0.1\nbits = 16\nsun_corrected = false\n\n[lsf]"
-SOURCE = ("\n[sources]", '\n[sources]\nproduct = "Chander2009"')
-
-
-def srf(text):
-    """Replacements that give the third band another response and limits it must cover."""
-    return PYRSR, f"srf = {{ {text} }}\nlimits = [0.63, 0.69]", BITS, f'{BITS}\nlimits = "NASA2013"'
-
-
-MISTAKES = [
-    # Keys and value types.
-    (("bits = 8 ", f'bits = "\\u001b{"a" * 5000}" '), r"bits = '\\x1baaa.*must be a whole number"),
-    (("bits = 8 ", "bitz = 8 "), "bits is missing; unknown key bitz, did you mean 'bits'"),
-    (("bits = 8 ", "mtf = 0.2\nbits = 8 "), "unknown key mtf, did you mean 'mtf_at_nyquist'"),
-    (("bits = 8 ", "bits = 8.5 "), "bits = 8.5: must be a whole number"),
-    (("bits = 8 ", "bits = 32 "), "bits = 32: .*16"),
-    (("= 705000.0", "= '705 km'"), "altitude = '705 km': .*number"),
-    (("= 705000.0", "= -705000.0"), "altitude = -705000.0: must be above 0"),
-    (("interval = 43.0e-6", "interval = { along = 43.0e-6 }"), "the key interval.across is missing"),
-    (("interval = 43.0e-6", "interval = '43 urad'"), "interval = '43 urad': .*number"),
-    (("= -1.5  ", "= 300.0  "), "bands.4: full_scale_radiance must be above min_radiance, got 206.2 and 300"),
-    (("= 83.44", "= nan"), "bands.6.solar_irradiance = nan: .*finite"),
-    (('altitude = "Friedl1995"', 'altitude = "nobody"'), "sources.altitude: must be one of .* got 'nobody'"),
-    (('solar_irradiance = "Chander2009"', ""), "sources.solar_irradiance: must be one of"),
-    (('name = "TM2"', FIRST), "each name may occur once"),
-    (("gsd = 30.0", "gsd = "), "is not valid TOML"),
-    ((FIRST, FIRST + "\ngains.nominal = { full_scale_radiance = 1.0, min_radiance = 0.0 }"), "own gain"),
-    ((FIRST, FIRST + "\nnoise = { radiance = 50.0 }"), "bands.1.noise: give either snr or nedl"),
-    ((FIRST, FIRST + "\nnoise = { radiance = 50.0, snr = 100.0 }"), "sources.noise: must be one of"),
-    (("max_angle = 7.47", "max_angle = 90.0"), "scan.max_angle = 90.0: must be below 75"),
-    (('kind = "whiskbroom"', 'kind = "frame"'), "scan.kind = 'frame': .*'whiskbroom' or 'pushbroom'"),
-    (("[lsf]", PRODUCT), r"sources\.product: must be one of"),
-    (("[lsf]", PRODUCT.replace("2e-5", "-2e-5"), *SOURCE), r"product\.gain = -2e-05: must be above 0"),
-    (("[lsf]", PRODUCT.replace("false", '"no"'), *SOURCE), r"product\.sun_corrected = 'no'"),
-    (("[lsf]", PRODUCT.replace("\noffset = -0.1", ""), *SOURCE), r"the key product\.offset is missing"),
-    # Spatial responses.
-    (('"cosine"', '"sinc"'), "lsf.kind = 'sinc': it must be one of 'cosine', 'boxcar'"),
-    (('kind = "cosine"', ""), "the key lsf.kind is missing"),
-    (("count = 9", "count = 0"), "lsf.count = 0: must be above 0"),
-    (('kind = "cosine"', 'kind = "boxcar"'), "unknown key lsf.step; unknown key lsf.count"),
-    ((LSF, 'kind = "boxcar"\n'), "bands.1.lsf: kind 'boxcar' needs the instantaneous field of view: add ifov"),
-    ((LSF, 'kind = "gaussian"\n'), "lsf: give one of fwhm, mtf_at_nyquist and eifov, got none"),
-    ((LSF, 'kind = "gaussian"\nmtf_at_nyquist = 30.0\n'), "lsf.mtf_at_nyquist = 30.0: must be below 1"),
-    ((LSF, 'kind = "table"\nangles = [0.0, 1e-5]\nvalues = [1.0]\n'), "lsf.values = .*needs 2 of them or more"),
-    (("[lsf] ", "#", LSF, '[lsf.along]\nkind = "boxcar"\n'), "the key lsf.across is missing"),
-    # Spectral responses.
-    (srf("wavelength = [620, 630, 690, 700], response = [0, 1, 1, 0]"), "wavelengths are in um.*nm: divide by 1000"),
-    (srf("wavelength = [0.62, 0.63, 0.69], response = [0, 1, 0.9]"), "does not cover the band: at 0.69 um, where its"),
-    (srf("wavelength = [0.64, 0.65, 0.66], response = [0, 1, 0]"), "does not cover the band from 0.63 to 0.69 um"),
-    (srf("wavelength = [0.62, 0.61, 0.69], response = [0, 1, 0]"), "bands.3.*wavelengths must increase"),
-    (srf("wavelength = [0.62, 0.69], response = [0, -1]"), "bands.3.*must not be negative"),
-    (srf("wavelength = [0.62, 0.69]"), "the key bands.3.srf.response is missing"),
-    (srf("response = [0, 1]"), "the key bands.3.srf.wavelength is missing"),
-    ((srf("")[0], "srf = 0.66"), "bands.3.srf.* = 0.66: must be"),
-    (srf('table = "none.csv", satellite = "A", band = "1"'), "srf.table = 'none.csv': no such file beside"),
-    (srf('table = "avhrr_response.csv", satellite = "NOAA-9", band = "3"'), "has no NOAA-9 3: it has .*NOAA-11 2"),
-    (('sensor = "TM", band = "7"', 'sensor = "TM", band = "9"'), "bands.6.srf: pyrsr has no .* Landsat-5 TM 9"),
-    # Numbers in a wrong unit.
-    (("altitude = 705000.0", "altitude = 705.0"), "altitude = 705: it is in metres.*multiply by 1000"),
-    (("interval = 43.0e-6", "interval = 43.0e-3"), "interval = 0.043: angles are in radians"),
-    (("interval = 43.0e-6", "interval = 0.0024637"), "interval = 0.0024637: it is in radians.*degrees, so multiply"),
-    (("= 1536.0", "= 153.6"), "bands.3.solar_irradiance = 153.6: it is in W m-2 um-1.*1550.7.*times 10"),
-    (("= 1536.0", "= 1.536"), "bands.3.solar_irradiance = 1.536: .*W m-2 nm-1 times 1000"),
-    (("= 206.2 ", "= 2000.0 "), "bands.4.full_scale_radiance = 2000: it is in W m-2 sr-1 um-1"),
-    (("max_angle = 7.47", "max_angle = 0.13"), "scan: max_angle = 0.13 degrees gives a swath of 3 km.*in degrees"),
-    (("swath = 185000.0", "swath = 185.0"), "scan: .*swath = 185 m; .*swath in metres"),
-    (("gsd = 30.0", "gsd = 0.03"), "interval = 4.3e-05: .*unless gsd is in kilometres"),
-    (("step = 4.778e-6", "step = 4.778e-3"), "bands.1.lsf: its angles are in radians.*milliradians times 1e-3"),
-    (("step = 4.778e-6", "step = 4.778e-8"), "bands.1.lsf: its angles are in radians"),
-    (
-        ("bits = 8 ", "ifov = 2.4351e-3\nbits = 8 ", BITS, f'{BITS}\nifov = "Friedl1995"'),
-        "bands.1.ifov = 0.0024351: it is in radians, and 56.6 times the interval; degrees times pi / 180",
-    ),
-    (
-        (FIRST, FIRST + "\nnoise = { radiance = 500.0, snr = 100.0 }", BITS, f'{BITS}\nnoise = "Friedl1995"'),
-        "noise.radiance = 500: it is in W m-2 sr-1 um-1 and must lie between",
-    ),
-    (TENTHS, "bands.full_scale_radiance: .*no band records more than 6%"),
-]
-# In other files. 2048 samples of 0.95 mrad reach 55.7 degrees to each side; the horizon from 833 km is at 62.2 degrees.
-# 6400 samples as wide as at nadir would reach 86 degrees; the zones of VIIRS reach 56 degrees. Half of 1000 pixels of
-# 0.1 m from 86.6 m is 50 / 86.6, the tangent of 30 degrees, or 33.08 degrees.
-OTHER_MISTAKES = {
-    AVHRR: [
-        (("= 55.4", "= 0.9669"), "scan: .*2048 x 0.00095 radians, reach 55.7 .*side, and max_angle = 0.9669 degrees"),
-        (("= 55.4", "= 60.0"), "scan: .*reach 55.7 degrees to either side, and max_angle = 60 degrees"),
-        (("= 55.4", "= 70.0"), "scan.max_angle = 70: .*misses the earth"),
-    ],
-    VIIRS: [
-        ((ZONES, "", "0.00015582", "0.00046746"), r"6400 x 0.00046746 radians, reach 85.7 .*\[\[scan.zones\]\]"),
-        (("samples = 736", "samples = 737"), "half of samples = 6400, got 3201"),
-        (("deleted = 4", "deleted = 16"), "deleted = 16 at each end leaves none of lines = 32"),
-        (("aggregation = 2", "aggregation = 0"), "scan.zones.2.aggregation = 0"),
-    ],
-    CAMERA: [
-        (("width = 0.010", "width = 10.0"), "bands.1.srf: width = 10: it is in um, and too wide"),
-        (("width = 0.010, ", ""), "bands.1.srf.width is missing"),
-        (('"boxcar"', '"triangle"'), "bands.2.srf.shape = 'triangle'"),
-        ((", snr_radiance = 100.0", ""), "bands.1.noise.radiance is missing"),
-        (("bits = 12", f'{MTF}\nlsf = {{ kind = "boxcar" }}'), "mtf_at_nyquist and lsf both state the blur"),
-        (("bits = 12", MTF.replace("0.3", "1.3")), r"lsf\.across\.mtf_at_nyquist = 1.3: must be below 1"),
-        (("bits = 12", MTF.replace("required", "guessed")), r"origin\.blur\.kind = 'guessed': .*'in-flight', 'pre-"),
-    ]
-    + [
-        (
-            ("altitude = 120.0", f"altitude = 86.6\n{FLAT.format(angle)}"),
-            "samples of red .* 1000 x 0\\.00115473 radians",
-        )
-        for angle in (27.0, 36.0)
-    ],
+TEXTS = {"TM": paper_text(), "AVHRR": AVHRR, "VIIRS": VIIRS, "CAMERA": CAMERA}
+# Long parts of the files that rows of sensor_mistakes.jsonl name.
+PARTS = {
+    "LSF": TEXTS["TM"][TEXTS["TM"].index('kind = "cosine"') : TEXTS["TM"].index("[scan]")],
+    "SRF": 'srf = { satellite = "Landsat-5", sensor = "TM", band = "3" }',
+    "ZONES": VIIRS[VIIRS.index("[[scan.zones]]") : VIIRS.index("[origin]")],
 }
-CASES = [(None, *each) for each in MISTAKES] + [(text, *each) for text, rows in OTHER_MISTAKES.items() for each in rows]
 
 
-@pytest.mark.parametrize(("text", "replacements", "message"), CASES, ids=[message for *_, message in CASES])
-def test_errors_in_a_file_name_key_value_and_remedy(changed, text, replacements, message):
-    with pytest.raises(ValueError, match=f"mine.toml.*{message}") as caught:
+@pytest.fixture
+def changed(tmp_path):
+    """Function that reads the TM file, or another text, after replacements, given as old, new, old, new, ..."""
+
+    def read(*replacements, text="TM"):
+        text = TEXTS.get(text, text)
+        for old, new in zip(replacements[::2], replacements[1::2], strict=True):
+            assert PARTS.get(old, old) in text
+            text = text.replace(PARTS.get(old, old), new, 1)
+        path = tmp_path / "mine.toml"
+        path.write_text(text, encoding="utf-8")
+        return read_instrument(path)
+
+    return read
+
+
+def nyquist(item, number=0):
+    """Modulation transfer of a band at its Nyquist frequency, along and across the track."""
+    band = item.bands[number]
+    spreads, steps = item.line_spreads(band), item.ground_intervals(band)
+    return [float(lsf.mtf(0.5 / step)) for lsf, step in zip(spreads, steps, strict=True)]
+
+
+# ------------------------------------------------------------------------------------------- descriptions
+
+
+def test_tm_agrees_with_table_1():
+    """Modulation transfer of the cosine at 0.5 cycles per interval by hand."""
+    paper = instrument("TM", "paper")
+    red, near_infrared = TM.select(["TM3", "TM4"])
+    assert (red.full_scale_radiance, near_infrared.full_scale_radiance) == (204.3, 206.2)
+    assert (red.min_radiance, near_infrared.min_radiance) == (-1.2, -1.5)
+    assert (TM.bits, TM.altitude, TM.interval, TM.gsd) == (8, 705_000.0, 0.000043, 30.0)
+    assert (paper.lsf.count, paper.lsf.step, paper.lsf.kind) == (9, 0.000004778, "cosine")
+    np.testing.assert_allclose(paper.line_spread.mtf(0.5 / 30.315), 0.6928, atol=1e-3)
+
+
+def test_bands_are_selected_in_order():
+    assert [band.name for band in TM.select(["TM4", "tm3"])] == ["TM4", "TM3"]
+    assert [band.name for band in TM.select(["red", "nir", "B5"])] == ["TM3", "TM4", "TM5"]
+    assert TM.select("TM3") == (TM.bands[2],) and TM.select() == TM.bands
+    assert band_called(11, instrument("VIIRS")).name == "M11" and band_called("", TM) is None
+
+
+def test_band_values_override_instrument_values():
+    """By hand: 86 urad and 60 urad from 705 km are 60.63 m and 42.3 m."""
+    green, red = TM.select(["TM2", "TM3"])
+    assert "Friedl" in TM.source("min_radiance", red) and "Markham" in TM.source("min_radiance", green)
+    sources = TM.sources | {"ifov": "Friedl1995", "detectors": "Friedl1995"}
+    own = dataclasses.replace(TM.bands[5], gsd=120.0, interval=86e-6, ifov=60e-6, detectors=4)
+    mixed = dataclasses.replace(TM, bands=(*TM.bands[:5], own), sources=sources)
+    assert mixed.pixel(own) == 120.0 and mixed.pixel(TM.bands[0]) == 30.0
+    assert mixed.ground_intervals(own) == pytest.approx((60.63, 60.63), rel=1e-12)
+    assert mixed.ground_fields(own) == pytest.approx((42.3, 42.3), rel=1e-12)
+    assert tuple(mixed.ground_fields(TM.bands[0])) == (None, None)
+
+
+def test_intervals_along_and_across_and_product_scale_are_read(changed):
+    interval = "interval = 43.0e-6", "interval = { along = 40.0e-6, across = 44.0e-6 }"
+    product = "[product]\ngain = 2e-5\noffset = -0.1\nbits = 16\nsun_corrected = false\n\n[lsf]"
+    mine = changed(*interval, "[lsf]", product, "\n[sources]", '\n[sources]\nproduct = "Chander2009"')
+    along, across = mine.ground_intervals(mine.bands[0])
+    assert (along, across) == pytest.approx((28.2, 31.02), rel=1e-12)
+    assert mine.ground_interval == across
+    assert dataclasses.astuple(mine.product) == (2e-5, -0.1, 16, False)
+
+
+def test_noise_from_snr_equals_noise_from_nedl():
+    """Half of the variance is shot noise: at 1/4 of the radiance, 1/8 + 1/2 of the variance remains."""
+    for noise in (Noise(radiance=80.0, snr=160.0, shot=0.5), Noise(radiance=80.0, nedl=0.5, shot=0.5)):
+        assert noise.equivalent_radiance == 0.5
+        model = noise.model(6, "columns")
+        assert (model.detectors, model.along) == (6, "columns")
+        found = model.noise_equivalent_radiance([80.0, 20.0])
+        np.testing.assert_allclose(found, [0.5, 0.5 * np.sqrt(0.625)], rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_false_colour_bands_share_a_grid(name):
+    own = instrument(name)
+    *green, red, near_infrared = false_colour_bands(own)
+    assert (red, near_infrared) == tuple(own.red_and_near_infrared())
+    for band in green:
+        assert GREEN.low <= band.wavelength <= GREEN.high
+        assert own.pixel(band) == own.pixel(red) == own.pixel(near_infrared)
+    known = {"TM": "TM2", "OLI": "OLI3", "MSI": "MSI3"}
+    assert name not in known or green[0].name == known[name]
+
+
+# ------------------------------------------------------------------------------------------- files
+
+
+@pytest.mark.parametrize(("stage", "changes", "said"), mistakes("instrument", name="sensor_mistakes"), ids=str)
+def test_errors_in_a_file_name_key_value_and_remedy(changed, stage, changes, said):
+    text, *replacements = changes
+    with pytest.raises(ValueError, match=f"mine.toml.*{said}") as caught:
         changed(*replacements, text=text)
     assert len(str(caught.value)) <= 500 and str(caught.value).isprintable()
 
 
 def test_scans_within_their_limits_are_read(changed):
-    assert changed(text=VIIRS).scan.elementary_samples() == 12608
+    """Half of 1000 pixels of 0.1 m from 86.6 m is 50 / 86.6, the tangent of 30 degrees, or 33.08 degrees."""
+    assert changed(text="VIIRS").scan.elementary_samples() == 12608
     for angle in (30.0, 33.08):
-        flat = changed("altitude = 120.0", f"altitude = 86.6\n{FLAT.format(angle)}", text=CAMERA)
-        assert flat.scan.samples == 1000
+        flat = f'altitude = 86.6\nscan = {{ kind = "pushbroom", max_angle = {angle}, samples = 1000 }}'
+        assert changed("altitude = 120.0", flat, text="CAMERA").scan.samples == 1000
 
 
-def test_pipe_or_deeply_nested_file_raises(tmp_path):
+def test_file_is_read_again_after_a_change(tmp_path):
+    path, text = tmp_path / "mine.toml", files.path("instruments/tm.toml").read_text(encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
+    assert instrument(str(path)) == instrument(path) == TM == instrument(TM)
+    assert instrument(str(path)) is instrument(str(path))
+    path.write_text(text.replace("bits = 8 ", "bits = 11 "), encoding="utf-8")
+    assert instrument(str(path)).bits == 11
+
+
+def test_pipe_or_deeply_nested_file_raises(changed, tmp_path):
+    """Reading a pipe would block."""
     os.mkfifo(tmp_path / "pipe.toml")
     (tmp_path / "deep.toml").write_text("x = " + "[" * 5000)
     for name, said in (("pipe.toml", "is a pipe: name a file"), ("deep.toml", "nests its tables too deeply")):
         with pytest.raises(ValueError, match=said):
             instrument(tmp_path / name)
+    (tmp_path / "loop.csv").symlink_to("loop.csv")
+    for table in (tmp_path / "pipe.toml", "loop.csv"):
+        with pytest.raises(ValueError, match="srf"):
+            changed("SRF", f'srf = {{ table = "{table}", satellite = "X", band = "1" }}')
 
 
 def test_table_path_is_relative_to_the_instrument_file(tmp_path, monkeypatch):
     """The working directory changes between reading the file and reading the table."""
-    text = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
-    (tmp_path / "mine.toml").write_text(text.replace("avhrr_response.csv", "own.csv"), encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(AVHRR.replace("avhrr_response.csv", "own.csv"), encoding="utf-8")
     shutil.copy(files.path("avhrr_response.csv"), tmp_path / "own.csv")
     monkeypatch.chdir(tmp_path)
     mine = instrument("mine.toml")
@@ -200,32 +180,11 @@ def test_table_path_is_relative_to_the_instrument_file(tmp_path, monkeypatch):
     assert [band.response for band in mine.bands] == [band.response for band in instrument("AVHRR9").bands]
 
 
-@pytest.mark.parametrize("table", ["pipe.csv", "folder.csv", "/dev/zero", "a" * 5000, "loop.csv"])
-def test_table_that_is_not_a_regular_file_raises(changed, tmp_path, table):
-    """Reading a pipe would block."""
-    os.mkfifo(tmp_path / "pipe.csv")
-    (tmp_path / "folder.csv").mkdir()
-    (tmp_path / "loop.csv").symlink_to("loop.csv")
-    table = str(tmp_path / table) if table == "pipe.csv" else table
-    with pytest.raises(ValueError, match="srf"):
-        changed(PYRSR, f'srf = {{ table = "{table}", satellite = "X", band = "1" }}')
-
-
-# ------------------------------------------------------------------------------------------- short files
-
-
-TABLE = """name,center,width,snr,snr_radiance
-red,0.668,0.010,200,100
-nir,0.840,0.040,,
-"""
-
-
-def test_minimal_file_defines_an_instrument_with_its_sources(changed):
-    camera = changed(text=CAMERA)
+def test_minimal_file_defines_an_instrument_with_its_sources(changed, tmp_path):
+    camera = changed(text="CAMERA")
     red, nir = camera.bands
     assert (red.wavelength, nir.wavelength) == (pytest.approx(0.668, abs=1e-9), pytest.approx(0.840, abs=1e-9))
-    assert camera.ground_interval == pytest.approx(0.1, rel=1e-12)
-    assert camera.line_spread.width == pytest.approx(0.1, rel=1e-12)
+    assert camera.ground_interval == pytest.approx(0.1, rel=1e-12) == camera.line_spread.width
     assert red.noise.equivalent_radiance == 0.5 and nir.noise is None
     assert (nir.full_scale_radiance, nir.min_radiance, red.min_radiance) == (300.0, 0.0, 0.0)
     # The default irradiance and range come from the reference spectrum.
@@ -233,13 +192,17 @@ def test_minimal_file_defines_an_instrument_with_its_sources(changed):
     assert red.full_scale_radiance == pytest.approx(red.solar_irradiance / np.pi, rel=1e-15)
     assert camera.source("solar_irradiance", red).startswith("ASTM G173-03")
     assert camera.source("full_scale_radiance", red).startswith("taken for a white surface")
-    assert camera.source("full_scale_radiance", nir) == "as mine.toml says"
     assert camera.source("interval").startswith("taken for gsd over altitude")
-    assert camera.source("noise", red) == "as mine.toml says"
+    assert camera.source("noise", red) == camera.source("full_scale_radiance", nir) == "as mine.toml says"
+    # The bands may be in a table, with empty cells.
+    table = "name,center,width,snr,snr_radiance\nred,0.668,0.010,200,100\nnir,0.840,0.040,,\n"
+    (tmp_path / "bands.csv").write_text(table)
+    first, second = changed(text=f'{HEAD}bands = "bands.csv"\n').bands
+    assert first == red and second.noise is None and second.wavelength == pytest.approx(0.840, abs=1e-9)
 
 
 def test_response_has_the_given_width_at_half_maximum(changed):
-    red, nir = (band.response for band in changed(text=CAMERA).bands)
+    red, nir = (band.response for band in changed(text="CAMERA").bands)
     half = np.interp([0.663, 0.668, 0.673], red.wavelength, red.response)
     np.testing.assert_allclose(half, [0.5, 1.0, 0.5], rtol=0, atol=1e-9)
     assert np.interp([0.8201, 0.8599, 0.8199, 0.8601], nir.wavelength, nir.response).tolist() == [1, 1, 0, 0]
@@ -248,63 +211,30 @@ def test_response_has_the_given_width_at_half_maximum(changed):
     assert area == pytest.approx(0.010 * np.sqrt(np.pi / np.log(2)) / 2, rel=1e-3)
 
 
-def test_band_table_is_read_again_after_a_change(changed, tmp_path):
-    (tmp_path / "bands.csv").write_text(TABLE)
-    red, nir = changed(text=f'{HEAD}bands = "bands.csv"\n').bands
-    assert nir.noise is None and nir.wavelength == pytest.approx(0.840, abs=1e-9)
-    path = tmp_path / "mine.toml"
-    assert fifesim.instrument(path) is fifesim.instrument(path)
-    (tmp_path / "bands.csv").write_text(TABLE.replace("0.668", "0.6500"))
-    assert fifesim.instrument(path).bands[0].wavelength == pytest.approx(0.65, abs=1e-9)
-    assert red == changed(text=CAMERA).bands[0]
+@pytest.mark.parametrize(("stage", "table", "said"), mistakes("band table", name="sensor_mistakes"), ids=str)
+def test_invalid_band_table_raises(changed, tmp_path, stage, table, said):
+    (tmp_path / "bands.csv").write_text(table[1])
+    with pytest.raises(ValueError, match=f"mine.toml: .*{said}"):
+        changed(text=f'{HEAD}bands = "{table[0].replace("FOLDER", tmp_path.name)}"\n')
 
 
 def test_noise_from_shot_share_or_two_ratios(changed):
-    red, _ = changed("snr_radiance = 100.0", "snr_radiance = 100.0, snr_shot = 0.75", text=CAMERA).bands
+    red, _ = changed("snr_radiance = 100.0", "snr_radiance = 100.0, snr_shot = 0.75", text="CAMERA").bands
     assert (red.noise.equivalent_radiance, red.noise.shot) == (0.5, 0.75)
     second = "snr_radiance = 100.0, high_snr = 350.0, high_snr_radiance = 250.0"
-    camera = changed("snr_radiance = 100.0", second, text=CAMERA)
-    model = camera.noise_model(camera.bands[0])
-    assert model.snr([100.0, 250.0]).tolist() == pytest.approx([200.0, 350.0], rel=1e-12)
+    camera = changed("snr_radiance = 100.0", second, text="CAMERA")
+    found = camera.noise_model(camera.bands[0]).snr([100.0, 250.0])
+    assert found.tolist() == pytest.approx([200.0, 350.0], rel=1e-12)
 
 
 def test_blur_from_mtf_at_nyquist(changed):
-    def transfer(camera, number):
-        spreads, steps = camera.line_spreads(camera.bands[number]), camera.ground_intervals(camera.bands[number])
-        return [float(spread.mtf(0.5 / step)) for spread, step in zip(spreads, steps, strict=True)]
-
-    camera = changed("bits = 12", MTF, 'name = "nir"', 'name = "nir", mtf_at_nyquist = 0.15', text=CAMERA)
-    np.testing.assert_allclose(transfer(camera, 0), [0.2, 0.3], rtol=1e-9)
-    np.testing.assert_allclose(transfer(camera, 1), 0.15, rtol=1e-9)
-    blur, noise, lacking, place = camera.provenance
-    assert (blur.quantity, blur.bands, blur.origin) == ("blur", ("red", "nir"), "required")
-    assert (noise.bands, noise.origin, lacking.bands, lacking.origin) == (("red",), "assumed", ("nir",), "unknown")
-    assert (place.quantity, place.origin) == ("geolocation", "unknown")
-
-
-@pytest.mark.parametrize(
-    ("name", "table", "said"),
-    [
-        ("../{}/bands.csv", TABLE, "no such file beside it; type a CSV file of bands"),
-        ("/dev/null", TABLE, "no such file beside it"),
-        ("bands.csv/", TABLE, "no such file beside it"),
-        ("other.csv", TABLE, "bands = 'other.csv': no such file beside it"),
-        ("bands.csv", "name,center\nred,0.6\n", "lacks the columns width"),
-        ("bands.csv", "wavelength,red\n0.6,1\n", "the column red has no response above 0 at two wavelengths"),
-        ("bands.csv", "wavelength,red\n0.6,0\n0.7,-1\n", "the column red has no response above 0"),
-        ("bands.csv", "wavelength,red\n600,0\n700,1\n", "wavelength 700: it is in um, this looks like nm"),
-        ("bands.csv", "wavelength,red\n0.6,low\n0.7,1\n", "the column red must have numbers, got 'low'"),
-        ("bands.csv", "wavelength,red,red\n0.6,0,1\n0.7,1,0\n", "the column red occurs twice"),
-        ("bands.csv", "wavelength\n0.6\n0.7\n", "no column beside wavelength"),
-        ("bands.csv", "wavelength,red\n0.6,0,5\n0.7,1,0\n", "cannot read bands"),
-        ("bands.csv", "wavelength,red\n0.6,-0.1\n0.65,1\n0.7,0\n", "the response must not be negative"),
-        ("bands.csv", "wavelength,red\n0.6,0\n0.6,1\n0.7,0\n", "wavelengths must increase"),
-    ],
-)
-def test_invalid_band_table_raises(changed, tmp_path, name, table, said):
-    (tmp_path / "bands.csv").write_text(table)
-    with pytest.raises(ValueError, match=f"mine.toml: .*{said}"):
-        changed(text=f'{HEAD}bands = "{name.format(tmp_path.name)}"\n')
+    mtf = 'bits = 12\nmtf_at_nyquist = { along = 0.2, across = 0.3 }\norigin = { blur = { kind = "required" } }'
+    camera = changed("bits = 12", mtf, 'name = "nir"', 'name = "nir", mtf_at_nyquist = 0.15', text="CAMERA")
+    np.testing.assert_allclose([nyquist(camera), nyquist(camera, 1)], [[0.2, 0.3], [0.15, 0.15]], rtol=1e-9)
+    found = [(row.quantity, row.bands, row.origin) for row in camera.provenance]
+    both = ("red", "nir")
+    assert found[:2] == [("blur", both, "required"), ("noise", ("red",), "assumed")]
+    assert found[2:] == [("noise", ("nir",), "unknown"), ("geolocation", both, "unknown")]
 
 
 MEASURED = """# calibration of the laboratory
@@ -318,20 +248,17 @@ wavelength, nir, red
 
 
 def test_measured_responses_are_bands(tmp_path):
-    """Rows in any order, empty cells, and noise around zero."""
-    (tmp_path / "srf.csv").write_text(MEASURED, encoding="utf-8")
+    """Rows in any order, empty cells, and noise around zero; a table is read again when it changes."""
+    path, table = tmp_path / "camera.toml", tmp_path / "srf.csv"
+    table.write_text(MEASURED, encoding="utf-8")
     noise = {"red": (120.0, 22.0)}
-    made = read_responses(
-        tmp_path / "srf.csv", name="Camera", altitude=5e5, gsd=10.0, bits=10, mtf_at_nyquist=0.25, snr=noise
-    )
+    made = read_responses(table, name="Camera", altitude=5e5, gsd=10.0, bits=10, mtf_at_nyquist=0.25, snr=noise)
     nir, red = made.bands
     assert (red.name, red.response.wavelength, red.response.response) == ("red", (0.62, 0.66, 0.72), (0.0, 1.0, 0.0))
     assert nir.response.wavelength == (0.66, 0.72, 0.8, 0.88) and min(nir.response.response) == 0
     assert (red.noise.snr, red.noise.radiance, nir.noise, made.bits) == (120.0, 22.0, None, 10)
-    assert made.line_spreads(red).along.mtf(0.5 / 10.0) == pytest.approx(0.25)
-    assert made.source("srf", red) == "as srf.csv says"
+    assert nyquist(made) == pytest.approx([0.25, 0.25]) and made.source("srf", red) == "as srf.csv says"
     text = 'name = "Camera"\naltitude = 5e5\ngsd = 10.0\nbits = 10\nmtf_at_nyquist = 0.25\nbands = "srf.csv"\n'
-    path = tmp_path / "camera.toml"
     path.write_text(text + "snr = { red = [120, 22] }\n", encoding="utf-8")
     again = instrument(path)
     assert again.bands == made.bands and again.lsf == made.lsf
@@ -339,28 +266,21 @@ def test_measured_responses_are_bands(tmp_path):
     with pytest.raises(ValueError, match=r"snr: it must have the names of bands, .* got 120"):
         instrument(path)
     path.write_text(text, encoding="utf-8")
-    # The table is read again when it changes.
-    (tmp_path / "srf.csv").write_text(MEASURED.replace("0.80", "0.82"), encoding="utf-8")
+    table.write_text(MEASURED.replace("0.80", "0.82"), encoding="utf-8")
     assert instrument(path).bands[0].response.wavelength[2] == 0.82
 
 
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        ({"snr": {"blue": (1.0, 2.0)}}, "there is no band blue, the table has nir, red"),
-        ({"snr": {"red": 100.0}}, "red needs a ratio and the radiance where it holds"),
-        ({"altitude": 400.0}, "interval = 0.025: angles are in radians"),
-        ({"mtf_at_nyquist": 1.5}, "mtf_at_nyquist = 1.5: must be below 1"),
-    ],
-)
-def test_wrong_numbers_beside_measured_responses_are_refused(tmp_path, keys, words):
+@pytest.mark.parametrize(("stage", "keys", "said"), mistakes("responses", name="sensor_mistakes"), ids=str)
+def test_wrong_numbers_with_measured_responses_raise(tmp_path, stage, keys, said):
     (tmp_path / "srf.csv").write_text(MEASURED, encoding="utf-8")
-    given = {"name": "Camera", "altitude": 5e5, "gsd": 10.0} | keys
-    with pytest.raises(ValueError, match=words):
-        read_responses(tmp_path / "srf.csv", **given)
+    with pytest.raises(ValueError, match=said):
+        read_responses(tmp_path / "srf.csv", **({"name": "Camera", "altitude": 5e5, "gsd": 10.0} | keys))
 
 
-@pytest.mark.parametrize("name", ["TM", "OLI", "MSI", "MODIS", "VIIRS", "AVHRR", "HRV"])
+# ------------------------------------------------------------------------------------------- designs
+
+
+@pytest.mark.parametrize("name", ["TM", "MSI", "VIIRS", "HRV"])
 def test_blur_and_interval_follow_the_pixel_of_a_design(name):
     own = instrument(name)
     wide = own.replace(gsd=2.5 * own.gsd, registration=3.0)
@@ -374,37 +294,111 @@ def test_blur_and_interval_follow_the_pixel_of_a_design(name):
     assert wide.name == f"{own.name}, gsd {2.5 * own.gsd:g}, registration 3" and not wide.aliases
 
 
-def test_a_design_has_the_transfer_and_the_noise_that_are_given():
+def test_design_has_the_given_transfer_and_noise():
+    """The noise at any radiance changes by the factor of the ratio."""
     own = instrument("MSI")
     made = own.replace(mtf=0.2, snr=50)
-    for band, other in zip(own.bands, made.bands, strict=True):
-        for spread, interval in zip(made.line_spreads(other), made.ground_intervals(other), strict=True):
-            assert spread.mtf(0.5 / interval) == pytest.approx(0.2)
+    for number, (band, other) in enumerate(zip(own.bands, made.bands, strict=True)):
+        assert nyquist(made, number) == pytest.approx([0.2, 0.2])
         assert other.noise.radiance / other.noise.equivalent_radiance == pytest.approx(50)
-        # The noise at any radiance changes by the factor of the ratio.
         factor = band.noise.radiance / band.noise.equivalent_radiance / 50
         stated = np.array([0.5, 1.0, 3.0]) * band.noise.radiance
         one, two = (model.noise_model(each) for model, each in ((own, band), (made, other)))
         np.testing.assert_allclose(two.thermal**2 + two.shot * stated, factor**2 * (one.thermal**2 + one.shot * stated))
     origins = {row.quantity: row.origin for row in made.provenance}
     assert origins == {row.quantity: row.origin for row in own.provenance} | {"blur": "required", "noise": "required"}
-    two_points = instrument("OLI").replace(snr=60.0).bands[3].noise
-    stated = instrument("OLI").bands[3].noise
+    two_points, stated = (item.bands[3].noise for item in (instrument("OLI").replace(snr=60.0), instrument("OLI")))
     assert two_points.high_snr / stated.high_snr == pytest.approx(60.0 / stated.snr)
 
 
-@pytest.mark.parametrize(
-    ("name", "keys", "error", "words"),
-    [
-        ("TM", {"gsd": 0.0}, ValueError, "gsd must be above 0 m, got 0"),
-        ("TM", {"mtf": 1.0}, ValueError, r"mtf must be in \(0, 1\), got 1"),
-        ("TM", {"snr": np.nan}, ValueError, "snr must be above 0, got nan"),
-        ("TM", {"gsd": "30 m"}, TypeError, "gsd must be a number in m"),
-        ("TM", {"mft": 0.2}, TypeError, "did you mean 'mtf'"),
-        ("MSS", {"snr": 50.0}, ValueError, "the description of MSS states no radiance"),
-        ("VIIRS", {"mtf": 0.2}, ValueError, "VIIRS sums samples on board"),
-    ],
-)
-def test_designs_that_are_not_possible_are_refused(name, keys, error, words):
-    with pytest.raises(error, match=words):
-        instrument(name).replace(**keys)
+# ------------------------------------------------------------------------------------------- responses
+
+NU = 1e-6 * TM.bands[0].wavelength / (2 * 43e-6 * 0.02)
+CIRCLE = 2 / np.pi * (np.arccos(NU) - NU * np.sqrt(1 - NU**2))
+SCANNER = (2 / np.pi) ** 2 / np.sqrt(2) * CIRCLE
+OPTICS = np.exp(-((np.pi * 0.4 * 0.5) ** 2) / (4 * np.log(2)))
+RESPONSES = [
+    # Boxcar as wide as the interval; Gaussians: given MTF, exp(-(pi W / d)^2 / (16 ln 2)) and 2^-(E / d)^2.
+    ('kind = "boxcar"\nwidth = 43.0e-6', 2 / np.pi, 1e-7),
+    ('kind = "gaussian"\nmtf_at_nyquist = 0.3', 0.3, 1e-7),
+    ('kind = "gaussian"\nfwhm = 43.0e-6', np.exp(-(np.pi**2) / (16 * np.log(2))), 1e-7),
+    ('kind = "gaussian"\neifov = 43.0e-6', 0.5, 1e-7),
+    # Triangle twice as wide as the interval.
+    ('kind = "table"\nangles = [-43.0e-6, 0.0, 43.0e-6]\nvalues = [0.0, 2.0, 0.0]', (2 / np.pi) ** 2, 1e-7),
+    # Detector and smear sinc(1/2) each, electronics 1/sqrt(2) at the cutoff, and diffraction of a circular aperture
+    # at nu = wavelength / (2 interval aperture); 3e-4 of the response is truncated.
+    (
+        "electronics = 0.5\naperture = 0.02\ntruncation = 3e-4\nsmear = 1.0",
+        (2 / np.pi) ** 2 / np.sqrt(2) * CIRCLE,
+        5e-4,
+    ),
+    # The MTF of optics with FWHM W is exp(-(pi W f)^2 / (4 ln 2)), of boxcars sinc(W f).
+    ("blur = 0.4\nsmear = 0.5\ndetector = 0.9", OPTICS * np.sinc(0.45) * np.sinc(0.25), 2e-3),
+    ('[lsf.along]\nkind = "boxcar"\n[lsf.across]\nkind = "gaussian"\nmtf_at_nyquist = 0.4', [2 / np.pi, 0.4], 1e-9),
+]
+
+
+@pytest.mark.parametrize(("lsf", "expected", "atol"), RESPONSES)
+def test_each_kind_of_response_has_the_stated_mtf(changed, lsf, expected, atol):
+    lsf = lsf if "kind" in lsf else f'kind = "system"\n{lsf}'
+    header = ("[lsf] ", "#") if lsf.startswith("[lsf.along]") else ()
+    np.testing.assert_allclose(nyquist(changed(*header, "LSF", lsf + "\n", *IFOV)), expected, rtol=0, atol=atol)
+
+
+def test_responses_may_differ_by_band(changed):
+    wider = changed('name = "TM1"', 'name = "TM1"\nlsf = { kind = "boxcar", width = 86.0e-6 }')
+    np.testing.assert_allclose(nyquist(wider), np.sinc(1.0), atol=1e-12)
+    np.testing.assert_allclose(wider.line_spreads(wider.bands[1]).along.width, 30.31641, rtol=1e-12)
+
+
+def test_named_responses():
+    """A band with the detector response keeps only the applicable sources."""
+    paper, msi = instrument("TM", "paper"), instrument("MSI")
+    assert paper.lsf == TM.paper_lsf and "Friedl" in paper.source("lsf") and "blur" not in paper.origin
+    assert instrument("MSI", "system") == msi and instrument("TM", "system") == TM
+    for description in (TM, msi):
+        sharp = with_response(description, "detector")
+        for band, own in zip(sharp.bands, description.bands, strict=True):
+            fields, intervals = description.ground_fields(own), description.ground_intervals(own)
+            assert [spread.width for spread in sharp.line_spreads(band)] == list(fields if fields.along else intervals)
+            assert not knows_blur(sharp, band) and knows_blur(description, own)
+    own = dataclasses.replace(TM.bands[0], sources={"lsf": "Markham1985", "bits": "Chander2009"})
+    sharp = with_response(dataclasses.replace(TM, bands=(own, *TM.bands[1:])), "detector").bands[0]
+    assert sharp.sources == {"bits": "Chander2009", "ifov": TM.sources["interval"]}
+
+
+@pytest.mark.parametrize("name", ["TM", "OLI", "VIIRS", "MSI"])
+def test_sharpest_and_softest_mtf_differ_by_the_uncertainty(name):
+    """For VIIRS the uncertainty is stated before aggregation, i.e. for elementary samples."""
+    items = [instrument(name, each) for each in (None, "sharpest", "softest")]
+    for number, band in enumerate(items[0].bands):
+        error, steps = band_provenance(items[0], "blur", band).uncertainty, items[0].ground_intervals(band)
+        spreads = [item.line_spreads(item.bands[number], 1) for item in items]
+        own, high, low = (
+            np.array([lsf.mtf(0.5 / step) for lsf, step in zip(pair, steps, strict=True)]) for pair in spreads
+        )
+        axes = slice(1) if items[0].scan.zones else slice(2)
+        np.testing.assert_allclose([(high - own)[axes], (own - low)[axes]], error, rtol=1e-6)
+        assert high[1] > own[1] > low[1]
+
+
+def test_spectral_response_is_read_from_a_list_a_table_or_pyrsr(changed, tmp_path):
+    """pyrsr has TM in nm or um; negative values are noise."""
+    rows = "wavelength = [0.60, 0.63, 0.69, 0.72], response = [0.0, 1.0, 1.0, 0.0]"
+    mine = changed("SRF", f"srf = {{ {rows} }}")
+    # The centre of a symmetric trapezoid is its midpoint.
+    np.testing.assert_allclose(mine.select("TM3")[0].wavelength, 0.66, rtol=1e-12)
+    table = "satellite,band,wavelength,response\nX,1,0.60,0\nX,1,0.63,1\nX,1,0.69,1\nX,1,0.72,0\n"
+    (tmp_path / "own.csv").write_text("# columns\n" + table, encoding="utf-8")
+    other = changed("SRF", 'srf = { table = "own.csv", satellite = "X", band = "1" }')
+    assert other.select("TM3")[0].response == mine.select("TM3")[0].response
+    found = PyrsrResponse("Landsat-5", "TM", "3").read("TM3")
+    theirs = RSR_reader("Landsat-5", "TM", LayerBandsAssignment=["3"])["3"]
+    assert 0.5 < found.wavelength[0] < 0.66 < found.wavelength[-1] < 0.8
+    np.testing.assert_allclose(found.response, np.maximum(theirs[:, 1], 0))
+
+
+def test_limits_lie_at_half_maximum():
+    found = ResponseList((0.5, 0.6, 0.7, 0.8, 0.9), (0.0, 1.0, 2.0, 1.0, 0.9)).read("a")
+    assert found == Band("a", (0.5, 0.6, 0.7, 0.8, 0.9), (0.0, 1.0, 2.0, 1.0, 0.9))
+    assert half_peak(found) == (0.6, 0.8)
