@@ -1,0 +1,205 @@
+"""Spectral bands, solar irradiance and digital numbers; directions of the sun and sensor, dates and times."""
+
+from datetime import datetime, timedelta, timezone
+
+import numpy as np
+import pandas as pd
+import pytest
+from pyrsr.rsr import RSR_reader
+
+import fifesim
+from fifesim.base.bands import (
+    COMMON_NAMES,
+    GREEN,
+    NEAR_INFRARED,
+    RED,
+    Band,
+    check_counts,
+    counts,
+    nearest_band,
+    solar_irradiance,
+    solar_irradiance_steps,
+    solar_spectrum,
+)
+from fifesim.base.geometry import Geometry, angle_between, relative_azimuth, scattering_angle_cosine, sun_geometry
+from fifesim.base.times import utc
+
+BOX = Band("box", (0.6, 0.6001, 0.6999, 0.7), (0.0, 1.0, 1.0, 0.0))
+
+
+def test_band_means_of_constant_and_linear_spectra():
+    wavelength = np.linspace(0.5, 0.8, 301)
+    assert BOX.center == pytest.approx(0.65, abs=1e-12)
+    assert BOX.mean(np.full(3, 0.25), [0.5, 0.65, 0.8]) == pytest.approx(0.25, rel=1e-14)
+    assert BOX.mean(2 * wavelength[::300], wavelength[::300]) == pytest.approx(2 * BOX.center, rel=1e-12)
+    # The integral of 1 / w over 0.6 to 0.7 um, compared with the integral of w^-2.
+    expected = np.log(0.7 / 0.6) / (1 / 0.6 - 1 / 0.7)
+    assert BOX.mean(wavelength, wavelength, weight=wavelength**-2) == pytest.approx(expected, rel=1e-4)
+    assert BOX.mean(np.ones((2, 3, 4)), [0.5, 0.6, 0.7, 0.8]).shape == (2, 3)
+    with pytest.raises(ValueError, match=r"band box spans 0.6 to 0.7 um, the spectrum only 0.65 to 0.8 um"):
+        BOX.mean([1.0, 1.0], [0.65, 0.8])
+
+
+def test_bands_are_equal_by_content_and_refuse_impossible_responses():
+    assert hash(Band("a", [0.5, 0.6], [1, 1])) == hash(Band("a", (0.5, 0.6), (1.0, 1.0)))
+    refused = [((0.5, 0.5), (1, 1)), ((0.5, 0.6), (1, -1)), ((0.5, 0.6), (0, 0)), ((0.5, np.nan, 0.6), (0, 1, 0))]
+    for wavelength, response in refused:
+        with pytest.raises(
+            ValueError, match=r"band odd: (wavelengths must increase|the response must not be negative)"
+        ):
+            Band("odd", wavelength, response)
+    for wavelength in ((620.0, 690.0), (6.2e-7, 6.9e-7)):
+        with pytest.raises(ValueError, match="band odd: wavelengths are in um, got"):
+            Band("odd", wavelength, (1, 1))
+
+
+def test_noise_below_zero_is_set_to_zero_with_its_size():
+    """Published responses scatter around zero outside of the band, such as those of ETM+."""
+    wavelength = (1.5, 1.6, 1.7, 1.8)
+    with pytest.warns(UserWarning, match=r"band B5: the response is -0\.0001 at 1\.8 um, 0\.0002 of its peak"):
+        noisy = Band("B5", wavelength, (0.0, 0.5, 0.5, -0.0001))
+    assert noisy == Band("B5", wavelength, (0.0, 0.5, 0.5, 0.0))
+    for response in ((0.0, 0.5, 0.5, -0.006), (0.0, 0.5, np.nan, 0.0), (0.0, -0.0, 0.0, 0.0)):
+        with pytest.raises(ValueError, match=r"band B5: the response must not .* numpy\.clip\(response, 0, None\)"):
+            Band("B5", wavelength, response)
+
+
+def test_solar_irradiance_agrees_with_the_solar_constant_and_the_landsat_handbook():
+    """
+    1361 W m-2 (Kopp & Lean 2011), of which 1 to 2 % lie outside 0.28 to 4 um.
+
+    Chander, Markham & Helder (2009), Table 4, use another solar spectrum (Thuillier 2003): within 4 %.
+    """
+    wavelength, irradiance = solar_spectrum()
+    assert np.trapezoid(irradiance, wavelength) == pytest.approx(0.985 * 1361, rel=0.01)
+    published = {"1": 1983, "2": 1796, "3": 1536, "4": 1031, "5": 220.0, "7": 83.44}
+    for key, response in RSR_reader("Landsat-5", "TM").items():
+        if key in published:
+            assert solar_irradiance(Band(f"TM{key}", *response.T)) == pytest.approx(published[key], rel=0.04)
+
+
+def test_solar_irradiance_steps_conserve_energy():
+    wavelength = np.linspace(0.4, 2.5, 841)
+    width = np.gradient(wavelength)
+    width[[0, -1]] /= 2
+    fine, irradiance = solar_spectrum()
+    inside = (fine >= 0.4) & (fine <= 2.5)
+    expected = np.trapezoid(irradiance[inside], fine[inside])
+    assert np.sum(solar_irradiance_steps(wavelength) * width) == pytest.approx(expected, rel=1e-9)
+
+
+def test_band_nearest_to_the_best_wavelength_within_the_window_is_taken():
+    for window, wavelengths, number in (
+        (RED, (0.61, 0.64, 0.69, 0.76), 1),
+        (NEAR_INFRARED, (0.705, 0.75, 1.0, 1.24), 1),
+        (NEAR_INFRARED, (0.95, 0.86), 1),
+        (GREEN, (0.49, 0.60), 1),
+        (RED, (0.599, 0.701, np.nan), None),
+        (RED, (), None),
+    ):
+        assert nearest_band(wavelengths, window) == number
+
+
+def test_common_names_agree_with_pystac_and_match_landsat_and_sentinel_2():
+    """Pystac has a narrower blue band; centres agree to 3 nm; neither mission has a yellow band."""
+    eo = pytest.importorskip("pystac.extensions.eo")
+    known = {name: eo.Band.band_range(name) for name in COMMON_NAMES if name != "blue"}
+    found = {name: COMMON_NAMES[name][1:3] for name, limits in known.items() if limits}
+    assert len(found) == 10 and found == {name: known[name] for name in found}
+    instruments = [fifesim.instrument(name) for name in ("MSI", "OLI", "TM")]
+    centres = np.array([band.response.center for each in instruments for band in each.bands])
+    for name in set(COMMON_NAMES) - {"yellow"}:
+        assert np.abs(centres - COMMON_NAMES[name].best).min() < 3e-3
+
+
+def test_counts_are_kept_no_data_becomes_0_and_impossible_numbers_are_rejected():
+    np.testing.assert_array_equal(counts(np.array([-9999, 7, 255], np.int16), -9999, 255, ""), [0, 7, 255])
+    np.testing.assert_array_equal(counts(np.array([7, 254, 255]), 0, 255, "", saturated=255), [7, 254, 0])
+    check_counts(np.array([np.nan, 0.0, 255.0]), 255, "")
+    assert counts(np.array([300]), 0, 65535, "").dtype == np.uint16
+    assert counts(np.array([30]), 0, 255, "").dtype == np.uint8
+    for dn in (-1.0, 256, 1.5, -1, np.inf):
+        match = rf"digital number of {dn:g} is not a whole number from 0 to 255: give nodata="
+        with pytest.raises(ValueError, match=match):
+            counts(np.array([dn]), 0, 255, "give nodata=")
+
+
+def almanac_sun(time, latitude, longitude):
+    """Solar zenith and azimuth by the low-precision formulas of the Astronomical Almanac, accurate to 0.01 degrees."""
+    days = (pd.Timestamp(time).tz_convert("UTC") - pd.Timestamp("2000-01-01T12:00Z")) / pd.Timedelta(days=1)
+    anomaly = np.radians(357.528 + 0.9856003 * days)
+    ecliptic = np.radians(280.460 + 0.9856474 * days + 1.915 * np.sin(anomaly) + 0.020 * np.sin(2 * anomaly))
+    obliquity = np.radians(23.439 - 4e-7 * days)
+    right_ascension = np.arctan2(np.cos(obliquity) * np.sin(ecliptic), np.cos(ecliptic))
+    declination = np.arcsin(np.sin(obliquity) * np.sin(ecliptic))
+    sidereal = np.radians(280.46061837 + 360.98564736629 * days + longitude)
+    hour, phi = sidereal - right_ascension, np.radians(latitude)
+    up = np.sin(phi) * np.sin(declination) + np.cos(phi) * np.cos(declination) * np.cos(hour)
+    east = -np.cos(declination) * np.sin(hour)
+    north = np.cos(phi) * np.sin(declination) - np.sin(phi) * np.cos(declination) * np.cos(hour)
+    return np.degrees(np.arccos(up)), np.degrees(np.arctan2(east, north)) % 360
+
+
+@pytest.mark.parametrize(
+    "place",
+    [("1987-06-06T16:35Z", 39.06, -96.54), ("1987-06-06T21:00Z", 39.06, -96.54), ("1989-12-21T12:00Z", -33.0, 18.0)],
+)
+def test_sun_agrees_with_the_almanac(place):
+    sun, (zenith, azimuth) = sun_geometry(*place), almanac_sun(*place)
+    assert sun.sza == pytest.approx(zenith, abs=0.02)
+    assert sun.saa == pytest.approx(azimuth, abs=0.03)
+
+
+def test_sun_of_the_paper_case():
+    """In the morning the sun is in the southeast; in June the Earth is near aphelion."""
+    case = fifesim.fife_geometry()
+    assert (round(case.sza, 1), round(case.saa, 1), case.vza, case.vaa) == (28.5, 117.0, 0.0, 0.0)
+    assert case.earth_sun_distance == pytest.approx(1.0148, abs=5e-4)
+    assert Geometry(60.0, 0.0, 0.0).mu_s == pytest.approx(0.5, abs=1e-15)
+
+
+def test_relative_azimuth_is_symmetric_and_folded():
+    azimuths = np.linspace(-360, 720, 37)
+    raa = relative_azimuth(azimuths[:, None], azimuths)
+    np.testing.assert_allclose(raa, raa.T, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(np.cos(np.radians(raa)), np.cos(np.radians(azimuths[:, None] - azimuths)), atol=1e-12)
+    assert raa.min() >= 0 and raa.max() <= 180
+    assert Geometry(30, 117, 20, 117).raa == 0 and Geometry(30, 117, 20, 297).raa == 180
+
+
+def test_angles_between_directions_match_the_unit_vectors():
+    """Light travels away from the sun and toward the sensor."""
+    zenith, azimuth = np.random.default_rng(6).uniform(0, [[[90.0]], [[360.0]]], (2, 2, 50))
+    theta, phi = np.radians(zenith), np.radians(azimuth)
+    vectors = np.array([np.sin(theta) * np.sin(phi), np.sin(theta) * np.cos(phi), np.cos(theta)])
+    cosine = np.prod(vectors, axis=1).sum(axis=0)
+    found = angle_between(zenith[0], azimuth[0], zenith[1], azimuth[1])
+    np.testing.assert_allclose(found, np.degrees(np.arccos(cosine)), rtol=0, atol=1e-9)
+    assert angle_between(33.0, 10.0, 33.0, 370.0) < 1e-12
+    scattered = scattering_angle_cosine(zenith[0], zenith[1], relative_azimuth(azimuth[0], azimuth[1]))
+    np.testing.assert_allclose(scattered, -cosine, rtol=0, atol=1e-12)
+
+
+def test_time_without_zone_is_utc_and_other_times_are_converted():
+    kansas = timezone(timedelta(hours=-5))
+    for time in (
+        *("1987-06-06T16:35:00", "1987-06-06 16:35", "1987-06-06T16:35:00.0Z", "19870606T1635", " 1987-06-06T16:35Z "),
+        *("1987-06-06T11:35:00-05:00", datetime(1987, 6, 6, 16, 35), datetime(1987, 6, 6, 11, 35, tzinfo=kansas)),
+    ):
+        assert utc(time).tolist() == [pd.Timestamp("1987-06-06T16:35Z")]
+
+
+def test_invalid_times_are_rejected():
+    """Words in messages are of dates in another order, dates alone, years without satellites, and other values."""
+    refused = {
+        "the year first": ["3.6.2022 10:00", "03/06/2022 10:00", "10:00", "June 3, 2022 9:00", "1987-06"],
+        "add the time of day, such as 1987.*T17:10Z": ["1987-06-06", "19870606"],
+        "years 1957 to 2100.*satellites": ["1956-12-31T23:59", "2100-01-01T00:00", "0001-01-01T12:00"],
+        "must be a date and time such as": [1987, 0.5, None, "NaT", "1987-06-06T24:00", "now", "", "1987-02-30T12:00"],
+    }
+    for message, times in refused.items():
+        for time in times:
+            with pytest.raises(ValueError, match=message):
+                utc(time)
+    for time in ("1957-01-01T00:00", "2099-12-31T23:59"):
+        assert utc(time)[0] == pd.Timestamp(time, tz="UTC")
