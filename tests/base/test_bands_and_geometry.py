@@ -44,9 +44,7 @@ def test_bands_are_equal_by_content_and_refuse_impossible_responses():
     assert hash(Band("a", [0.5, 0.6], [1, 1])) == hash(Band("a", (0.5, 0.6), (1.0, 1.0)))
     refused = [((0.5, 0.5), (1, 1)), ((0.5, 0.6), (1, -1)), ((0.5, 0.6), (0, 0)), ((0.5, np.nan, 0.6), (0, 1, 0))]
     for wavelength, response in refused:
-        with pytest.raises(
-            ValueError, match=r"band odd: (wavelengths must increase|the response must not be negative)"
-        ):
+        with pytest.raises(ValueError, match=r"band odd: (wavelengths must increase|the response must not)"):
             Band("odd", wavelength, response)
     for wavelength in ((620.0, 690.0), (6.2e-7, 6.9e-7)):
         with pytest.raises(ValueError, match="band odd: wavelengths are in um, got"):
