@@ -1,8 +1,7 @@
-"""Kernels on dask arrays: the same bits, nothing computed early, and only rasters on the same grid."""
+"""Kernels on dask arrays and windows of them: the same bits, nothing computed early, rasters on one grid only."""
 
-import multiprocessing
+import gc
 import threading
-from concurrent.futures import ProcessPoolExecutor
 
 import dask
 import dask.array as da
@@ -13,9 +12,10 @@ from distributed import Client, LocalCluster
 from lazy import ODD_CHUNKS, in_chunks, no_compute
 
 import fifesim
-from fifesim.grids import chunks
+from fifesim.grids import chunks, windows
 from fifesim.grids import grid as grids
 from fifesim.grids.chunks import all_apart, apart, by_band, found_client, layers_of
+from fifesim.grids.windows import _ORIGINS, array_by_place, array_from_windows, gather, held, origin_of, with_origin
 
 GRID = fifesim.fife_site(30 / 9, window=((0, 36), (5, 50)))
 BANDS = xr.DataArray([1.0, 2.0, 3.0], dims="band")
@@ -50,28 +50,6 @@ def test_kernels_may_read_and_create_bands(pieces, plain_pieces):
     for out in (sums, both):
         assert out.dims == ("band", "y", "x")
         np.testing.assert_array_equal(out, cube.values + plain.values * BANDS.values[:, None, None])
-
-
-def test_blocks_along_bands_are_not_copied():
-    """dask copies blocks that it concatenates along an axis, even a single block."""
-    made, seen = [], []
-
-    def source(block):
-        made.append(block + 1)
-        return made[-1]
-
-    def kernel(cells, weights):
-        seen.append(cells)
-        return np.moveaxis(cells * weights, -1, 0)
-
-    cube = in_chunks(raster(bands=3), {"band": 3, "y": 20, "x": 25})
-    cube = cube.copy(data=cube.data.map_blocks(source, meta=cube.data._meta))
-    out = chunks.pointwise(kernel, cube, BANDS, bands=3)
-    first, *_ = chunks.along_first(cube.data)
-    entries = first.map_blocks(lambda entry: seen.append(entry) or entry, meta=first._meta)
-    dask.compute(out, entries, scheduler="synchronous")
-    assert len(seen) == 2 * cube.data.npartitions
-    assert all(any(np.shares_memory(block, each) for each in made) for block in seen)
 
 
 def test_only_rasters_on_the_same_cells_under_the_same_sun_are_combined():
@@ -133,24 +111,16 @@ def rechunked_array():
     return source.rechunk((7, 80))[::3, [5, 2, 2, 70]].rechunk((4, 3))
 
 
-@pytest.fixture(scope="module")
-def process():
-    """Pool of one process, which starts once because it imports the package."""
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        yield pool
-
-
-@pytest.mark.parametrize("scheduler", ["synchronous", "threads", "processes"])
 @pytest.mark.parametrize("dtype", [float, np.float32, np.int16])
-def test_separate_copy_has_the_values_of_the_array(scheduler, dtype, request):
+def test_separate_copy_has_the_values_of_the_array(dtype):
     """The copy shares no task with the array."""
     array = rechunked_array().astype(dtype)
     with no_compute():
         found = apart(array)
     assert (found.shape, found.dtype, found.numblocks) == (array.shape, dtype, (1, 1))
     assert not set(found.__dask_graph__()) & set(array.__dask_graph__())
-    workers = {"pool": request.getfixturevalue("process")} if scheduler == "processes" else {}
-    np.testing.assert_array_equal(found.compute(scheduler=scheduler, **workers), array.compute())
+    for scheduler in ("synchronous", "threads"):
+        np.testing.assert_array_equal(found.compute(scheduler=scheduler), array.compute())
 
 
 def test_separate_copy_is_computed_in_one_thread_or_on_a_client():
@@ -164,9 +134,8 @@ def test_separate_copy_is_computed_in_one_thread_or_on_a_client():
     blocks = da.ones((60, 80), chunks=(5, 5)).map_blocks(note, dtype=float, meta=np.empty((0, 0)))
     with dask.config.set(scheduler="threads", num_workers=2):
         assert apart(blocks).sum().compute() == 4800
-    assert len(threads) == 1
+    assert len(threads) == 1 and found_client() is None
     options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
-    assert found_client() is None
     with LocalCluster(**options) as cluster, Client(cluster) as client:
         assert found_client() is client
         assert client.compute(apart(blocks).sum()).result(timeout=20) == 4800
@@ -196,19 +165,10 @@ def test_equal_arrays_have_equal_keys_and_shared_parts_are_computed_once():
     assert len(calls) == 18
     np.testing.assert_array_equal(found[0], POSITIONS[::4, ::4])
     np.testing.assert_array_equal(found[1], POSITIONS.sum(axis=0))
-
-
-def test_nested_samples_are_computed_once_with_several_threads():
-    """Each consumer gets a separate copy of the values."""
-    calls = []
-    few = apart(counting_array(calls)[::3, ::3])
-    many = [apart(few + number) for number in range(6)]
-    with dask.config.set(scheduler="threads", num_workers=3):
-        dask.compute(few, *many)
-    assert len(calls) == 9
-    first = few.compute(scheduler="synchronous")
-    first += 1
-    np.testing.assert_array_equal(few.compute(scheduler="synchronous"), first - 1)
+    # Each consumer gets a separate copy of the values.
+    found = one.compute(scheduler="synchronous")
+    found += 1
+    np.testing.assert_array_equal(one.compute(scheduler="synchronous"), found - 1)
 
 
 def test_numbers_fill_layers_and_order_is_kept(lai):
@@ -232,3 +192,130 @@ def test_layers_are_selected_by_name_or_shared(lai):
         layers_of(0.5, ["a"], "soil")
     with pytest.raises(ValueError, match=r"a must be a number, or one raster .* got dimensions \('band', 'y', 'x'\)"):
         by_band({"a": both}, lai)
+
+
+CELLS = np.arange(11.0 * 13).reshape(11, 13)
+
+
+def mean_of_three(array, chunks):
+    """Mean of each cell and its western and eastern neighbours; NaN if a neighbour lies outside."""
+
+    def ask(rows, columns):
+        return (), [(rows, slice(columns.start - 1, columns.stop + 1))]
+
+    def kernel(window):
+        return (window[:, :-2] + window[:, 1:-1] + window[:, 2:]) / 3
+
+    return array_from_windows(kernel, [array], chunks, ask, token="mean-of-three")
+
+
+@pytest.mark.parametrize("read", [-1, (3, 4), (11, 1)])
+@pytest.mark.parametrize("made", [((11,), (13,)), ((2, 9), (5, 5, 3))])
+def test_windows_are_assembled_from_any_chunks(read, made):
+    by_place = array_by_place(
+        lambda row, column, shape: CELLS[row:, column:][: shape[0], : shape[1]], ((11,), (7, 6)), token="c"
+    )
+    for source in (da.from_array(CELLS, chunks=read), by_place):
+        found = mean_of_three(source, made)
+        assert found.chunks == made
+        np.testing.assert_array_equal(found.compute()[:, 1:-1], CELLS[:, 1:-1])
+        assert np.isnan(found.compute()[:, [0, -1]]).all()
+
+
+def test_gathered_window_is_missing_beyond_the_array():
+    found = gather(CELLS, (slice(-1, 2), slice(11, 15)))
+    np.testing.assert_array_equal(found[1:, :2], CELLS[:2, 11:])
+    assert np.isnan(found[0]).all() and np.isnan(found[:, 2:]).all()
+
+
+def test_block_split_at_seams_is_identical():
+    """A block split at seams reads only its margins from other chunks."""
+    cells = np.random.default_rng(3).random((2, 30, 40))
+    array = da.from_array(cells, chunks=(2, 10, 10))
+
+    def kernel(window):
+        return window[:, :-2, :-2] + window[:, 2:, 2:]
+
+    def ask(rows, columns):
+        return (), [tuple(slice(each.start, each.stop + 2) for each in (rows, columns))]
+
+    made = ((8, 10, 10), (8, 10, 20))
+    options = {"token": "parts", "leading": (2,), "seams": ([10, 20], [10, 20, 30])}
+    found = array_from_windows(kernel, [array], made, ask, **options)
+    np.testing.assert_array_equal(found.compute(scheduler="synchronous"), cells[:, :-2, :-2] + cells[:, 2:, 2:])
+
+
+def test_dataset_of_an_array_and_its_derivative_is_computed():
+    """Without `held`, dask fuses the two arrays and no longer finds the first."""
+    image = held(da.from_array(CELLS, chunks=5) + 1.0)
+    dataset = xr.Dataset({"image": (("y", "x"), image), "index": (("y", "x"), image * 2)})
+    found = dask.compute(dataset)[0]
+    np.testing.assert_array_equal(found["image"], CELLS + 1)
+    np.testing.assert_array_equal(found["index"], 2 * CELLS + 2)
+    assert held(CELLS) is CELLS
+
+
+def position_cells(row, column, shape):
+    """Kernel whose cell values encode their location."""
+    return 1000.0 * (row + np.arange(shape[0]))[:, None] + column + np.arange(shape[1])
+
+
+@pytest.mark.parametrize("pieces", [None, "auto", 17, {"y": 5, "x": 8}, {"y": 5}, {"x": -1}, {"y": (30, 6), "x": 45}])
+def test_tiles_depend_on_their_location(pieces):
+    with no_compute():
+        out = windows.tiles(position_cells, GRID, pieces, tile=8)
+    assert (out.chunks is None) == (pieces is None)
+    np.testing.assert_array_equal(out, position_cells(0, 0, tuple(GRID.shape)))
+    with pytest.raises(ValueError, match="chunks name the dimensions y and x, got band"):
+        windows.tiles(position_cells, GRID, {"band": 1}, tile=8)
+
+
+def test_automatic_chunks_end_at_tile_boundaries():
+    """Each chunk holds two tiles of 8 cells; the lattice starts at the origin of the CRS."""
+    out = windows.tiles(position_cells, GRID, "auto", tile=8)
+    for first, sizes in zip(grids.lattice_position(GRID), out.chunks, strict=True):
+        ends = first + np.cumsum(sizes)[:-1]
+        assert (ends % 16 == 0).all() and len(ends) > 1
+
+
+@pytest.mark.parametrize("tile", [8, 1008])
+def test_parts_cover_the_grid_and_none_crosses_chunks(monkeypatch, tile):
+    monkeypatch.setattr(windows, "_ROWS", 3)
+    other, asked = np.random.default_rng(1).random(tuple(GRID.shape)), []
+
+    def kernel(row, column, shape, block):
+        asked.append((row, column, shape))
+        return position_cells(row, column, shape) + block
+
+    out = windows.part_by_part(kernel, GRID, other, tile=tile)
+    np.testing.assert_array_equal(out, position_cells(0, 0, tuple(GRID.shape)) + other)
+    grids.check_grid(grids.geobox(out))
+    step, lattice = 16 if tile == 8 else tile, grids.lattice_position(GRID)
+    for row, column, (rows, columns) in asked:
+        assert rows <= 3
+        for first, size, start in zip((row, column), (rows, columns), lattice, strict=True):
+            assert (start + first) // step == (start + first + size - 1) // step
+
+
+@pytest.mark.parametrize("tile", [None, 8])
+def test_kernel_gets_the_location_of_its_block(monkeypatch, tile):
+    monkeypatch.setattr(windows, "_ROWS", 3)
+    array = windows.tiles(position_cells, GRID, tile=8)
+
+    def kernel(block, starts):
+        return block - position_cells(*starts, block.shape)
+
+    assert (windows.located(kernel, array, tile=tile) == 0).all()
+    assert (windows.located(kernel, array.chunk({"y": 5, "x": 8}), tile=tile) == 0).all()
+
+
+def test_origin_is_kept_with_unchanged_values_and_released_with_its_raster():
+    made = with_origin(xr.DataArray(da.zeros((4, 6), chunks=2), dims=("y", "x")), "leaves")
+    assert origin_of(made) == "leaves" and origin_of(made.compute()) is None
+    assert origin_of(made.assign_coords(sza=30.0).rename("other")) == "leaves"
+    assert origin_of(made + 1) is None and origin_of(made[1:]) is None and origin_of(made.persist()) is None
+    key = id(made.data.dask), made.data.name
+    assert key in _ORIGINS
+    del made
+    gc.collect()
+    assert key not in _ORIGINS

@@ -1,18 +1,18 @@
-"""Sums and means over rasters, bands and pixel footprints."""
+"""Sums and means over rasters, bands and pixel footprints, and kernels by cover class."""
 
-import threading
-import time
+from itertools import product
 
 import numpy as np
 import pytest
 import xarray as xr
-from lazy import ODD_CHUNKS, in_chunks, no_compute
+from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 from odc.geo.geobox import GeoBox
 
 import fifesim
 from fifesim.base.footprints import Boxcar, regularize
+from fifesim.grids import classes, reductions
 from fifesim.grids import grid as grids
-from fifesim.grids import reductions
+from fifesim.grids.classes import by_class, check_codes
 from fifesim.grids.reductions import areas, combined, operators, regularized, resample, sums_by_block, sums_by_row
 
 VALUES = np.random.default_rng(9).integers(0, 100, (23, 31)).astype(float)
@@ -185,34 +185,6 @@ def test_chunks_give_the_same_bits_and_stay_lazy(cube, chunks, in_turn, monkeypa
     assert lazy.chunks[1:] == cube.chunk(dict(zip(cube.dims, chunks, strict=True))).chunks[1:]
 
 
-def test_large_chunks_are_read_one_at_a_time(cube, monkeypatch):
-    """Even with more threads than chunks, at most one chunk of a sum is in memory at a time."""
-    held = {"now": 0, "most": 0}
-    lock, add = threading.Lock(), reductions._add
-
-    def read(block):
-        with lock:
-            held["now"] += block.size > 0
-            held["most"] = max(held["most"], held["now"])
-        return block
-
-    def slow_add(*arguments):
-        time.sleep(0.02)
-        out = add(*arguments)
-        with lock:
-            held["now"] -= 1
-        return out
-
-    monkeypatch.setattr(reductions, "_IN_TURN", 0)
-    monkeypatch.setattr(reductions, "_add", slow_add)
-    chunked = cube.chunk(band=1)
-    chunked = chunked.copy(data=chunked.data.map_blocks(read, meta=np.empty((0, 0, 0))))
-    lazy = combined(chunked, "band", np.ones((1, 5)))
-    held.update(now=0, most=0)
-    lazy.compute(scheduler="threads", num_workers=5)
-    assert held["most"] == 1
-
-
 def test_chunks_without_weight_are_not_read(cube):
     """A missing sample is missing only in sums with a weight for it, and its chunk is not read for others."""
     cube[2, 1, 1] = np.nan
@@ -233,3 +205,80 @@ def test_single_precision_is_kept_and_summed_in_double(cube):
     assert found.dtype == np.float32
     exact = combined(single.astype(float), "band", WEIGHTS)
     np.testing.assert_array_equal(found, exact.astype(np.float32))
+
+
+@pytest.fixture
+def cover(lai):
+    codes = np.random.default_rng(2).choice([-1, 1, 5, 9], lai.shape).astype(np.int16)
+    return lai.copy(data=codes).rename("cover")
+
+
+@pytest.fixture
+def kernels(lai):
+    by_band = xr.DataArray([1.0, 2.0], dims="band")
+    shifted = (lai + 1).rename("shifted")
+    rows = xr.DataArray(np.arange(lai.sizes["y"]) * 1.0, dims="y", coords={"y": lai.y})
+    return {
+        1: (lambda cells, bands: bands[:, None] * cells, [by_band]),
+        5: (lambda cells, other: np.stack([cells - other, other]), [shifted]),
+        9: (lambda cells, other, row, bands: np.stack([bands[0] * row, other]), [shifted, rows, by_band]),
+    }
+
+
+@pytest.mark.parametrize("at_once", [7, 2**17])
+@pytest.mark.parametrize("chunks", [None, CHUNKS, ODD_CHUNKS], ids=str)
+def test_each_class_has_the_values_of_its_kernel(monkeypatch, lai, cover, kernels, chunks, at_once):
+    monkeypatch.setattr(classes, "_AT_ONCE", at_once)
+    expected = np.full((2, *lai.shape), np.nan)
+    values, rows = lai.values, np.broadcast_to(np.arange(lai.sizes["y"])[:, None], lai.shape)
+    expected[:, cover == 1] = [values[cover == 1], 2 * values[cover == 1]]
+    expected[:, cover == 5] = [(values - (values + 1))[cover == 5], (values + 1)[cover == 5]]
+    expected[:, cover == 9] = [rows[cover == 9], (values + 1)[cover == 9]]
+    if chunks:
+        lai, cover = in_chunks(lai, chunks), in_chunks(cover, chunks)
+    with no_compute():
+        made = by_class(kernels, cover, lai, bands=2)
+    assert (made.chunks is not None) == bool(chunks)
+    np.testing.assert_array_equal(made, expected)
+
+
+@pytest.mark.parametrize("codes", [[1, 5], [-1, 1, 5], [1, 5, 9], [-1, 1, 5, 9]], ids=str)
+def test_classes_with_the_same_kernel_are_evaluated_together(lai, codes):
+    calls = []
+    both = (lambda cells: calls.append(cells.size) or np.sqrt(cells), [])
+    cover = lai.copy(data=np.random.default_rng(3).choice(codes, lai.shape).astype(np.int16))
+    made = by_class({1: both, 5: both, 9: (np.negative, [])}, cover, lai)
+    known = np.where(cover == 9, -lai, np.where(cover == -1, np.nan, np.sqrt(lai)))
+    np.testing.assert_array_equal(made, known)
+    assert calls == [int(cover.isin([1, 5]).sum())]
+
+
+def test_code_without_a_kernel_raises_when_computed(lai, cover):
+    lazy = by_class({1: (np.sqrt, []), 5: (np.sqrt, [])}, in_chunks(cover, CHUNKS), lai)
+    with pytest.raises(ValueError, match="codes without a class: 9"):
+        lazy.compute()
+
+
+TABLE = (40, 0, 32764)
+
+
+def test_known_codes_pass_in_any_number_type():
+    """NaN and -1 have no class."""
+    known = np.random.default_rng(1).choice(TABLE, 1000)
+    for dtype in (np.int16, np.int64, float, np.uint16):
+        np.testing.assert_array_equal(check_codes(known.astype(dtype), TABLE), known)
+        assert check_codes(known.astype(dtype), TABLE).dtype == np.int16
+    assert check_codes(np.array([np.nan, 40.0, -1.0]), TABLE).tolist() == [-1, 40, -1]
+
+
+def test_unknown_codes_are_named_in_a_short_message():
+    """As an index from the end of an array, -5 would be 32764."""
+    for dtype, wrong in product((np.int16, np.int32, float), (-5, 7, 32765)):
+        said = rf"codes without a class: {wrong}, in 2 of 3 cells. Classes are 40, 0, 32764"
+        with pytest.raises(ValueError, match=said):
+            check_codes(np.array([wrong, 40, wrong], dtype), TABLE)
+    with pytest.raises(ValueError, match=r"codes without a class: 1\.5, in 1 of 1"):
+        check_codes(np.array([1.5]), (1, 2))
+    with pytest.raises(ValueError, match=r"1, 2, 3, 4, 5, 6, 7, 8, \.\.\., in") as caught:
+        check_codes(np.arange(1, 1001), tuple(range(2000, 3000)))
+    assert len(str(caught.value)) < 500
