@@ -1,20 +1,18 @@
 """Kernels on dask arrays and windows of them: the same bits, nothing computed early, rasters on one grid only."""
 
 import gc
-import threading
 
 import dask
 import dask.array as da
 import numpy as np
 import pytest
 import xarray as xr
-from distributed import Client, LocalCluster
 from lazy import ODD_CHUNKS, in_chunks, no_compute
 
 import fifesim
 from fifesim.grids import chunks, windows
 from fifesim.grids import grid as grids
-from fifesim.grids.chunks import all_apart, apart, by_band, found_client, layers_of
+from fifesim.grids.chunks import all_apart, apart, by_band, layers_of
 from fifesim.grids.windows import _ORIGINS, array_by_place, array_from_windows, gather, held, origin_of, with_origin
 
 GRID = fifesim.fife_site(30 / 9, window=((0, 36), (5, 50)))
@@ -27,16 +25,6 @@ def raster(grid=GRID, seed=0, bands=None):
     return grids.place(xr.DataArray(values, dims=("band", "y", "x")[-len(shape) :], name=f"raster{seed}"), grid)
 
 
-def test_kernel_gets_arrays_and_the_result_keeps_the_grid(array_type):
-    one, two = array_type(raster(seed=1)), array_type(raster(seed=2))
-    with no_compute():
-        out = chunks.pointwise(lambda a, b, power: a + b**power, one, two, power=2)
-        counts = chunks.pointwise(lambda a: (a * 9).astype(np.uint8), one, dtype=np.uint8)
-    np.testing.assert_array_equal(out, one.values + two.values**2)
-    assert grids.same_grid(grids.geobox(out), GRID)
-    assert counts.dtype == np.uint8 == counts.compute().dtype
-
-
 @pytest.mark.parametrize("pieces", [{}, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}])
 @pytest.mark.parametrize("plain_pieces", [{}, ODD_CHUNKS])
 def test_kernels_may_read_and_create_bands(pieces, plain_pieces):
@@ -46,7 +34,10 @@ def test_kernels_may_read_and_create_bands(pieces, plain_pieces):
         made = chunks.pointwise(lambda a: np.stack([a, 2 * a]), plain, bands=2)
         sums = chunks.pointwise(lambda a, b, c: a + b * c, cube, plain, BANDS)
         both = chunks.pointwise(lambda a, b, c: np.moveaxis(a + b[..., None] * c, -1, 0), cube, plain, BANDS, bands=3)
+        power = chunks.pointwise(lambda a, power: (9 * a**power).astype(np.uint8), plain, dtype=np.uint8, power=2)
     np.testing.assert_array_equal(made, np.stack([plain.values, 2 * plain.values]))
+    np.testing.assert_array_equal(power, (9 * plain.values**2).astype(int))
+    assert power.dtype == np.uint8 == power.compute().dtype and grids.same_grid(grids.geobox(power), GRID)
     for out in (sums, both):
         assert out.dims == ("band", "y", "x")
         np.testing.assert_array_equal(out, cube.values + plain.values * BANDS.values[:, None, None])
@@ -68,18 +59,11 @@ def test_only_rasters_on_the_same_cells_under_the_same_sun_are_combined():
             chunks.pointwise(lambda *cells: cells[0], *arrays)
 
 
-@pytest.mark.parametrize("lazy", [True, False])
-def test_entries_along_the_first_axis_are_views(lazy):
+def test_entries_along_the_first_axis_are_views():
     whole = np.arange(24.0).reshape(2, 3, 4)
-    array = da.from_array(whole, chunks=(2, 2, 4)) if lazy else whole
-    found = chunks.along_first(array)
-    np.testing.assert_array_equal(np.stack(found), whole)
-    if lazy:
-        assert found[1].chunks == ((2, 1), (4,)) and found[1].dtype == whole.dtype
-        blocks = dask.get(dict(found[1].dask), [(found[1].name, 0, 0)])
-        assert blocks[0].base is not None
-    else:
-        assert np.shares_memory(found[1], whole)
+    for array in (da.from_array(whole, chunks=(2, 2, 4)), whole):
+        np.testing.assert_array_equal(np.stack(chunks.along_first(array)), whole)
+    assert np.shares_memory(chunks.along_first(whole)[1], whole)
 
 
 POSITIONS = np.add.outer(1000.0 * np.arange(60), np.arange(80))
@@ -113,43 +97,14 @@ def rechunked_array():
 
 @pytest.mark.parametrize("dtype", [float, np.float32, np.int16])
 def test_separate_copy_has_the_values_of_the_array(dtype):
-    """The copy shares no task with the array."""
+    """The copy shares no task with the array, and its task waits for no other: one thread is enough."""
     array = rechunked_array().astype(dtype)
     with no_compute():
         found = apart(array)
     assert (found.shape, found.dtype, found.numblocks) == (array.shape, dtype, (1, 1))
     assert not set(found.__dask_graph__()) & set(array.__dask_graph__())
     for scheduler in ("synchronous", "threads"):
-        np.testing.assert_array_equal(found.compute(scheduler=scheduler), array.compute())
-
-
-def test_separate_copy_is_computed_in_one_thread_or_on_a_client():
-    """The task waits for no other task, so it also finishes in a pool of one thread or a cluster of one worker."""
-    threads = set()
-
-    def note(block):
-        threads.add(threading.get_ident())
-        return block
-
-    blocks = da.ones((60, 80), chunks=(5, 5)).map_blocks(note, dtype=float, meta=np.empty((0, 0)))
-    with dask.config.set(scheduler="threads", num_workers=2):
-        assert apart(blocks).sum().compute() == 4800
-    assert len(threads) == 1 and found_client() is None
-    options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
-    with LocalCluster(**options) as cluster, Client(cluster) as client:
-        assert found_client() is client
-        assert client.compute(apart(blocks).sum()).result(timeout=20) == 4800
-    assert found_client() is None
-
-
-def test_blocks_are_computed_once_for_the_sample_and_once_for_its_use():
-    """Otherwise every block would wait in memory, because the sample needs all blocks."""
-    calls = []
-    array = counting_array(calls)
-    total = apart(array[::4, ::4]).sum()
-    found = (array - total).sum(axis=1).compute(scheduler="synchronous")
-    assert sorted(calls) == sorted(2 * [(row, column) for row in range(3) for column in range(3)])
-    np.testing.assert_allclose(found, (POSITIONS - POSITIONS[::4, ::4].sum()).sum(axis=1), rtol=1e-12)
+        np.testing.assert_array_equal(found.compute(scheduler=scheduler, num_workers=1), array.compute())
 
 
 def test_equal_arrays_have_equal_keys_and_shared_parts_are_computed_once():
@@ -270,27 +225,22 @@ def test_tiles_depend_on_their_location(pieces):
         windows.tiles(position_cells, GRID, {"band": 1}, tile=8)
 
 
-def test_automatic_chunks_end_at_tile_boundaries():
-    """Each chunk holds two tiles of 8 cells; the lattice starts at the origin of the CRS."""
-    out = windows.tiles(position_cells, GRID, "auto", tile=8)
-    for first, sizes in zip(grids.lattice_position(GRID), out.chunks, strict=True):
-        ends = first + np.cumsum(sizes)[:-1]
-        assert (ends % 16 == 0).all() and len(ends) > 1
-
-
 @pytest.mark.parametrize("tile", [8, 1008])
-def test_parts_cover_the_grid_and_none_crosses_chunks(monkeypatch, tile):
+def test_chunks_and_parts_end_at_tile_boundaries(monkeypatch, tile):
+    """Each chunk holds two tiles of 8 cells; the lattice starts at the origin of the CRS."""
     monkeypatch.setattr(windows, "_ROWS", 3)
-    other, asked = np.random.default_rng(1).random(tuple(GRID.shape)), []
+    asked, step, lattice = [], 16 if tile == 8 else tile, grids.lattice_position(GRID)
+    for first, sizes in zip(lattice, windows.tiles(position_cells, GRID, "auto", tile=tile).chunks, strict=True):
+        assert ((first + np.cumsum(sizes)[:-1]) % step == 0).all() and (len(sizes) > 1) == (tile == 8)
 
     def kernel(row, column, shape, block):
         asked.append((row, column, shape))
         return position_cells(row, column, shape) + block
 
+    other = np.random.default_rng(1).random(tuple(GRID.shape))
     out = windows.part_by_part(kernel, GRID, other, tile=tile)
     np.testing.assert_array_equal(out, position_cells(0, 0, tuple(GRID.shape)) + other)
     grids.check_grid(grids.geobox(out))
-    step, lattice = 16 if tile == 8 else tile, grids.lattice_position(GRID)
     for row, column, (rows, columns) in asked:
         assert rows <= 3
         for first, size, start in zip((row, column), (rows, columns), lattice, strict=True):

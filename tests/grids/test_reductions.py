@@ -136,23 +136,6 @@ def test_resampling_gives_the_same_bits_in_any_chunks(pixels, bands):
     assert lazy.dtype == lazy.compute().dtype == eager.dtype
 
 
-def test_output_chunks_read_only_the_required_cells():
-    """A chunk that fails affects only the pixels over it."""
-    scene = in_chunks(raster(SITE), {"y": 9, "x": 9})
-    rows, columns = operators((Boxcar(30.0), Boxcar(30.0)), SITE, ANYWHERE[0])
-
-    def spoil(block, block_info=None):
-        if block_info[0]["chunk-location"] == (0, 0):
-            raise RuntimeError("read")
-        return block
-
-    scene.data = scene.data.map_blocks(spoil, dtype=float)
-    image = resample(rows, columns, scene, ANYWHERE[0])
-    assert np.isfinite(image[2:, 2:].compute()).all()
-    with pytest.raises(RuntimeError, match="read"):
-        image[0, 0].compute()
-
-
 WEIGHTS = np.array([[0.5, 0.25, 0.0, 0.0, 0.25], [0.0, 0.0, 2.0, -1.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0]])
 
 
@@ -185,26 +168,13 @@ def test_chunks_give_the_same_bits_and_stay_lazy(cube, chunks, in_turn, monkeypa
     assert lazy.chunks[1:] == cube.chunk(dict(zip(cube.dims, chunks, strict=True))).chunks[1:]
 
 
-def test_chunks_without_weight_are_not_read(cube):
-    """A missing sample is missing only in sums with a weight for it, and its chunk is not read for others."""
-    cube[2, 1, 1] = np.nan
-    found = combined(cube, "band", WEIGHTS)
-    assert np.argwhere(np.isnan(found.values)).tolist() == [[1, 1, 1]]
-
-    def fail_on_third_band(block):
-        assert block.size == 0 or float(block["wavelength"][0]) != 2.0
-        return block
-
-    whole = cube.chunk(band=1).map_blocks(fail_on_third_band, template=cube.chunk(band=1))
-    assert combined(whole, "band", WEIGHTS[:1]).compute().notnull().all()
-
-
-def test_single_precision_is_kept_and_summed_in_double(cube):
+def test_missing_samples_and_single_precision(cube):
+    """A missing sample is missing only in sums with a weight for it; single precision is summed in double."""
     single = cube.astype(np.float32)
-    found = combined(single, "band", WEIGHTS)
-    assert found.dtype == np.float32
     exact = combined(single.astype(float), "band", WEIGHTS)
-    np.testing.assert_array_equal(found, exact.astype(np.float32))
+    xr.testing.assert_identical(combined(single, "band", WEIGHTS), exact.astype(np.float32))
+    cube[2, 1, 1] = np.nan
+    assert np.argwhere(np.isnan(combined(cube, "band", WEIGHTS).values)).tolist() == [[1, 1, 1]]
 
 
 @pytest.fixture
@@ -240,17 +210,6 @@ def test_each_class_has_the_values_of_its_kernel(monkeypatch, lai, cover, kernel
         made = by_class(kernels, cover, lai, bands=2)
     assert (made.chunks is not None) == bool(chunks)
     np.testing.assert_array_equal(made, expected)
-
-
-@pytest.mark.parametrize("codes", [[1, 5], [-1, 1, 5], [1, 5, 9], [-1, 1, 5, 9]], ids=str)
-def test_classes_with_the_same_kernel_are_evaluated_together(lai, codes):
-    calls = []
-    both = (lambda cells: calls.append(cells.size) or np.sqrt(cells), [])
-    cover = lai.copy(data=np.random.default_rng(3).choice(codes, lai.shape).astype(np.int16))
-    made = by_class({1: both, 5: both, 9: (np.negative, [])}, cover, lai)
-    known = np.where(cover == 9, -lai, np.where(cover == -1, np.nan, np.sqrt(lai)))
-    np.testing.assert_array_equal(made, known)
-    assert calls == [int(cover.isin([1, 5]).sum())]
 
 
 def test_code_without_a_kernel_raises_when_computed(lai, cover):
