@@ -8,22 +8,20 @@ import shutil
 import tomllib
 import traceback
 import warnings
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from fnmatch import fnmatch
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from odc.geo.geobox import GeoBox
 
 import fifesim
 from fifesim.accessor import PUBLIC, find
 from fifesim.base import arguments as kinds
-from fifesim.base.arguments import FilePath, Kind, Metres, Names, Range, check_fields, checked, kind_of
+from fifesim.base.arguments import Range, check_fields, checked, kind_of
 from fifesim.grids import grid as grids
 from fifesim.ground.canopy.description import LEAF
 from fifesim.ground.canopy.properties import PROPERTIES
@@ -263,63 +261,6 @@ def test_checked_function_keeps_its_signature_and_can_be_pickled(name):
     assert pickle.loads(pickle.dumps(function)) is function
 
 
-class Sieve:
-    """A description that is in no table of the package."""
-
-
-def sieved(
-    raster: xr.DataArray,
-    mesh: float,
-    sieve: Sieve | None = None,
-    *,
-    wet: bool = False,
-    pixel: Metres = 30.0,
-    times: Annotated[int, Kind("a number of shakes")] = 1,
-    names: Names = (),
-    grid: GeoBox | None = None,
-    by: Literal["size", "mass"] = "size",
-    weights: Mapping[str, float] | None = None,
-    source: FilePath | xr.Dataset = "none",
-    sizes: Sequence[float] = (),
-    each: Callable[[float], float] | None = None,
-) -> str:
-    """A public function that is in no table of the package."""
-    return "done"
-
-
-WRONG = {
-    "raster": (5, "an xarray.DataArray over (y, x), got 5"),
-    "mesh": (True, "a number, got True"),
-    "sieve": (3, "a {tests}.Sieve, got 3"),
-    "times": ("3", "a number of shakes, got '3'"),
-    "names": (5, "a list of names, got 5"),
-    "grid": (5, "an odc.geo.geobox.GeoBox, such as"),
-    "by": (5, "a name, got 5"),
-    "weights": ([1.0], "a mapping of names, got a list of 1"),
-    "source": (5, "the path of a file, or an xarray.Dataset, got 5"),
-    "sizes": (5, "a list, got 5"),
-    "each": (5, "a function, got 5"),
-}
-
-
-def test_new_function_is_checked_by_its_annotations(lai):
-    for name, (value, words) in WRONG.items():
-        with pytest.raises(TypeError) as caught:
-            checked(sieved)(**{"raster": lai, "mesh": 2.0, name: value})
-        words = words.format(tests=__name__.partition(".")[0])
-        assert str(caught.value).startswith(f"{name} must be {words}")
-    with pytest.raises(TypeError, match=r"^sieved has no argument 'meshes': did you mean 'mesh'\?"):
-        checked(sieved)(lai, 2.0, meshes=5)
-
-
-def test_new_function_accepts_values_allowed_by_its_annotations(lai):
-    every = {"wet": np.bool_(True), "pixel": 5, "times": 2, "names": ["a"], "grid": lai.odc.geobox, "by": "mass"}
-    every |= {"weights": {"a": 1.0}, "source": xr.Dataset(), "sizes": np.ones(2), "each": np.sqrt}
-    assert checked(sieved)(lai, 2, Sieve(), **every) == "done"
-    # The default value of an argument is always valid.
-    assert checked(sieved)(lai, np.float32(2), None, weights=None, each=None) == "done"
-
-
 Share = Annotated[float, Range("1", 0, 1, others={"percent": 0.01}, ends="[)")]
 Depth = Annotated[float | None, Range("m", 0, np.inf, ends="()"), "depth of the water"]
 
@@ -373,6 +314,8 @@ def test_annotation_without_a_kind_is_an_error():
         (kinds.NUMBERS, [1, [1.0, 2.0], np.ones((2, 2)), xr.DataArray([1.0])], [None, "1", ["1"], np.array(["a"])]),
         (kinds.PAIR, [30, (30, 15)], [(1, 2, 3), "30", np.ones((2, 2)), ("a", "b")]),
         (kinds.FLAG, [True, np.bool_(False)], [1, 0, None, "no"]),
+        (kinds.NAMES, ["a", ["a"], ()], [5, None, xr.Dataset()]),
+        (kinds.MAPPING, [{"a": 1.0}], [[1.0], None, 5]),
         (kinds.CHUNKS, [256, "auto", "64MB", {"y": 2}, (2, 2), None], ["many", xr.Dataset(), np.ones(2)]),
         (LEAF, [fifesim.Leaf(), {"TM3": (0.1, 0.1)}, (0.1, 0.1)], [0.1, (0.1,), 5]),
         (kind_of(InstrumentLike), ["TM", fifesim.instrument("TM")], [None, ["TM"], 5]),
