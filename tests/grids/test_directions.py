@@ -1,9 +1,6 @@
 """Directions of the sun and sensor, and dates: carried as coordinates, by cell, and processed date by date."""
 
-import datetime
-
 import numpy as np
-import pandas as pd
 import pytest
 import xarray as xr
 from lazy import in_chunks, no_compute
@@ -37,6 +34,8 @@ def test_uniform_directions_are_scalar_coordinates():
     assert directions.geometry_of(carried) == SUN
     assert carried["sza"].attrs == cf.attributes("sza")
     assert directions.geometry_of(raster()) is None
+    by_cell = directions.checked_geometry(xr.Dataset({"sza": ramp(0.0, 60.0), "saa": 0.0}))
+    np.testing.assert_allclose(directions.mu_s(by_cell)[0, [0, -1]], [1.0, 0.5], atol=1e-15)
 
 
 def test_azimuths_count_from_grid_north():
@@ -57,12 +56,6 @@ def test_angles_by_cell_are_a_dataset_and_are_carried(scan):
     with pytest.raises(ValueError, match="the test needs one direction of sun and sensor, got rasters of vza"):
         directions.uniform_geometry(found, "the test")
     assert directions.uniform_geometry(SUN, "the test") == SUN
-
-
-def test_cosine_of_the_sun_is_a_number_or_by_cell():
-    assert directions.mu_s(Geometry(60.0, 0.0)).item() == pytest.approx(0.5, abs=1e-15)
-    by_cell = directions.checked_geometry(xr.Dataset({"sza": ramp(0.0, 60.0), "saa": 0.0}))
-    np.testing.assert_allclose(directions.mu_s(by_cell)[0, [0, -1]], [1.0, 0.5], atol=1e-15)
 
 
 def test_invalid_directions_are_rejected():
@@ -138,10 +131,6 @@ def test_sun_of_several_times_and_places_equals_each_alone():
         for name in ("sza", "saa", "earth_sun_distance"):
             assert float(season[name][number]) == pytest.approx(getattr(alone, name), abs=1e-9)
     expected = fifesim.sun_position(DATES[0], **FIFE).sza
-    one = datetime.datetime(1987, 6, 6, 16, 35, tzinfo=datetime.UTC)
-    stamp = np.array(["1987-06-06T16:35"], "datetime64[m]")
-    for times in (pd.to_datetime(DATES[:1]), stamp, [one], xr.DataArray(stamp.astype("M8[ns]"), dims="time")):
-        assert float(fifesim.sun_position(times, **FIFE)["sza"][0]) == pytest.approx(expected, abs=1e-9)
     both = fifesim.sun_position(DATES[:2], latitude=[39.06, -33.0], longitude=[-96.54, 150.0])
     assert float(both["sza"][0]) == pytest.approx(expected, abs=1e-9)
     assert float(both["sza"][1]) > 90  # night in Australia is returned, not rejected

@@ -79,9 +79,7 @@ def test_gdal_reads_location_bands_and_calibration(image, write):
             wavelength = float(source.tags(number, ns="IMAGERY")["CENTRAL_WAVELENGTH_UM"])
             assert wavelength == pytest.approx(band.wavelength, rel=1e-8)
         found = source.tags()
-    assert json.loads(found["FIFESIM"])["dims"] == ["band", "y", "x"] and found["PROJECT"] == "trial"
-    assert found["atmosphere"] == image.attrs["atmosphere"] and found["instrument"] == "TM"
-    assert found["AREA_OR_POINT"] == "Area"
+    assert (found["PROJECT"], found["instrument"], found["AREA_OR_POINT"]) == ("trial", "TM", "Area")
 
 
 @pytest.mark.parametrize("name", ["image", "reflectance", "lai", "one-band", "single-precision", "odd", "nameless"])
@@ -128,8 +126,7 @@ def test_variables_of_a_dataset_become_bands_and_only_they_need_names(truth, wri
         fifesim.open_image(several.write(tmp_path / "several.tif"))
 
 
-@pytest.mark.parametrize("before", [None, "kept"])
-def test_failed_write_leaves_the_folder_unchanged(image, tmp_path, before):
+def test_failed_write_leaves_the_folder_unchanged(image, tmp_path):
     """Chunks other than the first cannot be computed."""
 
     def refuse(block, block_info=None):
@@ -139,20 +136,16 @@ def test_failed_write_leaves_the_folder_unchanged(image, tmp_path, before):
 
     path, lazy = tmp_path / "tm.tif", in_chunks(image, {"y": 2})
     lazy = lazy.copy(data=lazy.data.map_blocks(refuse, dtype=image.dtype))
-    if before:
-        path.write_text(before)
+    path.write_text("kept")
     with pytest.raises(RuntimeError, match="disk on fire"):
         fifesim.to_geotiff(lazy, path, overwrite=True)
-    assert [(each.name, each.read_text()) for each in tmp_path.iterdir()] == ([("tm.tif", "kept")] if before else [])
+    assert [(each.name, each.read_text()) for each in tmp_path.iterdir()] == [("tm.tif", "kept")]
 
 
 def test_coordinates_omitted_from_a_geotiff_give_a_warning(image, write):
-    for name, value, said in (
-        ("vza", 20.0, "lacks vza, which vary by cell.* give geometry="),
-        ("date", np.datetime64("1987", "ns"), "lacks date"),
-    ):
-        with pytest.warns(UserWarning, match=said):
-            write(image.assign_coords({name: (("y", "x"), np.full(image.shape[1:], value))}))
+    angles = (("y", "x"), np.full(image.shape[1:], 20.0))
+    with pytest.warns(UserWarning, match="lacks vza, date, which vary by cell.* give geometry="):
+        write(image.assign_coords(vza=angles, date=(("y", "x"), np.full(image.shape[1:], "1987", "M8[ns]"))))
 
 
 def test_calibration_goes_with_digital_numbers_of_all_bands_or_one(image, toa, write):
@@ -165,9 +158,8 @@ def test_calibration_goes_with_digital_numbers_of_all_bands_or_one(image, toa, w
 
 
 @pytest.mark.parametrize("kind", ["netcdf", "zarr"])
-@pytest.mark.parametrize("name", ["image", "lai"])
-def test_netcdf_and_zarr_keep_crs_and_names(image, truth, tmp_path, kind, name):
-    raster, path = {"image": image, "lai": truth["lai"]}[name], tmp_path / name
+def test_netcdf_and_zarr_keep_crs_and_names(image, tmp_path, kind):
+    raster, path = image, tmp_path / "image"
     if kind == "netcdf":
         raster.to_netcdf(path)
         opened = xr.open_dataset(path, decode_coords="all", mask_and_scale=False)
@@ -184,7 +176,7 @@ def test_netcdf_and_zarr_keep_crs_and_names(image, truth, tmp_path, kind, name):
     for coordinate in raster.coords:
         np.testing.assert_array_equal(again[coordinate], raster[coordinate])
         assert raster[coordinate].attrs.items() <= again[coordinate].attrs.items()
-    if (name, kind) == ("image", "netcdf"):
+    if kind == "netcdf":
         # By default xarray masks the fill value and converts the counts to floating point.
         with xr.open_dataset(path, decode_coords="all") as masked:
             for each in (again, masked["dn"]):
