@@ -1,12 +1,9 @@
 """Files, messages, caches and compiled kernels: nothing blocks, changes or stops a run, and no message is long."""
 
 import importlib.util
-import inspect
 import os
-import pickle
 import socket
 import warnings
-from dataclasses import dataclass
 
 import numba
 import numpy as np
@@ -18,7 +15,7 @@ from fifesim.accessor import PUBLIC, find
 from fifesim.base import arrays, caches, files
 from fifesim.base.caches import CACHES, Results, cached, clear_caches
 from fifesim.base.files import check_regular, in_a_line, read_toml, shown, whole_file
-from fifesim.base.messages import is_quiet, nearest, quiet, spelled, warn
+from fifesim.base.messages import is_quiet, nearest, quiet, warn
 
 
 def test_only_regular_files_are_opened(tmp_path, monkeypatch):
@@ -105,20 +102,6 @@ def test_file_is_replaced_by_a_complete_one_only(tmp_path):
             pass
 
 
-@dataclass(frozen=True)
-class Plain:
-    visibility: float = 45.0
-
-
-def test_class_keeps_its_signature_and_names_misspelt_arguments():
-    before = inspect.signature(Plain)
-    assert spelled(Plain) is Plain and inspect.signature(Plain) == before
-    assert Plain(23.0) == Plain(visibility=23.0) == pickle.loads(pickle.dumps(Plain(23.0)))
-    with pytest.raises(TypeError, match=r"^Plain has no argument 'visibilty': did you mean 'visibility'\? There are v"):
-        Plain(visibilty=23.0)
-    assert nearest("zzz", ["sense", "slope"]) == ""
-
-
 def test_warning_points_outside_the_package_and_quiet_ends_with_its_context():
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -129,6 +112,7 @@ def test_warning_points_outside_the_package_and_quiet_ends_with_its_context():
             assert not is_quiet()
         assert is_quiet()
     assert not is_quiet()
+    assert nearest("sens", ["sense", "slope"]) == "did you mean 'sense'? " and nearest("zzz", ["sense", "slope"]) == ""
 
 
 @pytest.fixture

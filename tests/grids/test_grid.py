@@ -207,13 +207,6 @@ def test_raster_without_a_crs_takes_it_from_a_raster_on_the_same_cells(lai, site
             lai.fifesim.surface_reflectance(bands=["TM3"], canopy=fifesim.Canopy(background=other * 0.01))
 
 
-def test_consistent_transform_gives_the_exact_cell_size():
-    third = xr.DataArray([0.0, 0.0], dims="x", coords={"x": [1.0, 2.0], "spatial_ref": 0})
-    third["spatial_ref"].attrs["GeoTransform"] = f"0 {10 / 3!r} 0 0 0 {-10 / 3!r}"
-    assert grids.exact_cell(third, 3.333333, -3.333333) == (10 / 3, -10 / 3)
-    assert grids.exact_cell(third, 3.4, -3.4) == (3.4, -3.4)
-
-
 WINDOW = fifesim.fife_site(cell=10, window=((10, 40), (10, 40)))
 CLASSES = [fifesim.CoverClass(str(code), lai=1.0, code=code) for code in range(10)]
 SOURCES = {
@@ -313,11 +306,3 @@ def test_scale_error_above_one_percent_gives_one_warning_per_location():
         for cell in (10 / 3, 30 / 9, 2.5, 25):
             fifesim.fife_site(cell)
         fifesim.fife_site(29, window=((0, 10), (0, 10)))
-
-
-def test_grid_description_has_crs_latitude_and_longitude():
-    grid = fifesim.grid_at("EPSG:32735", 620000.0, 7220000.0, 300.0, 200.0, 10.0)
-    said = "620000 to 620300 E and 7219800 to 7220000 N in EPSG:32735 (latitude -25.13, longitude 28.19)"
-    assert projection.lies_in_words(grid.affine, grid.shape, grid.crs) == said
-    # Location given in the paper.
-    assert projection.middle(fifesim.fife_site(30)) == pytest.approx((-96.54, 39.06), abs=0.02)

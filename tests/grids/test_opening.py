@@ -171,15 +171,6 @@ def test_paths_that_are_no_regular_file_are_rejected_without_waiting(tmp_path):
     check_refused_everywhere(f"/vsizip/{tmp_path}/pipe/a.tif", "is a pipe")
 
 
-def test_error_names_the_truncated_file(tmp_path):
-    rasterio.shutil.copy(write(tmp_path / "a.tif"), tmp_path / "cut.tif", driver="COG", compress="none")
-    data = (tmp_path / "cut.tif").read_bytes()
-    (tmp_path / "cut.tif").write_bytes(data[: len(data) // 2])
-    check_refused_everywhere(tmp_path / "cut.tif", r"cannot read .*cut\.tif", OSError)
-    with pytest.raises(OSError, match=r"cannot read .*cut\.tif"):
-        fifesim.open_image(tmp_path / "cut.tif", chunks=20).compute()
-
-
 def test_rasters_without_numbers_or_location_are_rejected(tmp_path):
     for number, given in enumerate(FOREIGN["odd"]):
         profile = {key: value or None if key == "crs" else value for key, value in given.items() if key != "said"}

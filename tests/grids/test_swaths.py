@@ -8,7 +8,7 @@ from lazy import check_place, in_chunks, no_compute
 import fifesim
 from fifesim.grids import grid as grids
 from fifesim.grids import projection
-from fifesim.grids.swaths import grid_swath, placed_as
+from fifesim.grids.swaths import grid_swath
 
 GRID = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 1500.0, 1200.0, (30.0, 25.0))
 
@@ -122,12 +122,3 @@ def test_map_in_another_crs_shows_the_same_ground():
     far = fifesim.grid_at("EPSG:26914", 725000.0, 4334000.0, 1500.0, 1200.0, 30.0)
     with pytest.raises(ValueError, match="no pixel of the scan lies on the grid, which spans 725000 to 726500 E"):
         grid_swath(image, far)
-
-
-def test_results_keep_the_coordinates_of_the_image():
-    image = swath()
-    bare = xr.DataArray(image.values, dims=image.dims)
-    assert placed_as(bare, image)["x"].equals(image["x"])
-    assert placed_as(bare, image).encoding == {"grid_mapping": "spatial_ref"}
-    with pytest.raises(ValueError, match="dimensions y and x"):
-        placed_as(bare, bare.rename(line="row", sample="column"))
