@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import inspect
-import pickle
 import shutil
 import tomllib
 import traceback
 import warnings
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from fnmatch import fnmatch
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Annotated, Any
 
 import numpy as np
@@ -21,7 +19,7 @@ import xarray as xr
 import fifesim
 from fifesim.accessor import PUBLIC, find
 from fifesim.base import arguments as kinds
-from fifesim.base.arguments import Range, check_fields, checked, kind_of
+from fifesim.base.arguments import kind_of
 from fifesim.grids import grid as grids
 from fifesim.ground.canopy.description import LEAF
 from fifesim.ground.canopy.properties import PROPERTIES
@@ -232,72 +230,6 @@ def test_rasters_must_hold_real_numbers(valid_calls, name):
                 continue
             with pytest.raises(TypeError, match=f"^{argument} must hold real numbers, got .*: it holds "):
                 function(**(given | {argument: raster.astype(dtype)}))
-
-
-def test_rasters_within_an_argument_must_hold_real_numbers(valid_calls):
-    """Rasters in mappings, pairs, descriptions and Datasets, and wavelengths."""
-    given, rho = valid_calls["surface_reflectance"], valid_calls["to_toa"]["reflectance"]
-    mask = given["lai"] > 1
-    canopies = [
-        {"background": mask}, {"background": {"TM3": mask, "TM4": 0.2}}, {"brown_leaf": fifesim.Leaf(chlorophyll=mask)},
-        {"leaf_optics": {"TM3": (mask, 0.1), "TM4": (0.4, 0.4)}},
-    ]  # fmt: skip
-    within = [("canopy", fifesim.Canopy(**each)) for each in canopies]
-    for argument, value in [*within, ("lai", xr.Dataset({"lai": given["lai"], "brown": mask}))]:
-        with pytest.raises(TypeError, match=rf"^{argument} must hold real numbers, got bool: it holds a mask"):
-            fifesim.surface_reflectance(**(given | {argument: value}))
-    for wavelength in (["red", "nir"], np.array(["2001-01-01", "2001-01-02"], "datetime64[s]")):
-        with pytest.raises(TypeError, match=r"^wavelength of \w+ must hold real numbers"):
-            fifesim.ndvi(rho.assign_coords(wavelength=("band", wavelength)))
-
-
-@pytest.mark.parametrize("name", ["ndvi", "grid_at"])
-def test_checked_function_keeps_its_signature_and_can_be_pickled(name):
-    """The name, documentation and signature are kept, and worker processes can load the function."""
-    function = find(name)
-    bare = inspect.unwrap(function)
-    assert bare is not function and function.__doc__ == bare.__doc__
-    assert inspect.signature(function) == inspect.signature(bare)
-    assert pickle.loads(pickle.dumps(function)) is function
-
-
-Share = Annotated[float, Range("1", 0, 1, others={"percent": 0.01}, ends="[)")]
-Depth = Annotated[float | None, Range("m", 0, np.inf, ends="()"), "depth of the water"]
-
-
-@dataclass
-class Pond:
-    """A description with a range of each kind."""
-
-    share: Share = 0.5
-    depth: Depth = None
-
-    def __post_init__(self):
-        check_fields(self)
-
-
-def pond(share: Share = 0.5, depth: Depth = None):
-    """A public function with the same ranges."""
-    return SimpleNamespace(share=share, depth=depth)
-
-
-@pytest.mark.parametrize("checks", [Pond, checked(pond)])
-@pytest.mark.parametrize(
-    ("given", "error", "message"),
-    [
-        ({"share": 1}, ValueError, r"share must be in \[0, 1\), got 1: if it is in percent, type share=0.01$"),
-        ({"share": xr.DataArray(-1.0)}, ValueError, r"share must be in \[0, 1\), got -1$"),
-        ({"share": float("nan")}, ValueError, r"share must be in \[0, 1\), got nan$"),
-        ({"depth": 0.0}, ValueError, "depth must be above 0 m, got 0: check its unit$"),
-        ({"depth": np.inf}, ValueError, "depth must be above 0 m, got inf"),
-        ({"share": np.ones(3)}, TypeError, r"share must be a number, .*, where one is for all cells$"),
-        ({"depth": "2 m"}, TypeError, "depth must be a number in m, got '2 m': leave the unit out$"),
-    ],
-)
-def test_range_in_an_annotation_is_checked(checks, given, error, message):
-    with pytest.raises(error, match=f"^{message}"):
-        checks(**given)
-    assert checks(share=0, depth=None).share == 0 and checks(share=np.float32(0.5), depth=1e-9).depth > 0
 
 
 def test_annotation_without_a_kind_is_an_error():

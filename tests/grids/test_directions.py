@@ -58,21 +58,6 @@ def test_angles_by_cell_are_a_dataset_and_are_carried(scan):
     assert directions.uniform_geometry(SUN, "the test") == SUN
 
 
-def test_invalid_directions_are_rejected():
-    """A default azimuth would light the slopes from the north."""
-    for given, kind, said in (
-        (xr.Dataset({"vza": 5.0}), TypeError, "must be a fifesim.Geometry, or an xarray.Dataset with sza"),
-        (xr.Dataset({"sza": 95.0, "saa": 0.0}), ValueError, "the sun is below the horizon"),
-        (xr.Dataset({"sza": ramp(0.5, 0.6).assign_attrs(units="radian"), "saa": 1.0}), ValueError, "'radian'"),
-        (xr.Dataset({"sza": ramp(30.0, 31.0)}), ValueError, r"zenith angle sza but no azimuth saa.*assign_coords"),
-        (xr.Dataset({"sza": 30.0}), ValueError, r"zenith angle sza but no azimuth saa.*assign_coords"),
-    ):
-        with pytest.raises(kind, match=said):
-            directions.checked_geometry(given)
-    with pytest.raises(ValueError, match="zenith angle sza but no azimuth saa"):
-        directions.geometry_of(raster().assign_coords(sza=30.0))
-
-
 CAPE = fifesim.grid_at("EPSG:32734", 261000.0, 6244000.0, 300.0, 300.0, 30.0)  # near Cape Town
 NOON = "2022-12-21T10:45Z"
 

@@ -207,31 +207,6 @@ def test_raster_without_a_crs_takes_it_from_a_raster_on_the_same_cells(lai, site
             lai.fifesim.surface_reflectance(bands=["TM3"], canopy=fifesim.Canopy(background=other * 0.01))
 
 
-WINDOW = fifesim.fife_site(cell=10, window=((10, 40), (10, 40)))
-CLASSES = [fifesim.CoverClass(str(code), lai=1.0, code=code) for code in range(10)]
-SOURCES = {
-    "open_lai": lambda raster: fifesim.open_lai(raster.rename("lai"), WINDOW),
-    "fine_dem": lambda raster: fifesim.fine_dem(300 + raster, WINDOW),
-    "source_dem": lambda raster: fifesim.terrain.source_dem(300 + raster, WINDOW, margin=0.0),
-    "moisture": lambda raster: fifesim.landscape(WINDOW, moisture=raster / 10),
-    "cover": lambda raster: fifesim.landscape(WINDOW, cover=raster.astype(int), classes=CLASSES),
-}
-
-
-@pytest.mark.parametrize("source", SOURCES)
-def test_sources_with_unevenly_spaced_coordinates_are_refused(source):
-    """odc-geo derives the grid from the first and last coordinates, which would shift the cells between them."""
-    raster = fifesim.lai_scene(fifesim.fife_site(cell=10, window=((0, 60), (0, 60))), seed=7)
-    raster = raster.drop_attrs(deep=False).rename(None)
-    SOURCES[source](raster)
-    for axis in ("x", "y"):
-        bent = raster[axis].values + 15 * np.sin(np.linspace(0, np.pi, 60))
-        gap, missing = [*range(20), *range(30, 60)], raster[axis].where(np.arange(60) != 5).values
-        for uneven in (raster.isel({axis: gap}), *(raster.assign_coords({axis: each}) for each in (bent, missing))):
-            with pytest.raises(ValueError, match=rf"{axis} is not evenly spaced.*\.interp"):
-                SOURCES[source](uneven)
-
-
 def test_coordinates_in_single_precision_are_evenly_spaced(lai):
     """Single precision resolves 0.5 m in a northing of 4e6 m, which matters for cells of 1 m but not of 10 m."""
     coarse, fine = (lai.y.values[0] - cell * np.arange(lai.sizes["y"]) for cell in (10.0, 1.3))

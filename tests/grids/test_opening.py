@@ -255,11 +255,6 @@ def test_band_is_the_only_one_that_names_the_quantity(tmp_path, name):
     path = write(tmp_path / "two.tif", values, names=["quality", name])
     for given in (path, rioxarray.open_rasterio(path)):
         np.testing.assert_allclose(found(given), 2.0, rtol=1e-6)
-    for names in (["elevation", "altitude"], [None, None]):
-        path = write(tmp_path / "unclear.tif", values, names=names)
-        for given in (path, rioxarray.open_rasterio(path)):
-            with pytest.raises(ValueError, match=r"has \d bands, and not exactly one .*gdal_translate -b 2"):
-                found(given)
 
 
 def test_scale_and_unit_are_of_the_band_of_the_quantity(tmp_path):

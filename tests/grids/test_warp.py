@@ -185,13 +185,3 @@ def test_array_is_warped_like_its_file(tmp_path, crs, affine, south_up):
         lazy = on_grid(raster.squeeze("band").chunk({"y": 50, "x": 70}), GRID, {"y": 33, "x": 41})
     np.testing.assert_array_equal(lazy.compute(scheduler="synchronous"), found)
     check_place(lazy, GRID.crs)
-
-
-def test_source_without_overlap_is_rejected_with_its_location(tmp_path):
-    path = write(tmp_path / "away.tif", hills(40, 40), Affine(10, 0, 600000, 0, -10, 4332000), "EPSG:26914")
-    with pytest.raises(ValueError, match=r"away\.tif does not overlap the grid, which spans"):
-        fifesim.open_lai(path, GRID)
-    away = xr.DataArray(np.ones((4, 4)), dims=("y", "x"), name="mine")
-    grid = fifesim.grid_at("EPSG:32735", 620000.0, 7220000.0, 40.0, 40.0, 10.0)
-    with pytest.raises(ValueError, match=r"mine does not overlap .* it spans 620000 to 620040 E .*\(latitude -25.13, "):
-        on_grid(grids.place(away, grid), GRID)
