@@ -114,14 +114,9 @@ def test_variables_of_a_dataset_become_bands_and_only_they_need_names(truth, wri
     again = fifesim.open_image(path)
     for name in truth:
         np.testing.assert_array_equal(again.sel(band=name), truth[name])
-    several = Copy(path)
-    lai = truth["lai"]
-    for raster, names in ((lai.rename(None), (None,)), (xr.concat([lai, lai], "band"), (None, None)), (lai, ("lai",))):
-        with rasterio.open(write(raster)) as source:
-            assert source.descriptions == names
-    one = Copy(path)
+    several, one = Copy(path), Copy(write(truth["lai"]))
     several.descriptions, one.descriptions = ["lai", "mine"], ["mine"]
-    np.testing.assert_array_equal(fifesim.open_image(one.write(tmp_path / "one.tif")), lai)
+    np.testing.assert_array_equal(fifesim.open_image(one.write(tmp_path / "one.tif")), truth["lai"])
     with pytest.raises(ValueError, match="are lai, mine, and its tag FIFESIM has lai, fpar"):
         fifesim.open_image(several.write(tmp_path / "several.tif"))
 
@@ -228,8 +223,7 @@ def test_file_and_its_gdal_sidecar_are_replaced_only_with_overwrite(image, tmp_p
     (tmp_path / "image.tif.aux.xml").write_text(f"<PAMDataset>{stale}</PAMDataset>")
     with pytest.raises(FileExistsError, match=r"there is a file .*image.tif: type overwrite=True"):
         fifesim.to_geotiff(image[::-1], path)
-    with rasterio.open(path) as source:
-        assert path.read_bytes() == before and source.descriptions[0] == "stale"
+    assert path.read_bytes() == before
     fifesim.to_geotiff(image[::-1], path, overwrite=True)
     np.testing.assert_array_equal(fifesim.open_image(path), image[::-1])
 

@@ -115,10 +115,6 @@ def test_no_request_is_sent_unless_allowed(tmp_path, server):
     virtual = [f"/vsicurl/{address}", f"/vsizip//vsicurl/{address}/a.tif", "/vsis3/bucket/a.tif"]
     for path in (address, tms(address), str(tmp_path / "tms.tif"), beside, *virtual, *mosaics):
         check_refused_everywhere(path, "allow_remote=True")
-    for name, content in FOREIGN["formats"].items():
-        (tmp_path / name).write_text(content)
-        with pytest.raises(ValueError, match="allow_remote=True"):
-            opening.raster_file(tmp_path / name)
     assert not asked
     for number, door in enumerate(DOORS):
         with pytest.raises(ValueError, match="404"):
@@ -195,18 +191,6 @@ def test_vertical_crs_and_nodata_value_outside_the_dtype_are_ignored(tmp_path):
     band = re.search("<VRTRasterBand[^>]*>", text)[0]
     (tmp_path / "marked.vrt").write_text(text.replace(band, f"{band}<NoDataValue>-9999</NoDataValue>"))
     assert (fifesim.open_image(tmp_path / "marked.vrt") == 3).all()
-
-
-@pytest.mark.slow
-def test_small_file_of_a_huge_raster_is_opened_only_in_chunks(tmp_path):
-    path = tmp_path / "huge.tif"
-    profile = {"driver": "GTiff", "width": 1_000_000, "height": 1_000_000, "count": 1, "dtype": "uint8"}
-    profile |= {"tiled": True, "blockxsize": 8192, "blockysize": 8192, "sparse_ok": True, "bigtiff": "yes"}
-    with rasterio.open(path, "w", **profile, crs="EPSG:26914", transform=PLACED * Affine.scale(0.005)):
-        pass
-    with pytest.raises(ValueError, match=r"huge\.tif takes 1e\+03 GB of memory.*chunks='auto'"):
-        fifesim.open_image(path)
-    assert float(fifesim.open_image(path, chunks=1000)[0, :5, :5].sum()) == 0
 
 
 IN_DEGREES = Affine(0.0002, 0, -96.6, 0, -0.0002, 39.12)

@@ -1,4 +1,4 @@
-"""Warping files onto grids: operations of known accuracy, compared with an independent interpolation."""
+"""Files and images of a scan onto grids, compared with an independent interpolation and with brute force."""
 
 import tomllib
 from pathlib import Path
@@ -6,18 +6,18 @@ from pathlib import Path
 import numpy as np
 import pyproj
 import pytest
-import rasterio
 import rioxarray
 import xarray as xr
 from affine import Affine
 from elevations import write
-from lazy import check_place, no_compute
+from lazy import check_place, in_chunks, no_compute
 from scipy.interpolate import RegularGridInterpolator
 
 import fifesim
 from fifesim.grids import grid as grids
 from fifesim.grids import projection, warp
 from fifesim.grids.source import open_source
+from fifesim.grids.swaths import grid_swath
 
 FOREIGN = tomllib.loads((Path(__file__).parents[1] / "data" / "foreign_rasters.toml").read_text(encoding="utf-8"))
 DEGREES, METRES = Affine(0.0002, 0, -96.6, 0, -0.0002, 39.12), Affine(30, 0, 709000, 0, -30, 4332000)
@@ -157,16 +157,9 @@ def test_finer_files_are_averaged(tmp_path, times):
     np.testing.assert_array_equal(on_grid(path, grid, chunks=13), whole)
 
 
-def test_number_of_file_cells_read_at_once_is_limited(tmp_path):
+def test_number_of_file_cells_read_at_once_is_limited():
     assert warp._block_size(warp._MUCH_FINER, 512) == 512
     assert [warp._block_size(cells, 512) for cells in (7, 64, 65, 2048, 1e6, np.nan)] == [32, 32, 16, 1, 1, 32]
-    path = tmp_path / "finest.tif"
-    profile = {"driver": "GTiff", "width": 100_000, "height": 100_000, "count": 1, "dtype": "uint8", "sparse_ok": True}
-    profile |= {"tiled": True, "blockxsize": 8192, "blockysize": 8192, "crs": "EPSG:26914"}
-    with rasterio.open(path, "w", **profile, transform=Affine(0.01, 0, 708000, 0, -0.01, 4332000)):
-        pass
-    with pytest.raises(ValueError, match=r"finest\.tif is far finer than the cells.*gdalwarp -r average -tr"):
-        fifesim.open_lai(path, fifesim.grid_at("EPSG:26914", 708000.0, 4332000.0, 900.0, 900.0, 300.0))
 
 
 @pytest.mark.parametrize("south_up", [False, True])
@@ -185,3 +178,117 @@ def test_array_is_warped_like_its_file(tmp_path, crs, affine, south_up):
         lazy = on_grid(raster.squeeze("band").chunk({"y": 50, "x": 70}), GRID, {"y": 33, "x": 41})
     np.testing.assert_array_equal(lazy.compute(scheduler="synchronous"), found)
     check_place(lazy, GRID.crs)
+
+
+MAP = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 1500.0, 1200.0, (30.0, 25.0))
+
+
+def swath(dtype=float):
+    """Thirty by forty pixels of about 33 m, rotated by about 0.1 rad, with a plane of values."""
+    line, sample = np.mgrid[0:30, 0:40]
+    x, y = 705180.7 + 31.3 * sample - 4.1 * line, 4333833.3 - 33.7 * line - 3.9 * sample
+    values = np.stack([1 + line + 40 * sample, 5 + line % 200]).astype(dtype) % 250
+    dims = ("line", "sample")
+    coords = {"band": ["TM3", "TM4"], "line": np.arange(30) - 7, "x": (dims, x), "y": (dims, y), "sza": 31.0}
+    coords |= {
+        "vza": (dims, 30 + sample / 10, {"units": "degree"}),
+        "spatial_ref": grids.coordinates(MAP)["spatial_ref"],
+    }
+    attrs = {"units": "1", "history": "sense_swath"}
+    return xr.DataArray(values, dims=("band", *dims), coords=coords, name="dn", attrs=attrs)
+
+
+def test_each_cell_takes_the_nearest_pixel():
+    image = swath()
+    out = grid_swath(image, MAP)
+    check_place(out, MAP.crs)
+    x, y = np.meshgrid(out["x"], out["y"])
+    away = np.hypot(x[..., None] - image["x"].values.ravel(), y[..., None] - image["y"].values.ravel())
+    number, near = away.argmin(-1), away.min(-1) < 20
+    for band in range(2):
+        np.testing.assert_array_equal(out.values[band][near], image.values[band].ravel()[number][near])
+    np.testing.assert_array_equal(out["vza"].values[near], image["vza"].values.ravel()[number][near])
+    # The farthest corner of a pixel is 23 m from its centre (half a diagonal of 46 m).
+    assert np.isnan(out.values[:, away.min(-1) > 26]).all() and np.isnan(out["vza"].values[away.min(-1) > 26]).all()
+    assert near.mean() > 0.5 and np.isnan(out).any()
+    assert out.attrs["history"] == "sense_swath\ngrid_swath: nearest" and float(out["sza"]) == 31
+    assert not {"line", "sample", "latitude"} & set(out.coords)
+
+
+def test_digital_numbers_stay_digital_numbers():
+    out = grid_swath(swath(np.uint8), MAP)
+    assert out.dtype == np.uint8 and (out == 0).any() and int(out.max()) > 200
+    with pytest.raises(ValueError, match=r"digital numbers have no mean.*\.to_radiance\(\)"):
+        grid_swath(swath(np.uint8), MAP, "mean")
+
+
+def test_mean_of_a_plane_is_the_plane():
+    """Pixels sample the plane at their centres; the covered part of a cell lies within one pixel of the plane."""
+    image = swath()
+    image = image.isel(band=0, drop=True).copy(data=0.02 * image["x"].values - 0.03 * image["y"].values)
+    coarse = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 1500.0, 1200.0, 150.0)
+    out = grid_swath(image, coarse, "mean", min_valid=1.0)
+    plane = 0.02 * out["x"] - 0.03 * out["y"]
+    inside = out.notnull().values
+    assert inside.sum() > 20 and not inside.all()
+    np.testing.assert_allclose(out.values[inside], plane.transpose("y", "x").values[inside], rtol=0, atol=0.15)
+    assert float((out - plane).std()) < 0.05
+
+
+def test_min_valid_selects_partly_covered_cells():
+    image = swath()
+    around = fifesim.grid_at("EPSG:26914", 704000.0, 4335000.0, 4000.0, 4000.0, 40.0)
+    out = grid_swath(image, around, "mean", min_valid=0.0)
+    full = grid_swath(image, around, "mean", min_valid=0.999)
+    assert full.notnull().sum() < out.notnull().sum()
+    area = 31.3 * 33.7 + 4.1 * 3.9
+    covered = float(full.isel(band=0).notnull().sum()) * 1600
+    assert covered < area * 1200 < float(out.isel(band=0).notnull().sum()) * 1600
+
+
+def test_map_is_the_same_in_any_chunks_and_for_each_date(monkeypatch):
+    for method, dtype in (("nearest", np.uint8), ("nearest", float), ("mean", float)):
+        image = swath(dtype)
+        monkeypatch.setattr("fifesim.grids.swaths._BLOCK", 512)
+        whole = grid_swath(image, MAP, method)
+        monkeypatch.setattr("fifesim.grids.swaths._BLOCK", 17)
+        xr.testing.assert_identical(grid_swath(image, MAP, method), whole)
+        for chunks in ({"line": 7, "sample": 11}, {"band": 1, "line": 30}):
+            with no_compute():
+                lazy = grid_swath(in_chunks(image, chunks), MAP, method)
+            assert lazy.chunks is not None and lazy["vza"].chunks is not None
+            xr.testing.assert_identical(lazy.compute(), whole)
+    times = np.array(["2022-05-01T17:00", "2022-06-01T17:00"], "M8[ns]")
+    passes = [swath().assign_coords(sza=sza) * share for sza, share in ((31.0, 1.0), (27.0, 2.0))]
+    season = xr.concat(passes, dim=xr.IndexVariable("time", times), coords="different", compat="equals")
+    out = season.fifesim.grid_swath(MAP)
+    assert out.dims == ("time", "band", "y", "x") and out["sza"].values.tolist() == [31.0, 27.0]
+    for number, one in enumerate(passes):
+        np.testing.assert_array_equal(out[number], grid_swath(one, MAP))
+
+
+def test_latitude_and_longitude_are_enough():
+    """This works for any swath; here NAD83 and WGS 84 differ by a metre."""
+    image = swath()
+    longitude, latitude = projection.carry(
+        projection.operation("EPSG:26914", "EPSG:4326"), "EPSG:26914", "EPSG:4326", image["x"], image["y"]
+    )
+    dims = ("line", "sample")
+    other = image.drop_vars(["x", "y", "spatial_ref"])
+    other = other.assign_coords(latitude=(dims, np.asarray(latitude)), longitude=(dims, np.asarray(longitude)))
+    np.testing.assert_array_equal(grid_swath(other, MAP), grid_swath(image, MAP))
+    with pytest.raises(ValueError, match="the pixel positions are unknown"):
+        grid_swath(image.drop_vars("x"), MAP)
+
+
+def test_map_in_another_crs_shows_the_same_ground():
+    image = swath().isel(band=0)
+    image = image.copy(data=image["y"].values)
+    north = fifesim.grid_at("EPSG:32614", 705200.0, 4333700.0, 900.0, 600.0, 30.0)
+    out = grid_swath(image, north)
+    assert out.rio.crs.to_epsg() == 32614
+    # Tolerance: half a pixel, plus the difference between NAD83 and WGS 84.
+    assert float(abs(out - out["y"]).max()) < 27
+    far = fifesim.grid_at("EPSG:26914", 725000.0, 4334000.0, 1500.0, 1200.0, 30.0)
+    with pytest.raises(ValueError, match="no pixel of the scan lies on the grid, which spans 725000 to 726500 E"):
+        grid_swath(image, far)
