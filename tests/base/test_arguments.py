@@ -1,7 +1,5 @@
 """Invalid arguments of every public function give one line that names the argument, and no raw library error."""
 
-from __future__ import annotations
-
 import inspect
 import shutil
 import tomllib
@@ -38,8 +36,8 @@ CHECKED = [
 
 def accepted_kinds(name, argument, first):
     """Kinds of values that may be accepted although they look wrong."""
-    patterns = (kinds for pattern, kinds in TABLE["accepted"].items() if fnmatch(f"{name}.{argument}", pattern))
-    return next(patterns, ["crs"] if first else [])
+    matching = (each for pattern, each in TABLE["accepted"].items() if fnmatch(f"{name}.{argument}", pattern))
+    return next(matching, ["crs"] if first else [])
 
 
 def default_arguments(name):

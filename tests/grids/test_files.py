@@ -178,24 +178,6 @@ def test_netcdf_and_zarr_keep_crs_and_names(image, tmp_path, kind):
                 np.testing.assert_array_equal(each.fifesim.ndvi(), image.fifesim.ndvi())
 
 
-def test_external_values_are_masked_and_scaled(tmp_path):
-    """Without masking and scaling, stored counts or -9999 would be processed as reflectance."""
-    path, cases = tmp_path / "theirs.tif", [("float32", 0.25, -9999), ("uint16", 2500, 65535), ("int16", 2500, None)]
-    for dtype, stored, nodata in cases:
-        profile = {"driver": "GTiff", "width": 4, "height": 3, "count": 1, "dtype": dtype, "crs": "EPSG:26914"}
-        values = np.full((3, 4), stored, dtype)
-        values[0, 0] = stored if nodata is None else nodata
-        transform = rasterio.transform.from_origin(705000, 4334100, 30, 30)
-        with rasterio.open(path, "w", **profile, nodata=nodata, transform=transform) as sink:
-            sink.write(values, 1)
-            sink.scales = [1.0 if dtype == "float32" else 1e-4]
-        for chunks in (None, {}):
-            found = fifesim.open_image(path, chunks=chunks)
-            assert (found.chunks is not None) == (chunks is not None) and "gain" not in found.coords
-            np.testing.assert_allclose(found[0, 1], 0.25, rtol=1e-7)
-            assert np.isnan(found[0, 0, 0]) == (nodata is not None)
-
-
 def test_nodata_value_is_taken_from_the_raster(write):
     """A mask of zeros and ones has no cell without data; floating-point rasters have NaN by default."""
     grid = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 120.0, 90.0, 30.0)

@@ -63,13 +63,8 @@ def check_refused_everywhere(path, reason, error=ValueError):
         assert len(str(said.value)) <= 500 and str(said.value).isprintable()
 
 
-def write_mosaic(path, source, relative=0):
-    path.write_text(
-        f'<VRTDataset rasterXSize="60" rasterYSize="60"><SRS>EPSG:26914</SRS>'
-        "<GeoTransform>707900,10,0,4332100,0,-10</GeoTransform>"
-        f'<VRTRasterBand dataType="Float32" band="1"><SimpleSource><SourceFilename relativeToVRT="{relative}">'
-        f"{source}</SourceFilename><SourceBand>1</SourceBand></SimpleSource></VRTRasterBand></VRTDataset>"
-    )
+def write_mosaic(path, source, relative="0"):
+    path.write_text(FOREIGN["templates"]["mosaic"].replace("SOURCE", source).replace("RELATIVE", relative))
     return str(path)
 
 
@@ -93,27 +88,19 @@ def server():
         yield f"http://127.0.0.1:{listening.getsockname()[1]}/x.tif", asked
 
 
-def tms(address):
-    return (
-        f'<GDAL_WMS><Service name="TMS"><ServerUrl>{address}?${{z}}</ServerUrl></Service><DataWindow><UpperLeftX>707900'
-        "</UpperLeftX><UpperLeftY>4332100</UpperLeftY><LowerRightX>708500</LowerRightX><LowerRightY>4331500"
-        "</LowerRightY><SizeX>60</SizeX><SizeY>60</SizeY><TileLevel>0</TileLevel></DataWindow><Projection>EPSG:26914"
-        "</Projection><BandsCount>1</BandsCount></GDAL_WMS>"
-    )
-
-
 def test_no_request_is_sent_unless_allowed(tmp_path, server):
     address, asked = server
-    (tmp_path / "tms.tif").write_text(tms(address))
+    tms = FOREIGN["templates"]["server"].replace("ADDRESS", address)
+    (tmp_path / "tms.tif").write_text(tms)
     beside = write(tmp_path / "beside.tif")
-    (tmp_path / "beside.tif.msk").write_text(tms(address))
+    (tmp_path / "beside.tif.msk").write_text(tms)
     mosaics = [
         write_mosaic(tmp_path / "curl.vrt", f"/vsicurl/{address}"),
-        write_mosaic(tmp_path / "tms.vrt", "tms.tif", relative=1),
-        write_mosaic(tmp_path / "nested.vrt", "curl.vrt", relative=1),
+        write_mosaic(tmp_path / "tms.vrt", "tms.tif", relative="1"),
+        write_mosaic(tmp_path / "nested.vrt", "curl.vrt", relative="1"),
     ]
     virtual = [f"/vsicurl/{address}", f"/vsizip//vsicurl/{address}/a.tif", "/vsis3/bucket/a.tif"]
-    for path in (address, tms(address), str(tmp_path / "tms.tif"), beside, *virtual, *mosaics):
+    for path in (address, tms, str(tmp_path / "tms.tif"), beside, *virtual, *mosaics):
         check_refused_everywhere(path, "allow_remote=True")
     assert not asked
     for number, door in enumerate(DOORS):
@@ -141,7 +128,7 @@ def test_lazy_tasks_keep_the_permission(tmp_path):
 
 def test_local_mosaics_and_archives_are_opened(tmp_path):
     path = write(tmp_path / "a.tif")
-    plain, packed = write_mosaic(tmp_path / "a.vrt", "a.tif", relative=1), tmp_path / "a.zip"
+    plain, packed = write_mosaic(tmp_path / "a.vrt", "a.tif", relative="1"), tmp_path / "a.zip"
     with zipfile.ZipFile(packed, "w") as archive:
         archive.write(path, "a.tif")
     for each in (plain, write_mosaic(tmp_path / "b.vrt", plain), f"/vsizip/{packed}/a.tif"):

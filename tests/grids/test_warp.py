@@ -36,14 +36,6 @@ def on_grid(raster, grid, chunks=None):
     return warp.onto_grid(open_source(raster, "lai"), grid, chunks)
 
 
-SITES = {
-    "London": fifesim.grid_at("EPSG:32630", 699000, 5710000, 3000, 3000, 30),
-    "Bern": fifesim.grid_at("EPSG:32632", 383000, 5201000, 3000, 3000, 30),
-    "Alaska": fifesim.grid_at("EPSG:32606", 466000, 7190000, 3000, 3000, 30),
-    "Kansas": fifesim.fife_site(30, window=((100, 200), (100, 200))),
-}
-
-
 @pytest.mark.parametrize("name", FOREIGN["maps"])
 def test_cells_of_foreign_maps_are_in_the_right_place(tmp_path, name):
     """
@@ -52,7 +44,7 @@ def test_cells_of_foreign_maps_are_in_the_right_place(tmp_path, name):
     Geodetic latitude is used on spheres: y is the radius times the latitude. The tolerance is 0.5 m.
     """
     crs, equal, site = FOREIGN["maps"][name].values()
-    grid = SITES[site]
+    grid = fifesim.grid_at(*FOREIGN["sites"][site], 3000, 3000, 30)
     place = grids.coordinates(grid)
     x, y = np.meshgrid(place["x"].values, place["y"].values)
     if isinstance(equal, float):
