@@ -2,7 +2,6 @@
 
 import importlib.util
 import os
-import socket
 import warnings
 
 import numba
@@ -18,17 +17,13 @@ from fifesim.base.files import check_regular, in_a_line, read_toml, shown, whole
 from fifesim.base.messages import is_quiet, nearest, quiet, warn
 
 
-def test_only_regular_files_are_opened(tmp_path, monkeypatch):
+def test_only_regular_files_are_opened(tmp_path):
     """Opening a pipe without a writer would block for ever."""
     os.mkfifo(tmp_path / "pipe")
-    with socket.socket(socket.AF_UNIX) as listening:
-        # Use a relative path, because the path of a socket is limited to 107 characters.
-        monkeypatch.chdir(tmp_path)
-        listening.bind("socket")
-        for name, kind in (("pipe", "a pipe"), (".", "a folder"), ("/dev/null", "a device"), ("socket", "a socket")):
-            for read in (check_regular, read_toml):
-                with pytest.raises(ValueError, match=f"is {kind}: name a file"):
-                    read(tmp_path / name)
+    for name, kind in (("pipe", "a pipe"), ("", "a folder"), ("/dev/null", "a device")):
+        for read in (check_regular, read_toml):
+            with pytest.raises(ValueError, match=f"is {kind}: name a file"):
+                read(tmp_path / name)
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with pytest.raises(OSError, match="loop"):
         check_regular(tmp_path / "loop")

@@ -154,28 +154,22 @@ def test_calibration_goes_with_digital_numbers_of_all_bands_or_one(image, toa, w
 
 @pytest.mark.parametrize("kind", ["netcdf", "zarr"])
 def test_netcdf_and_zarr_keep_crs_and_names(image, tmp_path, kind):
-    raster, path = image, tmp_path / "image"
-    if kind == "netcdf":
-        raster.to_netcdf(path)
-        opened = xr.open_dataset(path, decode_coords="all", mask_and_scale=False)
-    else:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("error", "The data type .* does not have a Zarr V3 spec")
-            raster.to_dataset().to_zarr(path, consolidated=False)
-        opened = xr.open_zarr(path, decode_coords="all", mask_and_scale=False, consolidated=False)
-    with opened:
-        again = opened[raster.name].load()
-    assert again.encoding["grid_mapping"] == "spatial_ref" and again.rio.crs == raster.rio.crs
-    assert cf.attributes(raster.name).items() <= again.attrs.items()
-    np.testing.assert_array_equal(again, raster)
-    for coordinate in raster.coords:
-        np.testing.assert_array_equal(again[coordinate], raster[coordinate])
-        assert raster[coordinate].attrs.items() <= again[coordinate].attrs.items()
-    if kind == "netcdf":
-        # By default xarray masks the fill value and converts the counts to floating point.
-        with xr.open_dataset(path, decode_coords="all") as masked:
-            for each in (again, masked["dn"]):
-                np.testing.assert_array_equal(each.fifesim.ndvi(), image.fifesim.ndvi())
+    path = tmp_path / "image"
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", "The data type .* does not have a Zarr V3 spec")
+        image.to_dataset().to_zarr(path, consolidated=False) if kind == "zarr" else image.to_netcdf(path)
+    options = {"decode_coords": "all"} | ({"engine": "zarr", "consolidated": False} if kind == "zarr" else {})
+    # By default xarray masks the fill value and converts the counts to floating point.
+    for masked in (True, False):
+        with xr.open_dataset(path, mask_and_scale=masked, **options) as opened:
+            again = opened["dn"].load()
+        np.testing.assert_array_equal(again.fifesim.ndvi(), image.fifesim.ndvi())
+    assert again.encoding["grid_mapping"] == "spatial_ref" and again.rio.crs == image.rio.crs
+    np.testing.assert_array_equal(again, image)
+    assert cf.attributes("dn").items() <= again.attrs.items()
+    for name in image.coords:
+        np.testing.assert_array_equal(again[name], image[name])
+        assert image[name].attrs.items() <= again[name].attrs.items()
 
 
 def test_nodata_value_is_taken_from_the_raster(write):
