@@ -1,6 +1,5 @@
-"""Spectral bands, solar irradiance and digital numbers; directions of the sun and sensor, dates and times."""
+"""Spectral bands, solar irradiance and digital numbers; directions of the sun and sensor."""
 
-from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +22,6 @@ from fifesim.base.bands import (
     solar_spectrum,
 )
 from fifesim.base.geometry import Geometry, angle_between, relative_azimuth, scattering_angle_cosine, sun_geometry
-from fifesim.base.times import utc
 
 BOX = Band("box", (0.6, 0.6001, 0.6999, 0.7), (0.0, 1.0, 1.0, 0.0))
 
@@ -140,14 +138,3 @@ def test_angles_between_directions_match_the_unit_vectors():
     assert angle_between(33.0, 10.0, 33.0, 370.0) < 1e-12
     scattered = scattering_angle_cosine(zenith[0], zenith[1], relative_azimuth(azimuth[0], azimuth[1]))
     np.testing.assert_allclose(scattered, -cosine, rtol=0, atol=1e-12)
-
-
-def test_time_without_zone_is_utc_and_other_times_are_converted():
-    kansas = timezone(timedelta(hours=-5))
-    for time in (
-        *("1987-06-06T16:35:00", "1987-06-06 16:35", "1987-06-06T16:35:00.0Z", "19870606T1635", " 1987-06-06T16:35Z "),
-        *("1987-06-06T11:35:00-05:00", datetime(1987, 6, 6, 16, 35), datetime(1987, 6, 6, 11, 35, tzinfo=kansas)),
-    ):
-        assert utc(time).tolist() == [pd.Timestamp("1987-06-06T16:35Z")]
-    for time in ("1957-01-01T00:00", "2099-12-31T23:59"):
-        assert utc(time)[0] == pd.Timestamp(time, tz="UTC")

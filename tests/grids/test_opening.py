@@ -16,13 +16,11 @@ import rasterio
 import rasterio.shutil
 import rasterio.vrt
 import rioxarray
-import xarray as xr
 from affine import Affine
 from rasterio.control import GroundControlPoint
 from rasterio.enums import ColorInterp
 
 import fifesim
-from fifesim.grids import grid as grids
 from fifesim.grids import opening
 from fifesim.grids.opening import covering_grid
 
@@ -251,16 +249,6 @@ def test_header_of_another_file_does_not_make_a_raster_raw_bytes(tmp_path, drive
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         np.testing.assert_array_equal(fifesim.open_lai(kept, GRID), 3.0)
-
-
-def test_map_with_flags_among_its_numbers_is_scaled():
-    """As of MODIS, whose codes above the valid range are explained by flags."""
-    around = GRID.pad(60)
-    stored = np.full(around.shape, 23, np.uint8)
-    stored[:70] = 250
-    attrs = {"scale_factor": 0.1, "valid_range": [0, 100], "_FillValue": 255, "flag_values": 250}
-    found = fifesim.open_lai(grids.place(xr.DataArray(stored, dims=("y", "x"), attrs=attrs), around), GRID)
-    assert np.isnan(found[:10]).all() and float(abs(found[11:] - 2.3).max()) < 1e-12
 
 
 @pytest.mark.parametrize("bring", [fifesim.open_lai, fifesim.fine_dem])
