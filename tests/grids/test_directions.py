@@ -23,11 +23,6 @@ def ramp(low, high):
     return raster().copy(data=np.broadcast_to(np.linspace(low, high, 3), (2, 3)))
 
 
-@pytest.fixture
-def scan():
-    return xr.Dataset({"sza": 40.0, "saa": 120.0, "vza": ramp(0.0, 30.0), "vaa": 280.0})
-
-
 def test_uniform_directions_are_scalar_coordinates():
     with no_compute():
         carried = directions.with_geometry(in_chunks(raster(), {"y": 1}), SUN)
@@ -47,7 +42,8 @@ def test_azimuths_count_from_grid_north():
     assert (turned[0].sza, turned[0].vza, turned[0].earth_sun_distance) == (28.5, 3.0, 1.0147)
 
 
-def test_angles_by_cell_are_a_dataset_and_are_carried(scan):
+def test_angles_by_cell_are_a_dataset_and_are_carried():
+    scan = xr.Dataset({"sza": 40.0, "saa": 120.0, "vza": ramp(0.0, 30.0), "vaa": 280.0})
     found = directions.checked_geometry(scan)
     assert directions.varying(found) == ("vza",) and float(found["earth_sun_distance"]) == 1.0
     again = directions.geometry_of(directions.with_geometry(raster(), found))
