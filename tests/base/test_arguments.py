@@ -127,12 +127,10 @@ def valid_calls(scene):
     """Arguments with which each public function works."""
     shared, given = resolved(TABLE["shared"], scene), resolved(TABLE["functions"], scene)
     assert set(given) <= set(CHECKED)
-    return {
-        name: {key: shared[key] for key in required_arguments(name) & set(shared)}
-        | default_arguments(name)
-        | given.get(name, {})
-        for name in CHECKED
-    }
+    needed = {name: {key: shared[key] for key in required_arguments(name) & set(shared)} for name in CHECKED}
+    calls = {name: needed[name] | default_arguments(name) | given.get(name, {}) for name in CHECKED}
+    assert [f"{name}: {lacks}" for name, call in calls.items() if (lacks := required_arguments(name) - set(call))] == []
+    return calls
 
 
 @pytest.fixture(scope="module")
@@ -172,12 +170,6 @@ def names_argument(text, argument, kind):
     also = TABLE["named"].get(argument, ())
     words = argument.lower(), stem.lower(), "there is no file or folder", *others, *also
     return any(word in text.lower() for word in words)
-
-
-def test_every_public_function_has_a_valid_call(valid_calls):
-    assert [
-        f"{name}: {missing}" for name in valid_calls if (missing := required_arguments(name) - set(valid_calls[name]))
-    ] == []
 
 
 @pytest.mark.parametrize("name", CHECKED)

@@ -54,7 +54,7 @@ def test_site_is_15_km_wide_and_coordinates_are_cell_centres():
 
 def test_scenes_on_the_site_are_marked():
     """A square of 300 m is shifted from the middle of the site."""
-    inside, beyond = [(0, 0), (7000, 7000)], [(8500, 0), (-8500, 0), (0, 8500), (0, -8500)]
+    inside, beyond = [(0, 0), (7450, 7450)], [(7600, 0), (-7600, 0), (0, 7600), (0, -7600)]
     for east, north in inside + beyond:
         grid = fifesim.grid_at("EPSG:26914", 712470 + east - 150, 4326720 + north + 150, 300, 300, 30)
         lai, known = fifesim.lai_scene(grid), (east, north) in inside

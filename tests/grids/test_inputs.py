@@ -161,10 +161,9 @@ def test_paths_that_are_no_regular_file_are_rejected_without_waiting(tmp_path):
 
 def test_rasters_without_numbers_or_location_are_rejected(tmp_path):
     for number, given in enumerate(FOREIGN["odd"]):
-        profile = {key: value or None if key == "crs" else value for key, value in given.items() if key != "said"}
-        if "transform" in profile:
-            profile["transform"] = Affine(*profile["transform"]) if profile["transform"] else None
-        profile["scales"] = profile.pop("scale", 1.0)
+        profile = {key: value for key, value in given.items() if key not in ("said", "none")}
+        profile |= {"transform": Affine(*given["transform"])} if "transform" in given else {}
+        profile |= dict.fromkeys(given.get("none", []))
         check_refused_everywhere(write(tmp_path / f"{number}.tif", **profile), rf"{number}\.tif.*{given['said']}")
     for angle in (90, 180, 20):
         turned = Affine.translation(708000, 4332000) @ Affine.rotation(angle) @ Affine.scale(10, -10)
@@ -185,31 +184,18 @@ def test_vertical_crs_and_nodata_value_outside_the_dtype_are_ignored(tmp_path):
     assert (fifesim.open_image(tmp_path / "marked.vrt") == 3).all()
 
 
-IN_DEGREES = Affine(0.0002, 0, -96.6, 0, -0.0002, 39.12)
-IN_METRES = Affine(10, 0, 709003, 0, -10, 4332001)
-MODIS, ON_SPHERE = "+proj=sinu +R=6371007.181 +units=m", Affine(10, 0, -8334000, 0, -10, 4343000)
-
-
-@pytest.mark.parametrize(
-    ("affine", "own", "asked", "epsg"),
-    [
-        (IN_DEGREES, 4326, None, 32614),
-        (IN_METRES, 26914, None, 26914),
-        (IN_METRES, 26914, "EPSG:5070", 5070),
-        (IN_DEGREES, 4269, None, 26914),
-        (ON_SPHERE, MODIS, None, 32614),
-    ],
-)
-def test_covering_grid_covers_the_file_in_whole_pixels(tmp_path, affine, own, asked, epsg):
-    path = write(tmp_path / "lai.tif", transform=affine, crs=own)
-    grid = covering_grid(path, 10 / 3, 30.0, asked)
-    a, box = grid.affine, grid.boundingbox
-    assert grid.crs.epsg == epsg
-    assert a.c % 30 == 0 and a.f % 30 == 0 and grid.shape.x % 9 == 0 and grid.shape.y % 9 == 0
-    corners = np.array([affine * corner for corner in [(0, 0), (60, 0), (0, 60), (60, 60)]])
-    x, y = pyproj.Transformer.from_crs(own, epsg, always_xy=True).transform(*corners.T)
-    assert box.left <= x.min() < box.left + 31 and box.right - 31 < x.max() <= box.right
-    assert box.bottom <= y.min() < box.bottom + 31 and box.top - 31 < y.max() <= box.top
+def test_covering_grid_covers_the_file_in_whole_pixels(tmp_path):
+    for case in FOREIGN["covering"]:
+        affine = Affine(*case["transform"])
+        path = write(tmp_path / "lai.tif", transform=affine, crs=case["crs"])
+        grid = covering_grid(path, 10 / 3, 30.0, case.get("asked"))
+        a, box = grid.affine, grid.boundingbox
+        assert grid.crs.epsg == case["epsg"]
+        assert a.c % 30 == 0 and a.f % 30 == 0 and grid.shape.x % 9 == 0 and grid.shape.y % 9 == 0
+        corners = np.array([affine * corner for corner in [(0, 0), (60, 0), (0, 60), (60, 60)]])
+        x, y = pyproj.Transformer.from_crs(case["crs"], case["epsg"], always_xy=True).transform(*corners.T)
+        assert box.left <= x.min() < box.left + 31 and box.right - 31 < x.max() <= box.right
+        assert box.bottom <= y.min() < box.bottom + 31 and box.top - 31 < y.max() <= box.top
     for crs, said in (("EPSG:4326", "must be projected"), ("EPSG:2193", "EPSG:2193"), ("EPSG:3857", "the scale of")):
         with pytest.raises(ValueError, match=said):
             covering_grid(path, 10.0, 30.0, crs)

@@ -149,11 +149,6 @@ def test_finer_files_are_averaged(tmp_path, times):
     np.testing.assert_array_equal(on_grid(path, grid, chunks=13), whole)
 
 
-def test_number_of_file_cells_read_at_once_is_limited():
-    assert warp._block_size(warp._MUCH_FINER, 512) == 512
-    assert [warp._block_size(cells, 512) for cells in (7, 64, 65, 2048, 1e6, np.nan)] == [32, 32, 16, 1, 1, 32]
-
-
 @pytest.mark.parametrize("south_up", [False, True])
 @pytest.mark.parametrize(("crs", "affine"), [("EPSG:26914", METRES), ("EPSG:4326", DEGREES)])
 def test_array_is_warped_like_its_file(tmp_path, crs, affine, south_up):
