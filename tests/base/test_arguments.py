@@ -52,7 +52,7 @@ def required_arguments(name):
 def reflectance_spectra(grid):
     """Reflectance spectra of the cells of a grid."""
     wavelength = np.linspace(0.4, 2.4, 201)
-    values = np.broadcast_to(np.linspace(0.05, 0.4, 201)[:, None, None], (201, *grid.shape)).copy()
+    values = np.linspace(0.05, 0.4, 201)[:, None, None] * np.ones(grid.shape)
     cells = grids.place(xr.DataArray(values, dims=("wavelength", "y", "x"), name="surface_reflectance"), grid)
     return cells.assign_coords(wavelength=wavelength)
 

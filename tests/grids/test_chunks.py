@@ -310,7 +310,6 @@ def test_block_sums_are_added_in_order():
     """Ones added singly to 1e16 are lost in rounding; ones summed beforehand are not."""
     data = np.array([[1e16, *[1.0] * 62, -1e16]])
     assert sums_by_block(lambda cells, margin: cells[0], data, (1,), 1).tolist() == [0.0]
-    assert data.sum() != 0
 
 
 FINE = fifesim.grid_at("EPSG:26914", 705600.0, 4334000.0, 120.0, 90.0, 3.0)

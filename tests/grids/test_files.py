@@ -65,8 +65,6 @@ def test_large_geotiff_has_overviews(write):
 def test_gdal_reads_location_bands_and_calibration(image, write):
     bands = fifesim.instrument("TM").select(["TM2", "TM3", "TM4"])
     with rasterio.open(write(image, tags={"PROJECT": "trial"})) as source:
-        structure = source.tags(ns="IMAGE_STRUCTURE")
-        assert (structure["LAYOUT"], structure["COMPRESSION"]) == ("COG", "DEFLATE")
         np.testing.assert_array_equal(source.read(), image)
         assert source.crs.to_epsg() == 26914
         np.testing.assert_allclose(source.transform, grids.geobox(image).affine, rtol=0, atol=1e-6)
@@ -305,23 +303,20 @@ def test_dates_of_a_composite_survive_a_round_trip(composite, write, open_change
         open_changed(copy)
 
 
-GOOD = {"name": "lai", "dims": ["y", "x"], "attrs": {}, "coords": {}}
-NUMBER = {"dims": [], "values": 1.0, "dtype": "<f8", "attrs": {}}
-
 BAD_TEXTS = ["1", "[1]", "null", "[" * 200_000, "x" * 1_000_001, '"\x1b[2J"', '{"name": "lai"}']
 
 
 def test_foreign_tag_is_rejected_with_the_file_name(truth, write):
-    path = write(truth["lai"])
+    path, (valid, number, changes, coordinates) = write(truth["lai"]), FOREIGN["tags"].values()
 
     def tagged(text):
         with rasterio.open(path, "r+", IGNORE_COG_LAYOUT_BREAK="yes") as sink:
             sink.update_tags(**{tags.TAG: text})
         return fifesim.open_image(path)
 
-    assert float(tagged(json.dumps(GOOD | {"coords": {"sza": NUMBER}}))["sza"]) == 1.0
-    bad = FOREIGN["tags"]["changes"] + [{"coords": {"sza": NUMBER | each}} for each in FOREIGN["tags"]["coordinates"]]
-    for text in BAD_TEXTS + [json.dumps(GOOD | each) for each in bad]:
+    assert float(tagged(json.dumps(valid | {"coords": {"sza": number}}))["sza"]) == 1.0
+    changes += [{"coords": {"sza": number | each}} for each in coordinates]
+    for text in BAD_TEXTS + [json.dumps(valid | each) for each in changes]:
         with pytest.raises(ValueError, match=r"a\.tif has a tag FIFESIM .*rioxarray\.open_rasterio") as said:
             tagged(text)
         assert len(str(said.value)) <= 500 and str(said.value).isprintable(), text[:100]
