@@ -315,7 +315,7 @@ def test_foreign_tag_is_rejected_with_the_file_name(truth, write):
         return fifesim.open_image(path)
 
     assert float(tagged(json.dumps(valid | {"coords": {"sza": number}}))["sza"]) == 1.0
-    changes += [{"coords": {"sza": number | each}} for each in coordinates]
+    changes = changes + [{"coords": {"sza": number | each}} for each in coordinates]
     for text in BAD_TEXTS + [json.dumps(valid | each) for each in changes]:
         with pytest.raises(ValueError, match=r"a\.tif has a tag FIFESIM .*rioxarray\.open_rasterio") as said:
             tagged(text)
