@@ -459,6 +459,17 @@ def test_each_class_has_the_values_of_its_kernel(monkeypatch, lai, cover, kernel
     np.testing.assert_array_equal(made, expected)
 
 
+def test_classes_with_the_same_kernel_are_evaluated_together(lai):
+    """The third class and cells without a class may be absent."""
+    for codes in ([1, 5], [-1, 1, 5], [1, 5, 9], [-1, 1, 5, 9]):
+        calls = []
+        both = (lambda cells, calls=calls: calls.append(cells.size) or np.sqrt(cells), [])
+        cover = lai.copy(data=np.random.default_rng(3).choice(codes, lai.shape).astype(np.int16))
+        made = by_class({1: both, 5: both, 9: (np.negative, [])}, cover, lai)
+        np.testing.assert_array_equal(made, np.where(cover == 9, -lai, np.where(cover == -1, np.nan, np.sqrt(lai))))
+        assert calls == [int(cover.isin([1, 5]).sum())]
+
+
 def test_code_without_a_kernel_raises_when_computed(lai, cover):
     lazy = by_class({1: (np.sqrt, []), 5: (np.sqrt, [])}, in_chunks(cover, CHUNKS), lai)
     with pytest.raises(ValueError, match="codes without a class: 9"):
