@@ -267,7 +267,7 @@ def test_scale_error_above_one_percent_gives_one_warning_per_location():
     with pytest.warns(UserWarning, match=r"of EPSG:3857 is 1.02 near .* 30 m is 29.\d m on the ground.*EPSG:32735"):
         grid = fifesim.grid_at(north=-1.2e6, **mercator)
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error", UserWarning)
         grids.check_grid(grid)
         fifesim.grid_at(north=-0.5e6, **mercator)
         for cell in (10 / 3, 30 / 9, 2.5, 25):
