@@ -1,13 +1,17 @@
-"""Results appear under their names only when all are complete; other files stay untouched."""
+"""Results appear under their names only when all are complete, other files stay untouched, and damaged blocks are found."""
 
 import multiprocessing
 import os
-import signal
+import time
 from pathlib import Path
 
+import dask.array as da
+import numpy as np
 import pytest
 
+from fifesim.output import blocks
 from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, results
+from fifesim.output.identity import NotThisRun
 
 NAMES = ("one.txt", "two.txt")
 
@@ -58,19 +62,16 @@ def write_new_run(folder, **options):
             (hidden / name).write_text("new")
 
 
-def write_old_run(folder):
-    (folder / "store").mkdir(parents=True)
-    for name in ("store/part", "one.txt", "mark", "stale", "one.txt.aux.xml"):
-        (folder / name).write_text("old")
-    return all_files(folder)
-
-
 def all_files(folder):
     found = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
     return {name: path.read_text() for name, path in found.items() if not name.startswith(UNFINISHED)}
 
 
-NEW = {"store/part": "new", "one.txt": "new", "mark": "new"}
+def write_old_run(folder):
+    (folder / "store").mkdir(parents=True)
+    for name in ("store/part", "one.txt", "mark", "stale", "one.txt.aux.xml"):
+        (folder / name).write_text("old")
+    return all_files(folder)
 
 
 @pytest.mark.parametrize("number", range(1, 9))
@@ -85,7 +86,8 @@ def test_run_killed_between_moves_leaves_no_mix_of_two_runs(tmp_path, monkeypatc
     # The first move removes the old mark; the last one adds the new mark.
     assert ("mark" in found) == (number == 1)
     write_new_run(out, resume=True)
-    assert all_files(out) == NEW and not (out / UNFINISHED).exists()
+    assert all_files(out) == {"store/part": "new", "one.txt": "new", "mark": "new"}
+    assert not (out / UNFINISHED).exists()
 
 
 def test_results_are_on_the_disk_before_their_mark(tmp_path, monkeypatch):
@@ -111,7 +113,7 @@ def test_error_between_moves_restores_the_old_results(tmp_path, monkeypatch, num
     assert all_files(out) == old and not (out / UNFINISHED).exists()
 
 
-@pytest.mark.parametrize("error", [ValueError, OSError, KeyboardInterrupt])
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
 def test_error_leaves_the_folder_unchanged(tmp_path, error):
     write(tmp_path / "there", "old")
     for name in ("there", "new"):
@@ -175,36 +177,28 @@ def test_folder_in_use_is_rejected_with_the_option_to_use(tmp_path, held, option
     assert all((tmp_path / name).read_text() == "kept" for name in held)
 
 
-def hold_folder(folder, ready, end):
-    with results(folder, NAMES, overwrite=True) as hidden:
-        for name in NAMES:
-            (hidden / name).write_text("first")
+def hold_folder(folder, ready):
+    with results(folder, NAMES, overwrite=True):
         ready.set()
-        end.wait(60)
+        time.sleep(60)
 
 
-@pytest.fixture
-def rival(tmp_path):
-    """A process that holds the folder until it receives the signal to end."""
-    spawn = multiprocessing.get_context("spawn")
-    ready, end = spawn.Event(), spawn.Event()
-    process = spawn.Process(target=hold_folder, args=(tmp_path / "out", ready, end))
+def test_second_run_in_a_folder_is_rejected_until_the_first_ends_or_is_killed(tmp_path):
+    out, spawn = tmp_path / "out", multiprocessing.get_context("spawn")
+    ready = spawn.Event()
+    process = spawn.Process(target=hold_folder, args=(out, ready))
     process.start()
-    assert ready.wait(60)
-    yield process, end
-    process.kill()
-    process.join()
-
-
-def test_second_run_in_a_folder_is_rejected_and_names_the_first(tmp_path, rival):
-    process, end = rival
-    for options in ({"overwrite": True}, {"overwrite": False}, {"overwrite": False, "resume": True}):
-        for attempt in (check_folder, lambda folder, **options: write(folder, "second", **options)):
-            with pytest.raises(ValueError, match=f"in use by process {process.pid} on "):
-                attempt(tmp_path / "out", **options)
-    end.set()
-    process.join(60)
-    assert contents(tmp_path / "out") == dict.fromkeys(NAMES, "first")
+    try:
+        assert ready.wait(60)
+        for options in ({"overwrite": True}, {"overwrite": False}, {"overwrite": False, "resume": True}):
+            for attempt in (check_folder, lambda folder, **options: write(folder, "second", **options)):
+                with pytest.raises(ValueError, match=f"in use by process {process.pid} on "):
+                    attempt(out, **options)
+    finally:
+        process.kill()
+        process.join(60)
+    write(out, "second")
+    assert contents(out) == dict.fromkeys(NAMES, "second")
 
 
 @pytest.mark.parametrize("name", ["lock", "holder", "block", "blocks/dn"])
@@ -246,9 +240,68 @@ def test_finished_run_needs_all_its_files(tmp_path):
     assert not (tmp_path / UNFINISHED).exists()
 
 
-def test_killed_run_releases_its_folder(tmp_path, rival):
-    process, _ = rival
-    os.kill(process.pid, signal.SIGKILL)
-    process.join(60)
-    write(tmp_path / "out", "second")
-    assert contents(tmp_path / "out") == dict.fromkeys(NAMES, "second")
+CELLS = np.random.default_rng(2).random((2, 7, 9))
+CELLS[:, :4, :5] = 0
+
+
+@pytest.fixture
+def array():
+    return da.from_array(CELLS, chunks=(2, 4, 5))
+
+
+def save(folder, array, *indices):
+    saved = blocks.block_store(folder, {"image": array})["image"]
+    for index in indices:
+        blocks.save_block(saved, index, array.blocks[index].compute())
+    return saved
+
+
+def saved_blocks(folder, array):
+    saved = save(folder, array)
+    return {index for index in np.ndindex(array.numblocks) if blocks.is_saved(saved, index)}
+
+
+def test_saved_blocks_form_the_original_array(tmp_path, array):
+    """A block of zeros is saved too, which Zarr leaves out by default."""
+    save(tmp_path, array, (0, 0, 0), (0, 1, 0))
+    assert saved_blocks(tmp_path, array) == {(0, 0, 0), (0, 1, 0)}
+    for other in (array.astype("float32"), array.rechunk((2, 4, 4))):
+        assert saved_blocks(tmp_path, other) == set()
+    saved = save(tmp_path, array, *np.ndindex(array.numblocks))
+    found = blocks.saved_array(saved)
+    assert found.chunks == (*array.chunks[:-1], (9,)) and found.dtype == array.dtype
+    np.testing.assert_array_equal(found.compute(), CELLS)
+
+
+@pytest.mark.parametrize("kept", [0, 60, -8, None], ids=["empty", "header", "truncated", "changed"])
+def test_incomplete_or_changed_block_is_ignored_and_not_read(tmp_path, array, kept):
+    saved = save(tmp_path, array, *np.ndindex(array.numblocks))
+    path = tmp_path / "image" / "c" / "0" / "0" / "0"
+    assert path == blocks.block_file(saved, (0, 0, 0))
+    content = bytearray(path.read_bytes()[:kept])
+    if kept is None:
+        content[-20] ^= 1
+    path.write_bytes(content)
+    (tmp_path / "image" / "zarr.json").write_bytes(b"{")
+    assert saved_blocks(tmp_path, array) == {(0, 0, 1), (0, 1, 0), (0, 1, 1)}
+    with pytest.raises(OSError, match="has changed since it was written"):
+        blocks.saved_array(saved).compute()
+    save(tmp_path, array, (0, 0, 0))
+    np.testing.assert_array_equal(blocks.saved_array(saved).compute(), CELLS)
+    path.unlink()
+    with pytest.raises(OSError, match="has changed since it was written"):
+        blocks.saved_array(saved).compute()
+
+
+def test_error_names_a_block_that_cannot_be_written(tmp_path, array):
+    (tmp_path / "image" / "c" / "0" / "0" / "0").mkdir(parents=True)
+    with pytest.raises(OSError, match="image/c/0/0/0"):
+        save(tmp_path, array, (0, 0, 0))
+
+
+def test_partial_run_is_kept_if_it_has_blocks_and_can_be_resumed(tmp_path, array):
+    save(tmp_path / "blocks", array)
+    assert not blocks.has_blocks(tmp_path, OSError())
+    save(tmp_path / "blocks", array, (0, 0, 0))
+    assert blocks.has_blocks(tmp_path, OSError()) and blocks.has_blocks(tmp_path, KeyboardInterrupt())
+    assert blocks.has_blocks(tmp_path, NotThisRun()) and not blocks.has_blocks(tmp_path, ValueError())
