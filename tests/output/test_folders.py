@@ -1,4 +1,4 @@
-"""Results appear under their names only when all are complete, other files stay untouched, and damaged blocks are found."""
+"""Results appear only when all are complete, other files stay untouched, and damaged blocks are found."""
 
 import multiprocessing
 import os
