@@ -205,7 +205,7 @@ def test_changed_files_of_a_finished_run_are_made_again(tmp_path, run_without_pi
 
 
 def test_unfinished_run_refuses_another_scenario_and_recomputes_a_changed_chunk(
-    folder, tmp_path, monkeypatch, run_without_pictures
+    tmp_path, monkeypatch, run_without_pictures
 ):
     def full(*given):
         raise OSError("disk full")
@@ -213,16 +213,20 @@ def test_unfinished_run_refuses_another_scenario_and_recomputes_a_changed_chunk(
     out, scenario = tmp_path / "out", parse_scenario(SMALL)
     with monkeypatch.context() as broken, pytest.raises(OSError, match=r"disk full.*--resume"):
         broken.setattr(run_folder, "_write_files", full)
-        run_without_pictures(scenario, out)
+        run_without_pictures(scenario, out, scene=True)
     with pytest.raises(ValueError, match=r"the unfinished run has another scenario, with arp = 0\.24, seed = 3"):
-        run_without_pictures(parse_scenario({**SMALL, "ground": {"arp": 0.15, "seed": 4}}), out, resume=True)
-    block = out / UNFINISHED / "blocks" / "image" / "c" / "0" / "0" / "0"
+        run_without_pictures(
+            parse_scenario({**SMALL, "ground": {"arp": 0.15, "seed": 4}}), out, scene=True, resume=True
+        )
+    block = out / UNFINISHED / "blocks" / "scene-lai" / "c" / "0" / "0"
     block.write_bytes(block.read_bytes()[:-1] + bytes([block.read_bytes()[-1] ^ 1]))
-    (out / UNFINISHED / "blocks" / "image" / "zarr.json").write_bytes(b"{}")
+    (out / UNFINISHED / "blocks" / "scene-lai" / "zarr.json").write_bytes(b"{}")
     # Left by a run that was killed while it wrote the files.
-    (out / UNFINISHED / "image.tif").write_bytes(b"half")
-    run_without_pictures(scenario, out, resume=True)
-    assert (out / "image.tif").read_bytes() == (folder / "image.tif").read_bytes()
+    (out / UNFINISHED / "scene.zarr" / "lai").mkdir(parents=True)
+    (out / UNFINISHED / "scene.zarr" / "lai" / "0.1").write_bytes(b"half")
+    for name in ("out", "whole"):
+        run_without_pictures(scenario, tmp_path / name, scene=True, resume=name == "out")
+    xr.testing.assert_identical(*(xr.open_zarr(tmp_path / name / "scene.zarr").load() for name in ("out", "whole")))
 
 
 def test_estimate_counts_cells_and_pixels_of_the_scenario(monkeypatch):

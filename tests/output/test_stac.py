@@ -1,4 +1,4 @@
-"""STAC items and collections are valid and agree with the files."""
+"""Other programs open the files and the STAC item of a run at the right location and with the right values."""
 
 import hashlib
 import json
@@ -6,8 +6,10 @@ import json
 import numpy as np
 import pytest
 import rasterio
+import xarray as xr
 from rasterio.warp import transform, transform_bounds
 
+import fifesim
 from fifesim.output import stac
 from fifesim.scenario.scenario import parse_scenario
 
@@ -88,22 +90,6 @@ def test_bands_of_the_item_match_the_file(item, small_run):
     assert {band["nodata"] for band in item["assets"]["truth"]["bands"]} == {"nan"}
 
 
-def test_bands_of_the_eo_extension_match_the_core_bands(item, pystac):
-    """Version 1.1.0 of the extension has eo:bands, which odc-stac uses to find names; version 2 does not."""
-    from pystac.extensions.eo import EOExtension
-
-    found = pystac.Item.from_dict(item)
-    for name, fields in (("image", ["name", "center_wavelength", "solar_illumination"]), ("truth", ["name"])):
-        core, extension = item["assets"][name]["bands"], item["assets"][name]["eo:bands"]
-        for field in fields:
-            core_field = field if field == "name" else f"eo:{field}"
-            assert [band[field] for band in extension] == [band[core_field] for band in core]
-        assert [band.name for band in EOExtension.ext(found.assets[name]).bands] == [band["name"] for band in core]
-    assert [band.common_name for band in EOExtension.ext(found.assets["image"]).bands] == ["green", "red", "nir"]
-    allowed = {"name", "common_name", "description", "center_wavelength", "full_width_half_max", "solar_illumination"}
-    assert all(set(band) <= allowed for asset in item["assets"].values() for band in asset.get("eo:bands", []))
-
-
 def test_footprint_encloses_the_pixels(item):
     """Quarter points of the edges, transformed by GDAL, agree to 0.1 m, counterclockwise from the southwest."""
     (ring,) = item["geometry"]["coordinates"]
@@ -149,3 +135,61 @@ def test_band_has_the_common_name_with_the_nearest_centre():
     found = [stac._spectral(coords, number) for number in (1, 2, 3)]
     assert [band["eo:common_name"] for band in found] == ["nir08", "nir", "nir09"]
     assert [band["eo:solar_illumination"] for band in found] == coords["solar_irradiance"]
+
+
+# Corner and size of the run in the scenario [m].
+WEST, NORTH, PIXEL, ROWS, COLUMNS = 704970.0, 4334220.0, 30.0, 20, 30
+
+
+def test_gdal_opens_the_files_at_the_right_location(small_run):
+    for name in ("image.tif", "truth.tif"):
+        with rasterio.open(small_run / name) as source:
+            assert (source.crs.to_epsg(), tuple(source.bounds)) == (26914, (WEST, NORTH - 600, WEST + 900, NORTH))
+    with rasterio.open(small_run / "image.tif") as source:
+        gains, offsets = (np.array(each)[:, None, None] for each in (source.scales, source.offsets))
+        radiance = fifesim.sensor.to_radiance(fifesim.open_image(small_run / "image.tif"))
+        np.testing.assert_allclose(source.read() * gains + offsets, radiance, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["image.tif", "truth.tif"])
+def test_files_are_valid_cloud_optimised_geotiffs(small_run, name):
+    cogeo = pytest.importorskip("rio_cogeo")
+    valid, errors, warnings = cogeo.cog_validate(small_run / name, strict=True)
+    assert valid, (errors, warnings)
+
+
+def test_odc_stac_loads_the_item(small_run, pystac):
+    stac = pytest.importorskip("odc.stac")
+    item = pystac.Item.from_file(str(small_run / "item.json"))
+    found = stac.load([item]).isel(time=0)
+    np.testing.assert_allclose(found["x"], WEST + 30 * (np.arange(30) + 0.5), rtol=0, atol=1e-3)
+    np.testing.assert_allclose(found["y"], NORTH - 30 * (np.arange(20) + 0.5), rtol=0, atol=1e-3)
+    assert found.rio.crs.to_epsg() == 26914
+    assert found["time"].values == np.datetime64("1987-06-06T16:35:00")
+    image, truth = (fifesim.open_image(small_run / name) for name in ("image.tif", "truth.tif"))
+    for name in ("TM2", "TM3", "TM4"):
+        np.testing.assert_array_equal(found[name], image.sel(band=name))
+        assert (found[name].dtype, found[name].attrs["nodata"]) == ("uint8", 0)
+    for name in ("lai", "fpar"):
+        np.testing.assert_array_equal(found[name], truth.sel(band=name))
+        assert np.isnan(found[name].attrs["nodata"])
+    for names in ({"image.2": "TM3"}, {"red": "TM3", "nir": "TM4"}):
+        chosen = stac.load([item], bands=list(names)).isel(time=0)
+        for name, band in names.items():
+            np.testing.assert_array_equal(chosen[name], found[band])
+
+
+def test_gdal_opens_the_cells_with_their_crs(small_run):
+    """The wheels of rasterio include the Zarr driver; a cell is a ninth of a pixel wide."""
+    with rasterio.Env() as env:
+        if "Zarr" not in env.drivers():
+            pytest.skip("this GDAL has no driver for Zarr")
+    with xr.open_zarr(small_run / "scene.zarr", decode_coords="all") as cells:
+        lai, reflectance = cells["lai"].values, cells["surface_reflectance"].values
+    with rasterio.open(f'ZARR:"{small_run}/scene.zarr":/lai') as source:
+        assert source.crs.to_epsg() == 26914
+        np.testing.assert_allclose(source.bounds, (WEST, NORTH - 600, WEST + 900, NORTH), rtol=0, atol=1e-6)
+        np.testing.assert_array_equal(source.read(1), lai)
+    with rasterio.open(f'ZARR:"{small_run}/scene.zarr":/surface_reflectance') as source:
+        assert source.crs.to_epsg() == 26914 and np.isnan(source.nodata)
+        np.testing.assert_array_equal(source.read(), reflectance)
