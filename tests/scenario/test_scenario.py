@@ -113,7 +113,7 @@ def test_numbers_may_carry_their_unit_and_seeds_are_integers_that_toml_can_hold(
         assert Shelf(length=written).length == value
     assert Shelf(step="native").step == "native" and Shelf(grain=2**63 - 1).grain == 2**63 - 1
     for wrong in ({"length": "3 ft"}, {"step": "3 ft"}, *({"grain": each} for each in (-1, 2**63, 1.0, "1", True))):
-        with pytest.raises(ValidationError, match="(length|step) is in m; write a number|grain"):
+        with pytest.raises(ValidationError, match=r"(length|step) is in m; write a number|grain"):
             Shelf(**wrong)
     lengths = {"width": "3 km", "height": "1.1km", "cell": "333 cm", "west": "709.0 km"}
     grid = parse_scenario({"grid": lengths}).grid
@@ -295,12 +295,12 @@ def test_class_without_leaf_area_takes_it_from_the_ground():
 
 
 def test_misspelt_key_does_not_hide_another_mistake(tmp_path):
-    for text, second in (
+    for wrong, second in (
         ("[sensor]\npixl = 30\nnoise = ['fixed-pattern']\n", "TM has no fixed-pattern noise for TM2"),
         ("[landscap]\ncover = 'pastures'\n[classes.a]\nshare = 0.3\n[classes.b]\n", "classes: b has no share"),
     ):
         with pytest.raises(ValueError, match="unknown key") as caught:
-            read_text(tmp_path, text)
+            read_text(tmp_path, wrong)
         first, *others = str(caught.value).splitlines()
         assert first.startswith("scenario.toml: unknown key") and len(others) == 1 and second in others[0]
 
@@ -348,7 +348,7 @@ def test_default_landscape_is_called_synthetic_in_the_readme():
 
 def test_default_bands_of_a_file_without_bands(tmp_path):
     """SuperDove has no known noise in any band; later checks name this and other mistakes."""
-    for text, bands in (
+    for given, bands in (
         ("", ["TM2", "TM3", "TM4"]),
         ("[sensor]\ninstrument = 'MSI'\n", ["MSI3", "MSI4", "MSI8"]),
         ("[sensor]\ninstrument = 'MODIS'\n", ["MODIS1", "MODIS2"]),
@@ -357,7 +357,7 @@ def test_default_bands_of_a_file_without_bands(tmp_path):
         ("[ground]\nbackground = { TM2 = 0.1, TM3 = 0.1, TM4 = 0.2 }\n", ["TM2", "TM3", "TM4"]),
         ("[sensor]\ninstrument = 'OLI'\nnoise = ['shot']\n", ["OLI3", "OLI4", "OLI5"]),
     ):
-        assert read_text(tmp_path, text).sensor.bands == bands
+        assert read_text(tmp_path, given).sensor.bands == bands
     noiseless = {"instrument": "SuperDove", "noise": ["shot"]}
     for sensor in ({"instrument": "TN"}, {"instrument": 3}, {"instrument": "missing.toml"}, "TM", noiseless):
         assert with_false_colour({"sensor": sensor}) == {"sensor": sensor}
