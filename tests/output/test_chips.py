@@ -1,6 +1,5 @@
 """Datasets of chips: complete or absent, and the same bits after interruptions and with any workers."""
 
-import json
 import multiprocessing
 import os
 import shutil
@@ -8,7 +7,6 @@ import signal
 import subprocess
 import sys
 import warnings
-from concurrent.futures import Executor, Future
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
@@ -20,12 +18,11 @@ import xarray as xr
 import zarr
 
 import fifesim
-from fifesim.output.blocks import save_block
 from fifesim.output.chips import folder as chips_folder
 from fifesim.output.chips import store
 from fifesim.output.chips.folder import dataset_to_folder, study_to_resume
-from fifesim.output.chips.makers import Makers, jobs_of, made_shards, processes
-from fifesim.output.chips.store import Shards, chip_arrays, layout_of, make_store
+from fifesim.output.chips.makers import jobs_of, made_shards, processes
+from fifesim.output.chips.store import Shards, chip_arrays, layout_of
 from fifesim.output.folders import UNFINISHED
 from fifesim.output.workers import cluster
 from fifesim.scenario.studies import Study
@@ -76,13 +73,6 @@ def interrupt_after(monkeypatch, after, error=KeyboardInterrupt):
     return made
 
 
-def interrupt(monkeypatch, study, folder, after):
-    """Interrupt the writing of a dataset after some chips."""
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        interrupt_after(patch, after)
-        dataset_to_folder(study, folder, COUNT)
-
-
 def test_function_returns_the_dataset_written_by_two_processes(small_shards, study, whole, tmp_path):
     path = tmp_path / "study.toml"
     path.write_text(study.to_toml())
@@ -115,18 +105,24 @@ def test_chip_equals_its_simulated_scenario(study, whole):
     np.testing.assert_array_equal((chips.green_fpar == chips.fpar).all(("y", "x")), chips["ground.brown"] == 0)
 
 
-# There are two chips in each shard.
-@pytest.mark.parametrize("after", [3, 6])
-def test_resumed_run_gives_the_same_bits(small_shards, after, study, whole, tmp_path, monkeypatch):
+@pytest.mark.parametrize("truncated", [False, True])
+def test_resumed_run_gives_the_same_bits(small_shards, truncated, study, whole, tmp_path, monkeypatch):
+    """Of three complete shards of two chips, a truncated one is computed again."""
     folder = tmp_path / "chips.zarr"
-    interrupt(monkeypatch, study, folder, after)
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        interrupt_after(patch, 6)
+        dataset_to_folder(study, folder, COUNT)
     assert {path.name for path in folder.iterdir()} == {UNFINISHED}
     assert study_to_resume(folder) == (study, COUNT)
     with pytest.raises(ValueError, match="has an unfinished run"):
         dataset_to_folder(study, folder, COUNT)
+    if truncated:
+        half = folder / UNFINISHED / "lai" / "c" / "1" / "0" / "0"
+        half.write_bytes(half.read_bytes()[:100])
+        (folder / UNFINISHED / "zarr.json").unlink()
     made = interrupt_after(monkeypatch, 100)
     dataset_to_folder(study, folder, COUNT, resume=True)
-    assert len(made) == COUNT - 2 * (after // 2)
+    assert len(made) == COUNT - 6 + 2 * truncated
     assert contents(folder) == contents(whole)
 
 
@@ -152,59 +148,23 @@ def test_resuming_a_finished_dataset_computes_nothing(study, whole, tmp_path, mo
         dataset_to_folder(study, folder, COUNT, resume=True)
 
 
-def test_truncated_shards_are_ignored(small_shards, study, whole, tmp_path, monkeypatch):
-    folder = tmp_path / "chips.zarr"
-    interrupt(monkeypatch, study, folder, 6)
-    hidden = folder / UNFINISHED
-    half = hidden / "lai" / "c" / "1" / "0" / "0"
-    half.write_bytes(half.read_bytes()[:100])
-    (hidden / "dn" / "c" / "2" / "0" / "0").mkdir(parents=True, exist_ok=True)
-    (hidden / "dn" / "c" / "2" / "0" / "0" / "0.1f2e.partial").write_bytes(b"half")
-    (hidden / "zarr.json").unlink()
-    dataset_to_folder(study, folder, COUNT, resume=True)
-    assert contents(folder) == contents(whole)
-
-
-def test_failed_run_leaves_no_files(study, tmp_path, monkeypatch):
-    interrupt_after(monkeypatch, 4, ValueError("cannot be"))
-    with pytest.raises(ValueError, match=r"chip \d: cannot be"):
-        dataset_to_folder(study, tmp_path / "chips.zarr", COUNT)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_earlier_dataset_is_replaced_completely(small_shards, whole, study, tmp_path):
-    folder = tmp_path / "chips.zarr"
+def test_earlier_dataset_is_replaced_completely(small_shards, whole, study, tmp_path, monkeypatch):
+    """The root, which marks a complete store, is removed first and added last."""
+    folder, replace, moved = tmp_path / "chips.zarr", os.replace, []
     dataset_to_folder(Study(study.scenario, {"vza": {"uniform": [0, 20]}}, landscapes=3), folder, 3)
     assert (folder / "geometry.vza").is_dir()
     (folder / "notes.txt").write_text("mine")
     with pytest.raises(ValueError, match="is not empty"):
         dataset_to_folder(study, folder, COUNT)
-    dataset_to_folder(study, folder, COUNT, overwrite=True)
-    assert contents(folder) == contents(whole) | {"notes.txt": b"mine"}
 
-
-@pytest.mark.parametrize("number", [1, 2, 20])
-def test_run_killed_between_moves_leaves_no_mixed_store(small_shards, whole, study, tmp_path, monkeypatch, number):
-    folder, replace, moved = tmp_path / "chips.zarr", os.replace, []
-    dataset_to_folder(Study(study.scenario, DRAWS, landscapes=3, seed=6), folder, COUNT)
-    earlier = xr.open_zarr(folder).load()
-
-    def killed(source, target):
-        moved.extend([target] * (folder in (Path(source).parent, Path(target).parent)))
-        if len(moved) >= number:
-            raise KeyboardInterrupt
+    def move(source, target):
+        moved.extend([Path(target).name] * (folder in (Path(source).parent, Path(target).parent)))
         replace(source, target)
 
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(os, "replace", killed)
-        dataset_to_folder(study, folder, COUNT, overwrite=True)
-    if number == 1:
-        xr.testing.assert_identical(xr.open_zarr(folder), earlier)
-    else:
-        with pytest.raises(FileNotFoundError):
-            xr.open_zarr(folder)
-    dataset_to_folder(study, folder, COUNT, resume=True)
-    assert contents(folder) == contents(whole)
+    monkeypatch.setattr(os, "replace", move)
+    dataset_to_folder(study, folder, COUNT, overwrite=True)
+    assert contents(folder) == contents(whole) | {"notes.txt": b"mine"}
+    assert moved[0] == moved[-1] == "zarr.json" and len(moved) > 20
 
 
 def test_invalid_study_is_reported_before_anything_is_written(study, small, tmp_path, monkeypatch):
@@ -216,15 +176,10 @@ def test_invalid_study_is_reported_before_anything_is_written(study, small, tmp_
     monkeypatch.setattr(chips_folder, "_LOOKED_AT", 1)
     with pytest.raises(ValueError, match=r"chip 59999: .*use more landscapes, so that chips are closer"):
         chips_folder._look_at(far)
+    interrupt_after(monkeypatch, 4, ValueError("cannot be"))
+    with pytest.raises(ValueError, match=r"chip \d: cannot be"):
+        dataset_to_folder(study, tmp_path / "chips.zarr", COUNT)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_drawn_file_is_an_input(tmp_path, study):
-    samples = tmp_path / "mine.csv"
-    samples.write_text("lai\n0.5\n0.7\n0.9\n1.1\n1.4\n")
-    draws = {"distribution": {"choice": ["burned-grazed", str(samples)]}}
-    chips = fifesim.scenario.chips_of(Study(study.scenario, draws, landscapes=3), 2)
-    assert list(chips_folder._inputs(chips)) == [str(samples)]
 
 
 def list_shards(length, count=30):
@@ -247,33 +202,6 @@ def test_jobs_are_ordered_by_shard_and_hills_are_computed_once_for_several_shard
     else:
         assert all(len(set(chips.landscape[job])) == 1 for job in jobs)
         assert [len(job) for job in jobs] == [4] * 6 + [1] * 6
-
-
-class Backwards(Executor):
-    """Run tasks in pairs, the second one first."""
-
-    def __init__(self):
-        self.waiting = []
-
-    def submit(self, function, *arguments):
-        future = Future()
-        self.waiting.append((future, function, arguments))
-        if len(self.waiting) == 2:
-            for each, call, given in self.waiting[::-1]:
-                each.set_result(call(*given))
-            self.waiting.clear()
-        return future
-
-
-def test_shards_equal_those_of_sequential_computation(chips_on):
-    chips, told = chips_on(8, 2), []
-    layout, shards = layout_of(chips), list_shards(4, 8)
-    assert len(jobs_of(chips, shards, [0, 1], 1)) % 2 == 0
-    found = dict(made_shards(chips, layout, shards, [0, 1], told.append, Makers(Backwards(), 1, ())))
-    assert sum(told) == 8 and set(found) == {0, 1}
-    for shard, arrays in found.items():
-        for name, values in chip_arrays(chips, range(*shards.range_of(shard)), layout).items():
-            np.testing.assert_array_equal(arrays[name], values)
 
 
 def test_killed_process_is_reported(chips_on):
@@ -305,36 +233,11 @@ def test_processes_end_with_their_parent(tmp_path):
     assert not psutil.pid_exists(int(done.stdout))
 
 
-def write_shard(folder, shard, arrays):
-    for name, values in arrays.items():
-        save_block(zarr.open_array(folder, path=name), (shard,), values)
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory, chips_on):
-    """A store of seven chips in shards of four, and the written arrays."""
-    folder = tmp_path_factory.mktemp("chips")
-    chips = chips_on(7, draws={"brown": {"choice": [0.0, 0.3]}})
-    layout, shards = layout_of(chips), Shards(7, 1, 4)
-    shards.length, shards.chunk = 4, 2
-    make_store(folder, chips, layout, shards)
-    arrays = {}
-    for shard in range(2):
-        first, last = shards.range_of(shard)
-        arrays[first] = chip_arrays(chips, range(first, last), layout)
-        write_shard(folder, shard, arrays[first])
-    return folder, chips, layout, shards, arrays
-
-
-def test_xarray_opens_the_store_without_a_warning(made):
-    folder, chips, layout, _, arrays = made
+def test_xarray_opens_the_store_without_a_warning(study, whole):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        dataset = xr.open_zarr(folder).load()
-    for name in layout.variables:
-        both = np.concatenate([arrays[0][name], arrays[4][name]])
-        np.testing.assert_array_equal(dataset[name].values, both.astype(dataset[name].dtype))
-    table = chips.table()
+        dataset = xr.open_zarr(whole).load()
+    table = fifesim.scenario.chips_of(study, COUNT).table()
     for name in table.data_vars:
         np.testing.assert_array_equal(dataset[name].values, table[name].values)
     assert set(dataset.data_vars) == {"dn", "toa_reflectance", "ndvi", "lai", "fpar", "green_fpar"}
@@ -345,34 +248,34 @@ def test_xarray_opens_the_store_without_a_warning(made):
     assert np.diff(dataset.y.values).tolist() == [-30.0] * 5 and dataset.x.values[0] == 15
 
 
-def test_saturated_pixels_have_no_reflectance(made):
+def test_saturated_pixels_have_no_reflectance(whole, chips_on):
     """The store states the number of saturated pixels, as the image does."""
-    _, _, layout, _, arrays = made
-    assert xr.open_zarr(made[0]).dn.attrs["saturated"] == layout.saturated == 255
-    bright = {name: values.copy() for name, values in arrays[0].items()}
+    chips = chips_on(2)
+    layout = layout_of(chips)
+    assert xr.open_zarr(whole).dn.attrs["saturated"] == layout.saturated == 255
+    bright = chip_arrays(chips, range(2), layout)
+    missing = (bright["dn"] == 0).sum()
     bright["dn"][0, :, 1, 1] = 255
     light = store._reflectance(bright, layout)
-    assert np.isnan(light[0, :, 1, 1]).all()
-    np.testing.assert_array_equal(np.isnan(light).sum(), len(bright["dn"][0]) + (arrays[0]["dn"] == 0).sum())
+    assert np.isnan(light[0, :, 1, 1]).all() and np.isnan(light).sum() == len(bright["dn"][0]) + missing
+    with pytest.raises(ValueError, match=r"chip \d: has a true property that others lack, green_fpar"):
+        chip_arrays(chips_on(2, draws={"brown": {"choice": [0.3]}}), range(2), layout._replace(truth=("lai", "fpar")))
 
 
-def test_each_shard_is_a_file(made):
-    folder = made[0]
-    files = sorted(path.relative_to(folder / "dn").as_posix() for path in (folder / "dn").rglob("0") if path.is_file())
-    assert files == ["c/0/0/0/0", "c/1/0/0/0"]
-    codecs = json.loads((folder / "dn" / "zarr.json").read_text())["codecs"]
-    assert codecs[0]["name"] == "sharding_indexed" and codecs[0]["configuration"]["chunk_shape"] == [2, 2, 6, 6]
-    raw = zarr.open_array(folder, path="dn", mode="r")
-    assert raw.dtype == np.uint8 and raw.shards == (4, 2, 6, 6)
+def test_each_shard_is_a_file(whole):
+    files = sorted(path.relative_to(whole / "dn").as_posix() for path in (whole / "dn").rglob("0") if path.is_file())
+    assert files == [f"c/{shard}/0/0/0" for shard in range(4)]
+    raw = zarr.open_array(whole, path="dn", mode="r")
+    assert raw.dtype == np.uint8 and raw.shards == (2, 2, 6, 6)
 
 
 @pytest.mark.parametrize("name", ["chip/c/0", "sza/c/0", "lai/c/0/0/0"])
-def test_damaged_numbers_of_chips_are_not_read(made, tmp_path, name):
+def test_damaged_numbers_of_chips_are_not_read(whole, tmp_path, name):
     """Without checksums, many of these bits change numbers of the dataset."""
-    path = shutil.copytree(made[0], tmp_path / "chips") / name
-    whole = path.read_bytes()
-    for at in range(0, len(whole), max(len(whole) // 40, 1)):
-        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+    path = shutil.copytree(whole, tmp_path / "chips") / name
+    content = path.read_bytes()
+    for at in range(0, len(content), max(len(content) // 40, 1)):
+        path.write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
         with pytest.raises(ValueError, match=r"[Cc]hecksum"):
             xr.open_zarr(tmp_path / "chips")[name.split("/")[0]].load()
 
@@ -387,13 +290,6 @@ def test_shards_are_large_enough_to_share_tiles_and_small_enough_for_memory(coun
     ranges = [shards.range_of(shard) for shard in range(len(shards))]
     assert ranges[0][0] == 0 and ranges[-1][1] == count
     assert all(before[1] == after[0] for before, after in pairwise(ranges))
-
-
-def test_error_names_the_chip_with_different_truth_variables(made):
-    _, chips, layout, *_ = made
-    without = layout._replace(truth=("lai", "fpar"))
-    with pytest.raises(ValueError, match=r"chip \d: has a true property that others lack, green_fpar"):
-        chip_arrays(chips, range(0, 7), without)
 
 
 NOISY = {"sensor": {"instrument": "L4TM", "offset": [0.5, -1.2], "noise": ["all"]}, "landscape": {"cover": "pastures"}}

@@ -348,7 +348,7 @@ def test_default_landscape_is_called_synthetic_in_the_readme():
 
 def test_default_bands_of_a_file_without_bands(tmp_path):
     """SuperDove has no known noise in any band; later checks name this and other mistakes."""
-    for given, bands in (
+    for sections, bands in (
         ("", ["TM2", "TM3", "TM4"]),
         ("[sensor]\ninstrument = 'MSI'\n", ["MSI3", "MSI4", "MSI8"]),
         ("[sensor]\ninstrument = 'MODIS'\n", ["MODIS1", "MODIS2"]),
@@ -357,7 +357,7 @@ def test_default_bands_of_a_file_without_bands(tmp_path):
         ("[ground]\nbackground = { TM2 = 0.1, TM3 = 0.1, TM4 = 0.2 }\n", ["TM2", "TM3", "TM4"]),
         ("[sensor]\ninstrument = 'OLI'\nnoise = ['shot']\n", ["OLI3", "OLI4", "OLI5"]),
     ):
-        assert read_text(tmp_path, given).sensor.bands == bands
+        assert read_text(tmp_path, sections).sensor.bands == bands
     noiseless = {"instrument": "SuperDove", "noise": ["shot"]}
     for sensor in ({"instrument": "TN"}, {"instrument": 3}, {"instrument": "missing.toml"}, "TM", noiseless):
         assert with_false_colour({"sensor": sensor}) == {"sensor": sensor}
