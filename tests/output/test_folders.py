@@ -113,67 +113,47 @@ def test_error_between_moves_restores_the_old_results(tmp_path, monkeypatch, num
     assert all_files(out) == old and not (out / UNFINISHED).exists()
 
 
-@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
-def test_error_leaves_the_folder_unchanged(tmp_path, error):
-    write(tmp_path / "there", "old")
-    for name in ("there", "new"):
-        with pytest.raises(error), results(tmp_path / name, NAMES, overwrite=True) as hidden:
-            (hidden / "one.txt").write_text("half")
-            raise error("in the middle")
-    assert contents(tmp_path / "there") == {"one.txt": "old", "two.txt": "old"}
-    assert not (tmp_path / "new").exists()
-
-
-def interrupt_run(tmp_path, error, **options):
+def interrupt_run(tmp_path, error):
     """Folder of a run that is kept only if an OSError interrupted it."""
-    out = tmp_path / "out"
-    options |= {"worth_keeping": lambda hidden, error: isinstance(error, OSError)}
-    with pytest.raises(error), results(out, NAMES, **options) as hidden:
+    out, kept = tmp_path / "out", lambda hidden, error: isinstance(error, OSError)
+    with pytest.raises(error), results(out, NAMES, worth_keeping=kept) as hidden:
         (hidden / BEGUN).touch()
         (hidden / "block").write_text("done")
         raise error("in the middle")
     return out
 
 
-def test_partial_results_worth_keeping_are_resumed(tmp_path):
-    out = interrupt_run(tmp_path, OSError)
+def test_partial_results_worth_keeping_are_resumed_and_overwriting_discards_them(tmp_path):
+    out, kept = interrupt_run(tmp_path, OSError), {"worth_keeping": lambda hidden, error: True}
     assert [path.name for path in out.iterdir()] == [UNFINISHED]
-    with results(out, NAMES, resume=True, worth_keeping=lambda hidden, error: True) as hidden:
+    with pytest.raises(OSError), results(out, NAMES, resume=True, **kept) as hidden:
         assert contents(hidden) == {BEGUN: "", "block": "done"}
-        for name in NAMES:
-            (hidden / name).write_text("whole")
-    assert contents(out) == {"one.txt": "whole", "two.txt": "whole"}
-
-
-def test_overwriting_discards_partial_results(tmp_path):
-    out = interrupt_run(tmp_path, OSError)
-    kept = {"overwrite": True, "worth_keeping": lambda hidden, error: True}
-    with pytest.raises(OSError), results(out, NAMES, **kept) as hidden:
+        raise OSError("again")
+    with pytest.raises(OSError), results(out, NAMES, overwrite=True, **kept) as hidden:
         assert contents(hidden) == {}
         raise OSError("again")
+    write(out, "whole", resume=True)
+    assert contents(out) == {"one.txt": "whole", "two.txt": "whole"}
     assert not interrupt_run(tmp_path / "another", ValueError).exists()
 
 
 @pytest.mark.parametrize(
-    ("held", "options", "said"),
+    ("held", "resume", "said"),
     [
-        (["notes.txt"], {"overwrite": False}, "not empty.*--overwrite"),
-        (["notes.txt"], {"overwrite": False, "resume": True}, "nothing to resume.*--overwrite"),
-        (["notes.txt", f"{UNFINISHED}/block"], {"overwrite": False, "resume": True}, "nothing to resume"),
-        ([f"{UNFINISHED}/{BEGUN}"], {"overwrite": False}, "--resume"),
-        ([f"{UNFINISHED}/{BEGUN}", "notes.txt"], {"overwrite": False}, "--resume"),
+        (["notes.txt"], False, "not empty.*--overwrite"),
+        (["notes.txt", f"{UNFINISHED}/block"], True, "nothing to resume.*--overwrite"),
+        (["notes.txt", f"{UNFINISHED}/{BEGUN}"], False, "--resume"),
     ],
 )
-def test_folder_in_use_is_rejected_with_the_option_to_use(tmp_path, held, options, said):
+def test_folder_in_use_is_rejected_with_the_option_to_use(tmp_path, held, resume, said):
     with pytest.raises(ValueError, match="is a file"):
         check_folder(Path(__file__), overwrite=True)
     for name in held:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("kept")
-    with pytest.raises(ValueError, match=said):
-        check_folder(tmp_path, **options)
-    with pytest.raises(ValueError, match=said), results(tmp_path, NAMES, **options):
-        pass
+    for attempt in (check_folder, lambda folder, **options: write(folder, "new", **options)):
+        with pytest.raises(ValueError, match=said):
+            attempt(tmp_path, overwrite=False, resume=resume)
     assert all((tmp_path / name).read_text() == "kept" for name in held)
 
 
@@ -218,26 +198,12 @@ def test_links_and_pipes_in_an_unfinished_run_are_not_followed(tmp_path, name, k
 
 
 def test_link_in_place_of_the_hidden_folder_is_rejected(tmp_path):
-    (tmp_path / "out").mkdir()
-    (tmp_path / "elsewhere").mkdir()
+    for name in ("out", "elsewhere"):
+        (tmp_path / name).mkdir()
     os.symlink(tmp_path / "elsewhere", tmp_path / "out" / UNFINISHED)
     with pytest.raises(ValueError, match=r"\.unfinished' is a link: remove it"):
         write(tmp_path / "out", "new", overwrite=True)
     assert not list((tmp_path / "elsewhere").iterdir())
-
-
-def test_finished_run_needs_all_its_files(tmp_path):
-    write(tmp_path, "1")
-    assert check_folder(tmp_path, overwrite=False, resume=True, names=NAMES)
-    assert not check_folder(tmp_path, overwrite=True, resume=True, names=NAMES)
-    with pytest.raises(ValueError, match="is not empty"):
-        check_folder(tmp_path, overwrite=False, names=NAMES)
-    with pytest.raises(ValueError, match="nothing to resume"):
-        check_folder(tmp_path, overwrite=False, resume=True, names=(*NAMES, "three.txt"))
-    (tmp_path / UNFINISHED).mkdir()
-    (tmp_path / UNFINISHED / "replaced").touch()
-    assert check_folder(tmp_path, overwrite=False, resume=True, names=NAMES)
-    assert not (tmp_path / UNFINISHED).exists()
 
 
 CELLS = np.random.default_rng(2).random((2, 7, 9))

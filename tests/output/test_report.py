@@ -1,31 +1,17 @@
 """Contents of a report page."""
 
-import base64
 import html
 import re
 from types import SimpleNamespace
 
-import jinja2
-import matplotlib
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import fifesim
 from fifesim.analysis.regression_labels import regress
 from fifesim.output import report
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
-
-
-def test_title_names_files_without_their_folders():
-    scenario = parse_scenario({"terrain": {"dem": "flat"}, "geometry": {"sza": 30.0, "saa": 120.0}})
-    ground = scenario.ground.model_copy(update={"lai_file": "/somewhere/leaves.tif"})
-    sensor = scenario.sensor.model_copy(update={"instrument": "/elsewhere/camera.toml"})
-    scenario = scenario.model_copy(update={"ground": ground, "sensor": sensor})
-    assert report.title(scenario) == "leaves.tif, seen by camera.toml"
-    oli = parse_scenario({"ground": {"arp": 0.15}, "sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]}})
-    assert report.title(oli).endswith("arp 0.15, seen by OLI (synthetic landscape, hypothetical overpass)")
 
 
 def test_report_lists_bands_where_5s_errs_by_more_than_two_percent():
@@ -108,14 +94,14 @@ def test_finding_without_a_regression_gives_the_reason(plain_run):
     assert "No line was fitted, because the bands have no NDVI." in page_of(plain_run)
 
 
-def test_headline_names_instrument_place_and_time():
+def test_titles_name_instrument_place_and_time():
     far = {"crs": "EPSG:32735", "west": 600000.0, "north": 7200000.0, "width": 600.0, "height": 600.0}
     case = {"grid": far, "geometry": {"time": "2022-06-01T10:05Z"}, "atmosphere": {"altitude": 1.0}}
-    case |= {"terrain": {"dem": "flat"}, "sensor": {"instrument": "OLI"}}
-    text = report.headline(parse_scenario(case).complete())
-    assert re.fullmatch(
-        r"Simulated .*Operational Land Imager.* image, 25\.\d\d° S, 2[78]\.\d\d° E, 1 June 2022 10:05 UTC \(.*\)", text
-    )
+    case |= {"terrain": {"dem": "flat"}, "sensor": {"instrument": "OLI"}, "ground": {"arp": 0.15}}
+    text, end = report.headline(parse_scenario(case).complete()), "image, 25.31° S, 27.99° E, 1 June 2022 10:05 UTC"
+    assert text.startswith("Simulated ") and end in text
+    assert report.title(parse_scenario(case)).endswith("arp 0.15, seen by OLI (synthetic landscape)")
+    assert [report.fixed(value, 3, sign=True) for value in (-4e-4, -6e-4, 6e-4)] == ["0.000", "−0.001", "+0.001"]
 
 
 def test_saturated_pixels_are_counted_in_the_summary(plain_run):
@@ -185,26 +171,3 @@ def test_figures_show_the_regression_and_each_pixel(plain_run):
     assert (fpar.get_title(), fpar.get_xlabel()) == ("True FPAR of the pixels", "FPAR")
     shares = {line.get_label(): line.get_ydata().sum() for line in axis.lines}
     assert shares == pytest.approx(dict.fromkeys(map(str, image["band"].values), 1.0))
-
-
-def test_picture_is_embedded_unchanged_and_an_undefined_name_is_an_error(tmp_path):
-    template, content = tmp_path / "own.html.j2", '<img src="{{ picture | embedded }}">{{ text }}'
-    template.write_text(f'{{% extends "page.html.j2" %}}{{% block content %}}{content}{{% endblock %}}')
-    figure = Figure(figsize=(2, 1))
-    figure.subplots().plot([0, 1])
-    png = report.png(figure, 50)
-    page = report.page_html(template, picture=png, text="a < b")
-    (content,) = re.findall(r'src="data:image/png;base64,([^"]*)"', page)
-    assert base64.b64decode(content) == png
-    # A PNG holds its width and height in bytes 16 to 24.
-    assert [int.from_bytes(png[start : start + 4]) for start in (16, 20)] == [100, 50]
-    assert "a &lt; b" in page and f"matplotlib {matplotlib.__version__}" in page
-    with pytest.raises(jinja2.UndefinedError, match="text"):
-        report.page_html(template, picture=png)
-
-
-def test_zero_has_no_sign():
-    assert [report.fixed(value, 3, sign=True) for value in (-4e-4, 4e-4, -6e-4, 6e-4)] == [
-        "0.000", "0.000", "−0.001", "+0.001",
-    ]  # fmt: skip
-    assert report.fixed(-0.0, 3) == "0.000"

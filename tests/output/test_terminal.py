@@ -9,10 +9,10 @@ import time
 
 import pytest
 
-from fifesim.base.messages import LOG, quiet
+from fifesim.base.messages import quiet
 from fifesim.output import progress
 from fifesim.output.progress import Progress, since_start, spinner, steps
-from fifesim.output.terminal import Exit, exit_with_error, in_time, interrupts_blocked, listening, print_lines, report
+from fifesim.output.terminal import Exit, exit_with_error, in_time, interrupts_blocked, print_lines, report
 
 
 def test_last_line_gives_the_duration_and_the_file_to_open(capsys):
@@ -33,17 +33,6 @@ def test_durations_never_show_60_seconds_or_60_minutes():
         "1 min 0 s",
         "1 h 0 min",
     ]
-
-
-def test_log_is_printed_only_inside_the_context(capsys):
-    before = LOG.level
-    with listening(logging.INFO):
-        LOG.info("a name \x1b[31m")
-        LOG.debug("a part")
-    LOG.info("afterwards")
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.endswith("a name \\x1b[31m")
-    assert not LOG.handlers and LOG.level == before
 
 
 def test_control_characters_are_escaped(capsys):
@@ -108,13 +97,3 @@ def test_elapsed_time_counts_from_the_start_of_the_process(monkeypatch):
     monkeypatch.setattr(progress.psutil.Process, "create_time", lambda process: 1000.0)
     monkeypatch.setattr(time, "time", lambda: 1030.0)
     assert since_start() == 30.0
-
-
-@pytest.mark.parametrize(("widgets", "shown"), [(True, True), (False, False)])
-def test_notebook_shows_bars_if_widgets_are_available(monkeypatch, widgets, shown):
-    """The standard error of a notebook is no terminal; rich draws widgets there."""
-    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
-    monkeypatch.setattr(progress, "find_spec", lambda name: widgets or None)
-    assert progress._shows_bars() == shown
-    with quiet():
-        assert not progress._shows_bars()
