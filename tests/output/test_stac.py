@@ -85,6 +85,10 @@ def test_bands_of_the_item_match_the_file(item, small_run):
     assert [band["eo:common_name"] for band in bands] == ["green", "red", "nir"]
     assert bands[2]["eo:solar_illumination"] == 1031.0
     assert {band["nodata"] for band in item["assets"]["truth"]["bands"]} == {"nan"}
+    # Version 1.1.0 of the extension has eo:bands, which odc-stac uses to find names; version 2 does not.
+    for band, old in zip(bands, item["assets"]["image"]["eo:bands"], strict=True):
+        assert old.items() >= {"name": band["name"], "center_wavelength": band["eo:center_wavelength"]}.items()
+        assert old["solar_illumination"] == band["eo:solar_illumination"]
 
 
 def test_footprint_encloses_the_pixels(item):

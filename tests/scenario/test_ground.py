@@ -20,11 +20,9 @@ from fifesim.scenario.ground import (
     elevation,
     ground_scene,
     scenario_light_on_hills,
-    truth_of,
     warn_of_canopy,
 )
 from fifesim.scenario.scenario import parse_scenario
-from fifesim.scenario.simulation import setup_of
 
 SMALL = {"grid": {"width": 300.0, "height": 240.0}, "terrain": {"dem": "flat"}}
 
@@ -32,27 +30,12 @@ STAND = {"distribution": "burned-grazed"}
 
 BACKGROUND = {"TM3": 0.1, "TM4": 0.2}
 
+GROUND = {"arp": 0.1, "seed": 11, "hotspot": 0.1, "brown": 0.2, "dissociation": 0.5, "crown_cover": 0.8}
+GROUND |= {"crown_shape": 0.7, "moisture": 0.2, "fpar_inf": 0.9, "background": BACKGROUND}
+GROUND |= {"distribution": "burned-ungrazed", "leaf_angles": "planophile", "brown_leaf": {"brown": 1.0}}
 OWN = {
-    "ground": {
-        "distribution": "burned-ungrazed",
-        "arp": 0.1,
-        "seed": 11,
-        "leaf_angles": "planophile",
-        "hotspot": 0.1,
-        "brown": 0.2,
-        "dissociation": 0.5,
-        "crown_cover": 0.8,
-        "crown_shape": 0.7,
-        "moisture": 0.2,
-        "fpar_inf": 0.9,
-        "background": BACKGROUND,
-        "brown_leaf": {"brown": 1.0},
-    },
-    "landscape": {
-        "cover": "voronoi",
-        "size": 80.0,
-        "deviations": {"soil": 0.03, "brown": 0.06, "crown_cover": 0.0},
-    },
+    "ground": GROUND,
+    "landscape": {"cover": "voronoi", "size": 80.0, "deviations": {"soil": 0.03, "brown": 0.06, "crown_cover": 0.0}},
     "classes": {
         "grass": {"share": 0.7, "hotspot": 0.2, "arp": 0.2, "leaf_angles": "spherical"},
         "wood": {"share": 0.3, "distribution": "unburned-ungrazed", "leaf_angles": "erectophile"},
@@ -68,15 +51,12 @@ def scenario():
 @pytest.fixture(scope="module")
 def by_hand(scenario):
     """The landscape of `OWN`, built by explicit calls."""
+    grass = fifesim.Canopy(hotspot=0.2, leaf_angles="spherical")
+    wood = fifesim.CoverClass(lai="unburned-ungrazed", canopy=fifesim.Canopy(leaf_angles="erectophile"))
     return fifesim.landscape(
         scenario.geobox(),
         cover=fifesim.ground.Patches("voronoi", 80, {"grass": 0.7, "wood": 0.3}),
-        classes={
-            "grass": fifesim.CoverClass(
-                lai="burned-ungrazed", canopy=fifesim.Canopy(hotspot=0.2, leaf_angles="spherical"), arp=0.2
-            ),
-            "wood": fifesim.CoverClass(lai="unburned-ungrazed", canopy=fifesim.Canopy(leaf_angles="erectophile")),
-        },
+        classes={"grass": fifesim.CoverClass(lai="burned-ungrazed", canopy=grass, arp=0.2), "wood": wood},
         arp=0.1,
         brown=fifesim.ground.Field(mean=0.2, sd=0.06, arp=0.1),
         soil=fifesim.ground.Field(sd=0.03, arp=0.1),
@@ -143,9 +123,8 @@ def test_drawn_properties_take_mean_and_arp_from_the_ground():
     means = {"soil": -0.1, "moisture": 0.3, "brown": 0.2, "crown_cover": 0.8}
     deviations = {"soil": 0.03, "moisture": 0.1, "brown": 0.05, "crown_cover": 0.07}
     case = parse_scenario({"ground": {"arp": 0.1} | means, "landscape": {"deviations": deviations}})
-    assert drawn_properties(case) == {
-        name: fifesim.ground.Field(mean=mean, sd=deviations[name], arp=0.1) for name, mean in means.items()
-    }
+    expected = {name: fifesim.ground.Field(mean=means[name], sd=sd, arp=0.1) for name, sd in deviations.items()}
+    assert drawn_properties(case) == expected
 
 
 def test_fields_set_by_classes_or_drawn_are_not_passed(scenario):
@@ -181,8 +160,7 @@ def test_ground_leaf_and_spectra_are_passed_unless_every_class_sets_them():
 )
 def test_green_fpar_is_output_only_where_some_leaves_are_dead(sections, dead):
     case = parse_scenario(SMALL | sections | {"ground": STAND | sections.get("ground", {})})
-    land = make_scene(**sections)
-    truth = truth_of(case, setup_of(case), land if isinstance(land, xr.Dataset) else land.to_dataset(name="lai"))
+    truth = fifesim.simulate(case)["truth"]
     assert ("green_fpar" in truth) == dead
     if dead:
         assert truth["green_fpar"].attrs["long_name"].endswith("that green leaves absorb")

@@ -123,19 +123,10 @@ def test_numbers_may_carry_their_unit_and_seeds_are_integers_that_toml_can_hold(
 
 
 def test_key_tells_whether_its_value_is_a_file():
-    for key, value, answer in (
-        ("picture", "anything", True),
-        ("picture", None, False),
-        ("list_of", "oak", False),
-        ("list_of", "mine.CSV", True),
-        ("list_of", "mine.tif", False),
-        ("map_of", "hills", False),
-        ("map_of", "hills.tif", True),
-        ("map_of", "v1.2", False),
-        ("colour", "red.csv", False),
-        ("unknown", "a.csv", False),
-    ):
-        assert Shelf.names_a_file(key, value) == answer, (key, value)
+    named = {"picture": ["anything"], "list_of": ["mine.CSV"], "map_of": ["hills.tif"]}
+    others = {"picture": [None], "list_of": ["oak", "mine.tif"], "map_of": ["hills", "v1.2"], "colour": ["red.csv"]}
+    for answer, values in ((True, named), (False, others | {"unknown": ["a.csv"]})):
+        assert {Shelf.names_a_file(key, value) for key, each in values.items() for value in each} == {answer}
 
 
 def test_limits_of_keys_are_allowed():
@@ -145,15 +136,10 @@ def test_limits_of_keys_are_allowed():
 
 
 def test_landscape_is_one_stand_if_only_leaf_area_varies():
-    for values, is_one in (
-        ({"learned": "konza"}, False),
-        ({"cover": "none", "size": 50.0}, True),
-        ({"deviations": {"soil": 0.0, "brown": 0}}, True),
-        ({"cover": "pastures"}, False),
-        ({"cover": "cover.tif"}, False),
-        ({"deviations": {"soil": 0.0, "brown": 0.1}}, False),
-    ):
-        assert Scenario(landscape={"learned": "none"} | values).is_one() is is_one, values
+    for values in ({"cover": "none", "size": 50.0}, {"deviations": {"soil": 0.0, "brown": 0}}):
+        assert Scenario(landscape={"learned": "none"} | values).is_one(), values
+    for values in ({"learned": "konza"}, {"cover": "pastures"}, {"deviations": {"soil": 0.0, "brown": 0.1}}):
+        assert not Scenario(landscape={"learned": "none"} | values).is_one(), values
     assert (
         LandscapeKeys(cover="cover.tif").files == {"cover": "cover.tif"} and LandscapeKeys(cover="levels").files == {}
     )
@@ -163,21 +149,17 @@ FILE_NAMES = ("a\nb.tif", "a\tb", "\x1b[31mred.tif", "a\x7fb.tif", "röd 😀.ti
 BAND_NAMES = ("B 3", "röd", 'b"3', "b.3", "b\\3", "", "=", "3")
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
+def test_any_scenario_or_name_of_a_file_or_band_is_read_back(tmp_path):
+    for values in (
         {"ground": {"arp": 0.24, "seed": 2**63 - 1, "method": "periodic", "leaf_angles": "verhoef(-0.35,-0.15)"}},
-        {"grid": {"cell": 1 / 3, "width": 60.0, "height": 60.0}, "sensor": {"interval": "30.5 m", "seed": 4}},
-        {"ground": {"leaf": {"chlorophyll": 40.0}, "background_spectra": {"soil_wet": 0.5, "shade": 0.5}}},
-        {"sensor": {"instrument": "L4TM", "interval": "native", "offset": [0.5, -1.0], "noise": ["thermal"]}},
+        {"sensor": {"instrument": "L4TM", "interval": "30.5 m", "offset": [0.5, -1.0], "noise": ["thermal"]}},
+        {"grid": {"cell": 1 / 3, "width": 60.0, "height": 60.0}},
         default_scenario().model_dump(exclude_unset=True),
-    ],
-)
-def test_scenario_survives_a_round_trip_through_text(tmp_path, values):
-    for scenario in (parse_scenario(values), parse_scenario(values).complete()):
-        again = read_text(tmp_path, write_scenario(scenario))
-        assert again == scenario and write_scenario(again) == write_scenario(scenario)
-    assert write_scenario(again.complete()) == write_scenario(scenario)
+    ):
+        whole = parse_scenario(values).complete()
+        for scenario in (parse_scenario(values), whole):
+            assert read_text(tmp_path, write_scenario(scenario)) == scenario
+        assert write_scenario(read_text(tmp_path, write_scenario(whole)).complete()) == write_scenario(whole)
     for name, band in zip(FILE_NAMES, BAND_NAMES, strict=True):
         odd = parse_scenario({"ground": {"lai_file": str(tmp_path / name), "background": {band: 0.1, "TM3": 0.2}}})
         assert read_text(tmp_path, write_scenario(odd)) == odd
@@ -197,9 +179,8 @@ def test_text_and_numbers_are_written_as_toml(text, number):
 def test_base_gives_way_to_given_keys():
     paper = Scenario(base="paper")
     assert (paper.learned, paper.ground.distribution, paper.sensor.response) == (None, "burned-grazed", "paper")
-    given = Scenario(base="paper", ground={"distribution": "unburned-ungrazed"}, sensor={"response": "detector"})
-    assert (given.ground.distribution, given.sensor.response) == ("unburned-ungrazed", "detector")
-    assert Scenario(base="paper", sensor={"instrument": "OLI"}).sensor.response is None
+    given = Scenario(base="paper", ground={"distribution": "unburned-ungrazed"}, sensor={"instrument": "OLI"})
+    assert (given.ground.distribution, given.sensor.response) == ("unburned-ungrazed", None)
     assert Scenario(base="landscape") == Scenario()
 
 
@@ -350,12 +331,11 @@ def test_default_bands_of_a_file_without_bands(tmp_path):
     """SuperDove has no known noise in any band; later checks name this and other mistakes."""
     for sections, bands in (
         ("", ["TM2", "TM3", "TM4"]),
-        ("[sensor]\ninstrument = 'MSI'\n", ["MSI3", "MSI4", "MSI8"]),
-        ("[sensor]\ninstrument = 'MODIS'\n", ["MODIS1", "MODIS2"]),
-        ("[sensor]\nbands = ['TM4']\n", ["TM4"]),
-        ("[ground]\nbackground = { TM3 = 0.1, TM4 = 0.2 }\n", ["TM3", "TM4"]),
-        ("[ground]\nbackground = { TM2 = 0.1, TM3 = 0.1, TM4 = 0.2 }\n", ["TM2", "TM3", "TM4"]),
-        ("[sensor]\ninstrument = 'OLI'\nnoise = ['shot']\n", ["OLI3", "OLI4", "OLI5"]),
+        ("sensor.instrument = 'MODIS'", ["MODIS1", "MODIS2"]),
+        ("sensor.bands = ['TM4']", ["TM4"]),
+        ("ground.background = { TM3 = 0.1, TM4 = 0.2 }", ["TM3", "TM4"]),
+        ("ground.background = { TM2 = 0.1, TM3 = 0.1, TM4 = 0.2 }", ["TM2", "TM3", "TM4"]),
+        ("sensor = { instrument = 'OLI', noise = ['shot'] }", ["OLI3", "OLI4", "OLI5"]),
     ):
         assert read_text(tmp_path, sections).sensor.bands == bands
     noiseless = {"instrument": "SuperDove", "noise": ["shot"]}
@@ -443,17 +423,15 @@ def test_unreadable_files_are_rejected_without_waiting(tmp_path, key):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("x = " + "[" * 5000, "nests its tables too deeply"),
         ("[" + "a." * 5000 + "a]", "nests its tables too deeply"),
         ("[ground]\n" + "k" * 5000 + " = 1", "allowed are distribution, arp"),
         ("[grid]\n'\\x' = '\\'\n\"\\u001b[31m\" = 1", "grid.\\x1b[31m = 1"),
         ("[ground]\nleaf_angles = 3\ndistribution = 4\n" + "".join(f"k{i} = 1\n" for i in range(999)), "and 99"),
         ("grid.north = 0x" + "f" * 9000, "grid.north"),
         ("grid.north = '1" + " " * 900_000 + "x'", "north is in m"),
-        ("[atmosphere]\nvisibility = '1.2.3'", "visibility is in km"),
         ("#" * 2_000_000, "has 2000000 bytes"),
     ],
-    ids=["brackets", "tables", "long key", "escape", "many", "digits", "spaces", "dots", "size"],
+    ids=["tables", "long key", "escape", "many", "digits", "spaces", "size"],
 )
 def test_message_is_short_and_printable(tmp_path, text, said):
     assert said in spelling_error(write_toml(tmp_path, text))

@@ -3,16 +3,14 @@
 import numpy as np
 import pytest
 import rasterio
-import xarray as xr
+from affine import Affine
 from elevations import write
 from lazy import no_compute
 
 import fifesim
-from fifesim.base import files
 from fifesim.base.geometry import Geometry, earth_sun_distance
 from fifesim.base.times import SITE_TIME
 from fifesim.grids import grid as grids
-from fifesim.scenario.ground import elevation
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.sections import Ground, Sensor
 from fifesim.sensor.description.instruments import instrument
@@ -93,101 +91,35 @@ LEVEL = {
 }
 
 
-def test_scenario_matches_the_chain(whole, site):
-    scenario = fifesim.Scenario.model_validate(LEVEL)
-    with no_compute():
-        tree = fifesim.simulate(scenario)
-    assert grids.same_grid(grids.geobox(tree["scene"]["lai"]), site)
-    np.testing.assert_array_equal(tree["scene"]["lai"], whole["lai"])
-    np.testing.assert_array_equal(tree["image"]["dn"], whole["image"])
-    np.testing.assert_array_equal(tree["image"]["ndvi"], whole["ndvi"])
-    np.testing.assert_array_equal(tree["truth"]["lai"], whole["truth"])
-    np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fifesim.fpar(whole["lai"]), 30.0))
-
-
 def test_every_key_of_a_scenario_reaches_its_stage():
     """Each key differs from its default, so an ignored key changes the bits."""
     bands = ["TM3", "TM4"]
     leaf, back = {"TM3": (0.1, 0.08), "TM4": (0.5, 0.4)}, {"TM3": 0.1, "TM4": 0.2}
     stand = {"distribution": "burned-ungrazed", "arp": 0.2, "leaf_angles": "planophile", "hotspot": 0.2}
-    optics = {f"leaf_{each}": {band: leaf[band][at] for band in bands} for at, each in enumerate(OPTICS)}
-    run = fifesim.Scenario(
+    stand |= {"leaf_reflectance": {"TM3": 0.1, "TM4": 0.5}, "leaf_transmittance": {"TM3": 0.08, "TM4": 0.4}}
+    case = fifesim.Scenario(
         grid=LEVEL["grid"],
         terrain=LEVEL["terrain"],
-        ground=stand | optics | {"seed": 11, "method": "periodic", "fpar_inf": 0.9, "background": back},
+        ground=stand | {"seed": 11, "method": "periodic", "fpar_inf": 0.9, "background": back},
         geometry={"sza": 40.0, "saa": 100.0, "vza": 5.0, "vaa": 10.0},
         atmosphere={"visibility": 23, "altitude": 1.0},
-        sensor={"bands": bands, "pixel": 50.0, "min_valid": 1.0, "response": "paper"},
+        sensor={"instrument": "L4TM", "bands": bands, "pixel": 50.0, "interval": 31.0, "offset": [0.25, -0.5]}
+        | {"min_valid": 1.0, "noise": ["thermal"], "seed": 3},
     )
-    tree = fifesim.simulate(run)
+    with no_compute():
+        tree = fifesim.simulate(case)
     sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(SITE_TIME))
     grid = grids.grid_at("EPSG:26914", *LEVEL["grid"].values(), 30 / 9)
     lai = fifesim.lai_scene(grid, "burned-ungrazed", arp=0.2, seed=11, method="periodic")
     canopy = fifesim.Canopy(leaf_optics=leaf, background=back, leaf_angles="planophile", hotspot=0.2)
     air = fifesim.Atmosphere(visibility=23, altitude=1.0)
-    rho = fifesim.surface_reflectance(lai, bands=bands, atmosphere=air, geometry=sun, canopy=canopy)
-    paper = fifesim.instrument("TM", response="paper")
-    image = fifesim.sense(fifesim.to_toa(rho), paper, onto=grids.aligned_grid(grid, 50.0), min_valid=1.0)
+    rho = fifesim.surface_reflectance(lai, "L4TM", bands=bands, atmosphere=air, geometry=sun, canopy=canopy)
+    pixels = {"onto": grids.aligned_grid(grid, 50.0), "interval": 31.0, "offset": (0.25, -0.5), "min_valid": 1.0}
+    image = fifesim.sense(fifesim.to_toa(rho), "L4TM", noise="thermal", seed=3, **pixels)
     fpar = fifesim.fpar(lai, geometry=sun, canopy=fifesim.Canopy(leaf_angles="planophile"), fpar_inf=0.9)
     np.testing.assert_array_equal(tree["image"]["dn"], image)
     np.testing.assert_array_equal(tree["truth"]["lai"], fifesim.aggregate(lai, 50.0, min_valid=1.0))
     np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fpar, 50.0, min_valid=1.0))
-
-
-def test_sensor_keys_equal_the_arguments_of_sense():
-    keys = {"instrument": "L4TM", "interval": 31.0, "offset": [0.25, -0.5], "noise": ["thermal"], "seed": 3}
-    case = parse_scenario(LEVEL | {"sensor": keys})
-    lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
-    toa = fifesim.to_toa(fifesim.surface_reflectance(lai, "L4TM", bands=["TM3", "TM4"]), instrument="L4TM")
-    image = fifesim.sense(toa, "L4TM", interval=31.0, offset=(0.25, -0.5), noise="all", seed=3)
-    xr.testing.assert_identical(fifesim.simulate(case)["image"]["dn"].drop_attrs(), image.drop_attrs())
-
-
-def test_coupling_slopes_and_model_keys_reach_the_chain():
-    case = scenario(horizon_reach=300).replace(coupling="directional", visibility=10)
-    dem, horizon, _ = elevation(case, case.geobox())
-    run, plain, upright, exact = (
-        fifesim.simulate(case.replace(**changes))
-        for changes in (
-            {},
-            {"coupling": "lambert"},
-            {"slopes": "upright"},
-            {"coupling": "four-stream", "ground.model": "discrete-ordinates"},
-        )
-    )
-
-    def reflectance(streams="directional", **slopes):
-        own = {"bands": ["TM3", "TM4"], "atmosphere": case.model_atmosphere(), "geometry": case.sun_and_view()}
-        return fifesim.surface_reflectance(run["scene"]["lai"], "TM", streams=streams, **own, **slopes)
-
-    hills = {"dem": dem, "horizon": horizon}
-    for found, streams in ((run["image"], reflectance(**hills)), (run["level"], reflectance())):
-        np.testing.assert_array_equal(found["dn"], fifesim.sense(fifesim.to_toa(streams), "TM"))
-    assert (run["image"]["dn"] != plain["image"]["dn"]).mean() > 0.05
-    np.testing.assert_array_equal(run["scene"]["surface_reflectance"], plain["scene"]["surface_reflectance"])
-    upwards = reflectance(False, slopes="upright", **hills)
-    np.testing.assert_array_equal(upright["scene"]["surface_reflectance"], upwards)
-    np.testing.assert_array_equal(upright["terrain"]["kt"], plain["terrain"]["kt"])
-    assert "discrete ordinates" in exact["scene"]["surface_reflectance"].history
-
-
-def test_instrument_path_is_relative_to_the_scenario_and_its_tables_to_the_instrument(tmp_path, monkeypatch):
-    """The working directory has no effect."""
-    for folder in ("sensors", "elsewhere"):
-        (tmp_path / folder).mkdir()
-    description = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
-    mine = description.replace("avhrr_response.csv", "responses.csv")
-    assert mine != description
-    (tmp_path / "sensors" / "mine.toml").write_text(mine, encoding="utf-8")
-    (tmp_path / "sensors" / "responses.csv").write_bytes(files.path("avhrr_response.csv").read_bytes())
-    bands = [band.name for band in instrument("AVHRR9").bands[:2]]
-    sensor = f'bands = {bands}, pixel = 1500.0, min_valid = 0.5, instrument = "sensors/mine.toml"'
-    text = f'terrain.dem = "flat"\nsensor = {{ {sensor} }}\ngrid = {{ width = 9000, height = 9000, cell = 300 }}\n'
-    (tmp_path / "s.toml").write_text(text, encoding="utf-8")
-    (tmp_path / "elsewhere" / "named.toml").write_text(text.replace("sensors/mine.toml", "AVHRR9"), encoding="utf-8")
-    monkeypatch.chdir(tmp_path / "elsewhere")
-    scenarios = (fifesim.scenario.read_scenario(path).complete() for path in ("../s.toml", "named.toml"))
-    np.testing.assert_array_equal(*(fifesim.simulate(each)["image"]["dn"] for each in scenarios))
 
 
 @pytest.mark.parametrize(
@@ -219,16 +151,14 @@ def test_cells_of_a_class_equal_a_scenario_of_that_class_alone():
 
 
 def test_cover_map_is_read_and_shares_are_drawn(tmp_path):
-    grid = parse_scenario({"grid": {"width": 600, "height": 600}}).geobox()
-    write(tmp_path / "cover.tif", np.array([[5.0, 9.0], [5.0, 5.0]]), grid.affine * rasterio.Affine.scale(90))
+    small = {"grid": {"width": 600, "height": 600}, "terrain": {"dem": "flat"}}
+    write(tmp_path / "cover.tif", [[5.0, 9.0], [5.0, 5.0]], parse_scenario(small).geobox().affine * Affine.scale(90))
     classes = {"grass": {"code": 5}, "wood": {"code": 9, "distribution": "unburned-ungrazed"}}
-    mapped = {"grid": {"width": 600, "height": 600}, "terrain": {"dem": "flat"}, "classes": classes}
-    scene = fifesim.simulate(parse_scenario(mapped | {"landscape": {"cover": str(tmp_path / "cover.tif")}}))["scene"]
-    wood = (scene["cover"] == 9).compute()
+    mapped = {"landscape": {"cover": str(tmp_path / "cover.tif")}, "classes": classes}
+    wood = (fifesim.simulate(parse_scenario(small | mapped))["scene"]["cover"] == 9).compute()
     assert float(wood.mean()) == 0.25 and bool(wood[:90, 90:].all())
-    drawn = mapped | {"landscape": {"cover": "levels", "size": 20}}
-    drawn["classes"] = {"grass": {"share": 0.8}, "wood": {"share": 0.2}}
-    cover = fifesim.simulate(parse_scenario(drawn))["scene"]["cover"]
+    drawn = {"landscape": {"cover": "levels", "size": 20}, "classes": {"grass": {"share": 0.8}, "wood": {"share": 0.2}}}
+    cover = fifesim.simulate(parse_scenario(small | drawn))["scene"]["cover"]
     # There are about 600 patches, so the standard error of the share is about 0.02.
     assert 0.1 < float((cover == 2).mean()) < 0.3
 
@@ -262,24 +192,6 @@ def test_complete_image_over_relief_with_clouds_has_no_missing_edge():
     assert (dn > 0).all()
     # TM saturates over thick clouds.
     np.testing.assert_array_equal(run["image"]["ndvi"].isnull(), (dn == 255).any("band"))
-
-
-def test_sensors_see_the_same_clouds():
-    """Cloud fraction agrees to 0.002 in pixels of each instrument, with its footprint and grid; the edge is clear."""
-    grid = fifesim.grid_at("EPSG:26914", 690000, 4310000, 12000, 12000, cell=30)
-    sky, sun = fifesim.cloud_field(grid, 0.5, length=1500, height=900, seed=3), fifesim.Geometry(30, 140)
-    thickness = sky.optical_thickness
-    inner = (abs(thickness.y - thickness.y.mean()) < 3300) & (abs(thickness.x - thickness.x.mean()) < 3300)
-    cloud = thickness.fifesim.cast_clouds(sky.assign(optical_thickness=thickness.where(inner, 0.0)), geometry=sun).cloud
-    for name in ("TM", "OLI", "MODIS"):
-        band = fifesim.instrument(name).select(None)[0].name
-        white = cloud.expand_dims(band=[band]).rename("toa_reflectance").drop_attrs(deep=False)
-        seen = white.fifesim.sense(name, quantise=False, geometry=sun).fifesim.to_reflectance()
-        covered = float(seen.sum()) * abs(float(seen.x[1] - seen.x[0])) ** 2 / 12000**2
-        assert covered == pytest.approx(float(cloud.mean()), abs=0.002), name
-
-
-OPTICS = ("reflectance", "transmittance")
 
 
 def test_optics_by_band_need_both_and_complete_optics_are_passed_to_the_chain():
