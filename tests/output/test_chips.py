@@ -244,7 +244,10 @@ def test_xarray_opens_the_store_without_a_warning(study, whole):
     assert {"split", "landscape", "atmosphere.visibility", "sza", "gain", "spatial_ref"} <= set(dataset.coords)
     assert all({"units", "long_name"} <= set(each.attrs) for each in dataset.data_vars.values())
     assert dataset["atmosphere.visibility"].attrs == {"long_name": "meteorological range", "units": "km"}
-    assert dataset.rio.crs.to_epsg() == 26914
+    files = sorted(path.relative_to(whole / "dn").as_posix() for path in (whole / "dn").rglob("0") if path.is_file())
+    assert files == [f"c/{shard}/0/0/0" for shard in range(4)]
+    assert zarr.open_array(whole, path="dn", mode="r").shards == (2, 2, 6, 6)
+    assert dataset.dn.encoding["dtype"] == np.uint8 and dataset.rio.crs.to_epsg() == 26914
     assert np.diff(dataset.y.values).tolist() == [-30.0] * 5 and dataset.x.values[0] == 15
 
 
@@ -260,13 +263,6 @@ def test_saturated_pixels_have_no_reflectance(whole, chips_on):
     assert np.isnan(light[0, :, 1, 1]).all() and np.isnan(light).sum() == len(bright["dn"][0]) + missing
     with pytest.raises(ValueError, match=r"chip \d: has a true property that others lack, green_fpar"):
         chip_arrays(chips_on(2, draws={"brown": {"choice": [0.3]}}), range(2), layout._replace(truth=("lai", "fpar")))
-
-
-def test_each_shard_is_a_file(whole):
-    files = sorted(path.relative_to(whole / "dn").as_posix() for path in (whole / "dn").rglob("0") if path.is_file())
-    assert files == [f"c/{shard}/0/0/0" for shard in range(4)]
-    raw = zarr.open_array(whole, path="dn", mode="r")
-    assert raw.dtype == np.uint8 and raw.shards == (2, 2, 6, 6)
 
 
 @pytest.mark.parametrize("name", ["chip/c/0", "sza/c/0", "lai/c/0/0/0"])
@@ -290,24 +286,6 @@ def test_shards_are_large_enough_to_share_tiles_and_small_enough_for_memory(coun
     ranges = [shards.range_of(shard) for shard in range(len(shards))]
     assert ranges[0][0] == 0 and ranges[-1][1] == count
     assert all(before[1] == after[0] for before, after in pairwise(ranges))
-
-
-NOISY = {"sensor": {"instrument": "L4TM", "offset": [0.5, -1.2], "noise": ["all"]}, "landscape": {"cover": "pastures"}}
-HILLS = {"sensor": {"instrument": "MSI"}, "terrain": {"dem": "flint-hills"}, "atmosphere": {"adjacency": True}}
-
-
-@pytest.mark.parametrize("sections", [NOISY, HILLS], ids=["noisy", "hills"])
-def test_chips_have_no_missing_pixels(chips_on, sections):
-    """Edge pixels see the surrounding ground; each chip equals its scenario simulated with that ground."""
-    chips = chips_on(3, **sections)
-    found = chip_arrays(chips, range(3), layout_of(chips))
-    for name in ("toa_reflectance", "ndvi", "lai", "fpar"):
-        assert np.isfinite(found[name]).all(), name
-    assert (found["dn"] > 0).all()
-    run, bare = (fifesim.simulate(chips.scenario(2), complete=complete) for complete in (True, False))
-    np.testing.assert_array_equal(found["dn"][2], run["image"]["dn"])
-    assert run["scene"].sizes == bare["scene"].sizes
-    np.testing.assert_array_equal(run["truth"]["lai"], bare["truth"]["lai"])
 
 
 def test_edge_pixels_equal_those_of_a_larger_scene(small):

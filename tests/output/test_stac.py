@@ -142,16 +142,6 @@ def test_band_has_the_common_name_with_the_nearest_centre():
 WEST, NORTH, PIXEL, ROWS, COLUMNS = 704970.0, 4334220.0, 30.0, 20, 30
 
 
-def test_gdal_opens_the_files_at_the_right_location(small_run):
-    for name in ("image.tif", "truth.tif"):
-        with rasterio.open(small_run / name) as source:
-            assert (source.crs.to_epsg(), tuple(source.bounds)) == (26914, (WEST, NORTH - 600, WEST + 900, NORTH))
-    with rasterio.open(small_run / "image.tif") as source:
-        gains, offsets = (np.array(each)[:, None, None] for each in (source.scales, source.offsets))
-        radiance = fifesim.sensor.to_radiance(fifesim.open_image(small_run / "image.tif"))
-        np.testing.assert_allclose(source.read() * gains + offsets, radiance, rtol=1e-12)
-
-
 @pytest.mark.parametrize("name", ["image.tif", "truth.tif"])
 def test_files_are_valid_cloud_optimised_geotiffs(small_run, name):
     cogeo = pytest.importorskip("rio_cogeo")
@@ -185,12 +175,9 @@ def test_gdal_opens_the_cells_with_their_crs(small_run):
     with rasterio.Env() as env:
         if "Zarr" not in env.drivers():
             pytest.skip("this GDAL has no driver for Zarr")
-    with xr.open_zarr(small_run / "scene.zarr", decode_coords="all") as cells:
-        lai, reflectance = cells["lai"].values, cells["surface_reflectance"].values
-    with rasterio.open(f'ZARR:"{small_run}/scene.zarr":/lai') as source:
-        assert source.crs.to_epsg() == 26914
-        np.testing.assert_allclose(source.bounds, (WEST, NORTH - 600, WEST + 900, NORTH), rtol=0, atol=1e-6)
-        np.testing.assert_array_equal(source.read(1), lai)
-    with rasterio.open(f'ZARR:"{small_run}/scene.zarr":/surface_reflectance') as source:
-        assert source.crs.to_epsg() == 26914 and np.isnan(source.nodata)
-        np.testing.assert_array_equal(source.read(), reflectance)
+    cells = xr.open_zarr(small_run / "scene.zarr", decode_coords="all")
+    for name in ("lai", "surface_reflectance"):
+        with rasterio.open(f'ZARR:"{small_run}/scene.zarr":/{name}') as source:
+            assert source.crs.to_epsg() == 26914 and np.isnan(source.nodata)
+            np.testing.assert_allclose(source.bounds, (WEST, NORTH - 600, WEST + 900, NORTH), rtol=0, atol=1e-6)
+            np.testing.assert_array_equal(source.read().squeeze(), cells[name])

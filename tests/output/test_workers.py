@@ -1,8 +1,6 @@
 """Workers are separate processes: their tasks must be picklable and their files complete."""
 
 import re
-import subprocess
-import sys
 import weakref
 from contextlib import nullcontext
 from types import SimpleNamespace
@@ -16,6 +14,7 @@ import pytest
 import rasterio
 import xarray as xr
 from distributed import Client, KilledWorker, LocalCluster
+from distributed.security import Security
 
 import fifesim
 from fifesim import fife_site
@@ -69,29 +68,15 @@ def listening_addresses():
     return {connection.laddr for connection in found if connection.status == psutil.CONN_LISTEN}
 
 
-STRANGER = """
-import asyncio, sys
-from distributed.comm import connect
-from distributed.security import Security
-tls = sys.argv[1]
-for address, security in ((tls.replace("tls", "tcp"), Security()), (tls, Security.temporary())):
-    try:
-        asyncio.run(connect(address, timeout=5, **security.get_connection_args("client")))
-    except (OSError, TypeError):
-        print("refused", flush=True)
-"""
-
-
-def test_workers_reject_clients_without_their_certificate():
+def test_workers_are_encrypted_and_only_reachable_from_this_machine():
     before = listening_addresses()
     with workers.cluster(workers=1) as guarded:
         assert guarded.submit(abs, -2).result() == 2
         address, places = guarded.scheduler.address, listening_addresses() - before
         assert address.startswith("tls://127.0.0.1:") and len(places) >= 3
         assert {place.ip for place in places} == {"127.0.0.1"}
-        stranger = [sys.executable, "-c", STRANGER, address]
-        told = subprocess.run(stranger, stdout=subprocess.PIPE, text=True, timeout=120, check=True)
-        assert told.stdout.split() == ["refused"] * 2
+        with pytest.raises(OSError):
+            Client(address, security=Security.temporary(), timeout=5)
 
 
 def test_task_that_kills_workers_is_reported_and_other_tasks_cancelled(monkeypatch):
