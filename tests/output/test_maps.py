@@ -13,9 +13,7 @@ from matplotlib.colors import to_rgb
 import fifesim
 from fifesim.grids import grid as grids
 from fifesim.output import maps
-from fifesim.output.colours import (
-    dark_and_bright,
-)
+from fifesim.output.colours import dark_and_bright
 
 
 @pytest.fixture(scope="module")

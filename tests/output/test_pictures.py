@@ -16,14 +16,7 @@ import fifesim
 from fifesim.experiments.explorer import layer_words
 from fifesim.grids import cf
 from fifesim.grids import grid as grids
-from fifesim.output.colours import (
-    axis_label,
-    long_name,
-    percentile_limits,
-    short_name,
-    subject,
-    unit,
-)
+from fifesim.output.colours import axis_label, long_name, percentile_limits, short_name, subject, unit
 from fifesim.output.maps import value_map
 
 

@@ -6,7 +6,7 @@ from json import dumps, loads
 import numpy as np
 import pytest
 import xarray as xr
-from mistakes import lines
+from mistakes import cases, lines
 
 import fifesim
 from fifesim.grids import grid as grids
@@ -47,10 +47,8 @@ def by_verbs(one):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "case", [row[1] for row in lines("scenario_combinations")], ids=[row[0] for row in lines("scenario_combinations")]
-)
-def test_realisation_and_public_functions_are_identical_to_simulating_the_scenario(case):
+@pytest.mark.parametrize(("case", "name"), cases("combination"), ids=str)
+def test_realisation_and_public_functions_are_identical_to_simulating_the_scenario(case, name):
     one = scenario(**case)
     alone, found = simulate(one), realise(one)
     assert list(found) == ["image", "truth"]

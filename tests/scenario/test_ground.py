@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 from elevations import write
 from lazy import no_compute
-from mistakes import mistakes
+from mistakes import cases, mistakes
 from oracles_canopy import fpar_of_green_leaves
 
 import fifesim
@@ -147,17 +147,7 @@ def test_ground_leaf_and_spectra_are_passed_unless_every_class_sets_them():
             assert (field in canopy_of(case).given) == (not other)
 
 
-@pytest.mark.parametrize(
-    ("sections", "dead"),
-    [
-        ({"ground": {"dissociation": 0.5}}, False),
-        ({"ground": {"brown": 0.2}}, True),
-        ({"landscape": {"deviations": {"brown": 0.05}}, "ground": {"brown": 0.2}}, True),
-        ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"brown": 0.1}, "b": {}}}, True),
-        ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"brown": 0.0}}, "ground": {"brown": 0.2}}, False),
-    ],
-    ids=str,
-)
+@pytest.mark.parametrize(("sections", "dead"), cases("dead leaves"), ids=str)
 def test_green_fpar_is_output_only_where_some_leaves_are_dead(sections, dead):
     case = parse_scenario(SMALL | sections | {"ground": STAND | sections.get("ground", {})})
     truth = fifesim.simulate(case)["truth"]
@@ -167,21 +157,13 @@ def test_green_fpar_is_output_only_where_some_leaves_are_dead(sections, dead):
         assert float(truth["green_fpar"].mean()) < float(truth["fpar"].mean())
 
 
-LEVEL_LAND = [
-    {"landscape": {"deviations": {"soil": 0.0, "moisture": 0.0, "brown": 0.0, "crown_cover": 0.0}}},
-    {"ground": {"brown": 0.0, "dissociation": 1.0, "brown_leaf": {"brown": 1.0}, "soil": 0.0, "moisture": 0.0}},
-    {"ground": {"crown_cover": 1.0, "crown_shape": 0.3}, "landscape": {"deviations": {"soil": 0.0}}},
-    {"landscape": {"cover": "levels", "size": 50.0}, "classes": {"a": {"brown": 0.0}, "b": {"hotspot": 0.0}}},
-]
-
-
 @pytest.fixture(scope="module")
 def uniform_run():
     return fifesim.simulate(parse_scenario(SMALL | {"ground": STAND})).compute()
 
 
-@pytest.mark.parametrize("sections", LEVEL_LAND, ids=str)
-def test_zero_variation_gives_the_uniform_ground(uniform_run, sections):
+@pytest.mark.parametrize(("sections", "_"), cases("uniform ground"), ids=str)
+def test_zero_variation_gives_the_uniform_ground(uniform_run, sections, _):
     """Results are identical to the bit."""
     found = fifesim.simulate(parse_scenario(SMALL | sections | {"ground": STAND | sections.get("ground", {})}))
     for node, name in (("scene", "lai"), ("scene", "surface_reflectance"), ("image", "dn"), ("truth", "fpar")):

@@ -14,24 +14,14 @@ from affine import Affine
 from elevations import write
 from hypothesis import given
 from hypothesis import strategies as st
-from mistakes import check_message, lines, mistakes
+from mistakes import cases, check_message, lines, mistakes
 from pydantic import Field, ValidationError
 
 import fifesim
 from fifesim.base.geometry import earth_sun_distance, sun_geometry
 from fifesim.base.times import SITE_TIME
 from fifesim.grids import grid as grids
-from fifesim.scenario.keys import (
-    VARYING,
-    ClassKeys,
-    LandscapeKeys,
-    Section,
-    StandKeys,
-    file,
-    number,
-    seed,
-    text,
-)
+from fifesim.scenario.keys import VARYING, ClassKeys, LandscapeKeys, Section, StandKeys, file, number, seed, text
 from fifesim.scenario.scenario import (
     Scenario,
     default_scenario,
@@ -125,10 +115,8 @@ def test_limits_of_keys_are_allowed():
 
 
 def test_landscape_is_one_stand_if_only_leaf_area_varies():
-    for values in ({"cover": "none", "size": 50.0}, {"deviations": {"soil": 0.0, "brown": 0}}):
-        assert Scenario(landscape={"learned": "none"} | values).is_one(), values
-    for values in ({"learned": "konza"}, {"cover": "pastures"}, {"deviations": {"soil": 0.0, "brown": 0.1}}):
-        assert not Scenario(landscape={"learned": "none"} | values).is_one(), values
+    for values, is_one in cases("one stand"):
+        assert Scenario(**values).is_one() is is_one, values
     assert (
         LandscapeKeys(cover="cover.tif").files == {"cover": "cover.tif"} and LandscapeKeys(cover="levels").files == {}
     )
@@ -139,12 +127,7 @@ BAND_NAMES = ("B 3", "röd", 'b"3', "b.3", "b\\3", "", "=", "3")
 
 
 def test_any_scenario_or_name_of_a_file_or_band_is_read_back(tmp_path):
-    for values in (
-        {"ground": {"arp": 0.24, "seed": 2**63 - 1, "method": "periodic", "leaf_angles": "verhoef(-0.35,-0.15)"}},
-        {"sensor": {"instrument": "L4TM", "interval": "30.5 m", "offset": [0.5, -1.0], "noise": ["thermal"]}},
-        {"grid": {"cell": 1 / 3, "width": 60.0, "height": 60.0}},
-        default_scenario().model_dump(exclude_unset=True),
-    ):
+    for values, _ in cases("round trip"):
         whole = parse_scenario(values).complete()
         for scenario in (parse_scenario(values), whole):
             assert read_text(tmp_path, write_scenario(scenario)) == scenario
@@ -311,15 +294,9 @@ def test_default_landscape_is_called_synthetic_in_the_readme():
 
 def test_default_bands_of_a_file_without_bands(tmp_path):
     """SuperDove has no known noise in any band; later checks name this and other mistakes."""
-    for sections, bands in (
-        ("", ["TM2", "TM3", "TM4"]),
-        ("sensor.instrument = 'MODIS'", ["MODIS1", "MODIS2"]),
-        ("sensor.bands = ['TM4']", ["TM4"]),
-        ("ground.background = { TM3 = 0.1, TM4 = 0.2 }", ["TM3", "TM4"]),
-        ("ground.background = { TM2 = 0.1, TM3 = 0.1, TM4 = 0.2 }", ["TM2", "TM3", "TM4"]),
-        ("sensor = { instrument = 'OLI', noise = ['shot'] }", ["OLI3", "OLI4", "OLI5"]),
-    ):
-        assert read_text(tmp_path, sections).sensor.bands == bands
+    assert read_text(tmp_path, "").sensor.bands == ["TM2", "TM3", "TM4"]
+    for values, bands in cases("bands of a file"):
+        assert parse_scenario(with_false_colour(values)).sensor.bands == bands
     noiseless = {"instrument": "SuperDove", "noise": ["shot"]}
     for sensor in ({"instrument": "TN"}, {"instrument": 3}, {"instrument": "missing.toml"}, "TM", noiseless):
         assert with_false_colour({"sensor": sensor}) == {"sensor": sensor}
