@@ -135,7 +135,12 @@ def read_style(raster, path):
 
 @pytest.mark.parametrize(
     ("bands", "numbers"),
-    [(["TM3", "TM4"], "2 1 1"), (["TM4", "TM2", "TM3"], "1 3 2"), (["TM1", "TM2", "TM3"], "3 2 1"), (["TM3"], None)],
+    [
+        (["TM3", "TM4"], "2 1 1"),
+        (["TM4", "TM2", "TM3"], "1 3 2"),
+        (["TM1", "TM2", "TM3"], "3 2 1"),
+        (["TM2", "TM3"], None),
+    ],
 )
 def test_style_selects_bands_by_wavelength(lai, tmp_path, bands, numbers):
     """The style shows false colour if possible, else natural colour, else the first band in grey."""

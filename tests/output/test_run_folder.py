@@ -1,4 +1,4 @@
-"""A run folder: its rasters, its report, resuming it, and the order in which its blocks are computed."""
+"""A run folder: its rasters, its report, resuming it, and its blocks."""
 
 import html
 import json
@@ -74,6 +74,7 @@ def hills(tmp_path_factory, run_without_pictures):
 
 def test_run_equals_the_chain_under_other_chunks(hills):
     assert sorted(path.name for path in hills.iterdir()) == sorted([*FILES, "scene.zarr"])
+    assert "north 0.6 km, east 0.6 km, south 0.6 km, west 0.6 km" in page_of(hills)
     tree = fifesim.simulate(parse_scenario(HILLS).complete(), chunks={"y": 333, "x": 1170})
     np.testing.assert_array_equal(fifesim.open_image(hills / "image.tif").values, tree["image"]["dn"].values)
     truth = fifesim.open_image(hills / "truth.tif")
@@ -113,6 +114,7 @@ def test_input_that_changes_during_or_after_a_run_is_an_error(tmp_path, monkeypa
         run_without_pictures(scenario, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     run_without_pictures(scenario, tmp_path / "out")
+    assert re.search("R² of .*none, all", page_of(tmp_path / "out"), re.DOTALL), "NDVI is uniform"
     write_lai_map(tmp_path / "lai.tif", 2.0)
     with pytest.raises(ValueError, match=r"older than its input .*lai\.tif.*--overwrite"):
         run_without_pictures(scenario, tmp_path / "out", resume=True)
