@@ -98,7 +98,7 @@ def test_titles_name_instrument_place_and_time():
     far = {"crs": "EPSG:32735", "west": 600000.0, "north": 7200000.0, "width": 600.0, "height": 600.0}
     case = {"grid": far, "geometry": {"time": "2022-06-01T10:05Z"}, "atmosphere": {"altitude": 1.0}}
     case |= {"terrain": {"dem": "flat"}, "sensor": {"instrument": "OLI"}, "ground": {"arp": 0.15}}
-    text, end = report.headline(parse_scenario(case).complete()), "image, 25.31° S, 27.99° E, 1 June 2022 10:05 UTC"
+    text, end = report.headline(parse_scenario(case).complete()), "image, 25.32° S, 28.00° E, 1 June 2022 10:05 UTC"
     assert text.startswith("Simulated ") and end in text
     assert report.title(parse_scenario(case)).endswith("arp 0.15, seen by OLI (synthetic landscape)")
     assert [report.fixed(value, 3, sign=True) for value in (-4e-4, -6e-4, 6e-4)] == ["0.000", "−0.001", "+0.001"]

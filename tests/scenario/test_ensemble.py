@@ -33,7 +33,7 @@ def by_verbs(one):
     """Image of a scenario by public functions."""
     setup, grid = setup_of(one), one.geobox()
     dem, horizon, _ = elevation(one, grid)
-    land, air = ground_scene(one, grid, dem=dem), {"atmosphere": setup.atmosphere, "geometry": setup.geometry}
+    land, air = ground_scene(one, grid), {"atmosphere": setup.atmosphere, "geometry": setup.geometry}
     slopes = {} if dem is None else {"dem": dem, "horizon": horizon, "slopes": setup.slopes}
     rho = land.fifesim.surface_reflectance(
         setup.instrument, bands=setup.bands, canopy=setup.canopy, upwelling=setup.upwelling, **slopes, **air,

@@ -93,12 +93,12 @@ LEVEL = {
 
 def test_every_key_of_a_scenario_reaches_its_stage():
     """Each key differs from its default, so an ignored key changes the bits."""
-    bands = ["TM3", "TM4"]
+    bands, place = ["TM3", "TM4"], LEVEL["grid"] | {"width": 360.0, "height": 300.0}
     leaf, back = {"TM3": (0.1, 0.08), "TM4": (0.5, 0.4)}, {"TM3": 0.1, "TM4": 0.2}
     stand = {"distribution": "burned-ungrazed", "arp": 0.2, "leaf_angles": "planophile", "hotspot": 0.2}
     stand |= {"leaf_reflectance": {"TM3": 0.1, "TM4": 0.5}, "leaf_transmittance": {"TM3": 0.08, "TM4": 0.4}}
     case = fifesim.Scenario(
-        grid=LEVEL["grid"],
+        grid=place,
         terrain=LEVEL["terrain"],
         ground=stand | {"seed": 11, "method": "periodic", "fpar_inf": 0.9, "background": back},
         geometry={"sza": 40.0, "saa": 100.0, "vza": 5.0, "vaa": 10.0},
@@ -109,12 +109,12 @@ def test_every_key_of_a_scenario_reaches_its_stage():
     with no_compute():
         tree = fifesim.simulate(case)
     sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(SITE_TIME))
-    grid = grids.grid_at("EPSG:26914", *LEVEL["grid"].values(), 30 / 9)
+    grid = grids.grid_at("EPSG:26914", *place.values(), 30 / 9)
     lai = fifesim.lai_scene(grid, "burned-ungrazed", arp=0.2, seed=11, method="periodic")
     canopy = fifesim.Canopy(leaf_optics=leaf, background=back, leaf_angles="planophile", hotspot=0.2)
     air = fifesim.Atmosphere(visibility=23, altitude=1.0)
     rho = fifesim.surface_reflectance(lai, "L4TM", bands=bands, atmosphere=air, geometry=sun, canopy=canopy)
-    pixels = {"onto": grids.aligned_grid(grid, 50.0), "interval": 31.0, "offset": (0.25, -0.5), "min_valid": 1.0}
+    pixels = {"interval": 31.0, "offset": (0.25, -0.5), "min_valid": 1.0}
     image = fifesim.sense(fifesim.to_toa(rho), "L4TM", noise="thermal", seed=3, **pixels)
     fpar = fifesim.fpar(lai, geometry=sun, canopy=fifesim.Canopy(leaf_angles="planophile"), fpar_inf=0.9)
     np.testing.assert_array_equal(tree["image"]["dn"], image)
