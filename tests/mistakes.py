@@ -1,4 +1,4 @@
-"""Invalid scenarios, studies and inputs of experiments, from JSON Lines files in `data`."""
+"""Scenarios, studies and inputs of experiments, valid or not, from JSON Lines files in `data`."""
 
 import json
 from pathlib import Path
@@ -13,6 +13,11 @@ def lines(name):
 def mistakes(*stages, name="scenario_mistakes"):
     """Stage, values and part of the error message of each mistake in the given stages."""
     return [each for each in lines(name) if each[0] in stages]
+
+
+def cases(topic):
+    """Values of scenarios of a topic, and the expected results."""
+    return [(values, expected) for each, values, expected in lines("scenario_cases") if each == topic]
 
 
 def check_message(message, start):

@@ -1,4 +1,7 @@
-"""Contents, colours, coordinates and titles of pictures."""
+"""Contents, coordinates and titles of pictures, whose words and colours come from one table of quantities."""
+
+import dataclasses
+from xml.etree import ElementTree
 
 import dask.array as da
 import matplotlib
@@ -6,9 +9,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 
 import fifesim
+from fifesim.experiments.explorer import layer_words
+from fifesim.grids import cf
 from fifesim.grids import grid as grids
+from fifesim.output.colours import axis_label, long_name, percentile_limits, short_name, subject, unit
+from fifesim.output.maps import value_map
 
 
 @pytest.fixture(autouse=True)
@@ -23,15 +32,12 @@ def drawn_artist(axes):
 
 
 def test_image_is_drawn_in_colour_at_its_coordinates(whole):
-    axes = whole["image"].fifesim.plot(composite=("TM4", "TM3", "TM3"))
-    box = grids.geobox(whole["image"]).boundingbox
+    axes, colours = whole["image"].fifesim.plot(), whole["image"].fifesim.rgb()
+    box, found = grids.geobox(whole["image"]).boundingbox, np.isfinite(colours.values)
     np.testing.assert_allclose(drawn_artist(axes).get_extent(), [box.left, box.right, box.bottom, box.top])
     assert axes.get_xlabel() == "Easting [m]" and axes.get_aspect() == 1
-    colours = whole["image"].fifesim.rgb(("TM4", "TM3", "TM3"))
-    found = np.isfinite(colours.values)
     np.testing.assert_array_equal(np.asarray(drawn_artist(axes).get_array()[..., :3])[found], colours.values[found])
     assert axes.get_title().startswith("TM4, TM3, TM3 as red, green, blue\nLandsat-5 Thematic Mapper")
-    assert "earth_sun_distance" not in axes.get_title()
 
 
 def test_no_data_is_transparent(whole):
@@ -46,12 +52,63 @@ def test_no_data_is_transparent(whole):
     np.testing.assert_array_equal(one, (image.sel(band="TM3") == 0).values)
 
 
-def test_quantity_has_a_colour_map_and_a_bar_with_its_unit(whole):
-    axes = whole["lai"].fifesim.plot(stretch=(0, 100))
-    picture = drawn_artist(axes)
-    assert picture.get_cmap().name == "YlGn"
-    assert picture.get_clim() == (float(whole["lai"].min()), float(whole["lai"].max()))
-    assert axes.figure.axes[1].get_ylabel() == "LAI [m² m⁻²]"
+CLUMPING = cf.Quantity(
+    "1", "", "clumping index", "1 for leaves at random", label="clumping", shown_units="m2 m-2", lowest=0.2,
+    highest=1.0, colours="magma", middle=0.5, ends=(0.25, None),
+)  # fmt: skip
+
+
+@pytest.fixture
+def clumping(monkeypatch, lai):
+    """A raster of a quantity that is in the table only during a test."""
+    matplotlib.use("agg")
+    monkeypatch.setitem(cf.QUANTITIES, "clumping", CLUMPING)
+    return cf.label(0.3 + lai / 10, "clumping", history="made")
+
+
+def test_quantity_words_come_from_the_table(clumping, whole):
+    assert clumping.name == "clumping" and clumping.attrs["long_name"] == "clumping index"
+    assert (short_name(clumping), unit(clumping), long_name(clumping)) == ("clumping", "[m² m⁻²]", "Clumping index")
+    assert axis_label("clumping") == "clumping [m² m⁻²]"
+    assert clumping.fifesim.plot().figure.axes[1].get_ylabel() == "clumping [m² m⁻²]"
+    assert layer_words(["clumping"])["clumping"]["axis"] == "clumping [m² m⁻²]"
+    assert dataclasses.replace(CLUMPING, label="").label == "clumping index"
+    assert unit(xr.DataArray(0.0, attrs={"units": "W m-2 sr-1 um-1"})) == "[W m⁻² sr⁻¹ µm⁻¹]"
+    assert unit(whole["ndvi"]) == unit(xr.DataArray(0.0)) == ""
+    assert short_name(whole["image"]) == "digital number" and short_name(whole["ndvi"]) == "NDVI"
+    assert long_name(whole["image"].sel(band="TM3")) == "TM3: digital number"
+    assert long_name(xr.DataArray(0.0, name="my_field")) == "My field" and long_name(xr.DataArray(0.0)) == "Values"
+
+
+def test_quantity_colours_come_from_the_table(clumping, tmp_path):
+    magma = [to_hex(colormaps["magma"](share)) for share in np.linspace(0, 1, 9)]
+    low, high = percentile_limits(clumping, middle=0.5)
+    assert (low + high) / 2 == pytest.approx(0.5) and high > 0.5 > low
+    picture = clumping.fifesim.plot().images[0]
+    assert picture.get_cmap().name == "magma" and picture.get_clim() == pytest.approx((low, high))
+    assert value_map(clumping, "").bar.stops == layer_words(["clumping"])["clumping"]["stops"] == magma
+    style = fifesim.output.write_style(clumping.fifesim.to_geotiff(tmp_path / "clumping.tif"))
+    shown = list(ElementTree.parse(style).getroot().iter("item"))
+    assert [item.get("color") for item in shown] == magma
+    ends = [float(shown[end].get("value")) for end in (0, -1)]
+    assert ends == pytest.approx([0.25, high], rel=1e-5)
+
+
+def test_percentile_limits_ignore_missing_values():
+    assert percentile_limits([np.nan, 1.0, 3.0, np.inf], (0, 100)) == (1.0, 3.0)
+    assert percentile_limits(np.full(3, np.nan)) == (0.0, 1.0)
+    assert percentile_limits(xr.DataArray(np.arange(101.0))) == (1.0, 99.0)
+
+
+def test_subject_names_instrument_date_and_location(whole):
+    said = subject(whole["image"].assign_coords(time=np.datetime64("1987-06-06T16:35", "ns")))
+    assert said == "Landsat-5 Thematic Mapper, 6 June 1987, 39.13° N, 96.62° W"
+    south = fifesim.grid_at("EPSG:32734", 300000.0, 6200000.0, 300.0, 300.0, 30.0)
+    assert subject(fifesim.lai_scene(south, "burned-grazed", seed=1)).endswith("34.32° S, 18.83° E")
+    assert subject(xr.DataArray(np.zeros(3))) == ""
+
+
+def test_colours_of_a_factor_are_centred_on_one_unless_given(whole):
     factor = (whole["lai"] * 0 + 1.0).rename("kt")
     factor[0, 0], factor[0, 1] = 0.9, 1.3
     picture = drawn_artist(factor.fifesim.plot(stretch=(0, 100)))
@@ -115,82 +172,43 @@ def test_scan_with_only_latitude_and_longitude_is_drawn_in_degrees():
     np.testing.assert_allclose(drawn_artist(axes).get_coordinates()[0, 0], [8.99, 60.005])
 
 
-def test_rasters_that_are_no_maps_are_rejected(whole):
-    with pytest.raises(ValueError, match=r"there is no band 'TM1': the raster has TM3, TM4"):
-        whole["image"].fifesim.plot(band="TM1")
-    with pytest.raises(ValueError, match=r"a map has dimensions \(\[band\], y, x\)"):
-        whole["image"].expand_dims("scene").fifesim.plot()
-
-
-def test_fit_is_drawn_with_its_pixels(whole):
-    fit = fifesim.regress(whole["truth"], whole["ndvi"])
+def test_fit_is_drawn_with_its_pixels_or_as_a_line_centred_on_the_mean(whole):
+    fit, values = fifesim.regress(whole["truth"], whole["ndvi"]), whole["ndvi"].values
     axes = fit.plot(whole["truth"], whole["ndvi"])
-    assert axes.get_xlabel() == "Normalized difference vegetation index"
-    assert axes.get_ylabel() == "Leaf area index [m² m⁻²]"
     x, y = axes.lines[0].get_data()
     np.testing.assert_allclose(y, fit.predict(x))
-    values = whole["ndvi"].values
     assert (x[0], x[-1]) == (np.nanmin(values), np.nanmax(values))
-    assert f"n = {fit.n}" in axes.get_title() and "R² = " in axes.get_title()
-    pixels = axes.collections[0].get_array()
-    assert pixels.sum() == fit.n
-
-
-def test_fit_without_rasters_is_a_line_centred_on_the_mean(whole):
-    fit = fifesim.regress(whole["truth"], whole["ndvi"])
+    assert axes.collections[0].get_array().sum() == fit.n and f"n = {fit.n}" in axes.get_title()
+    assert (axes.get_ylabel(), axes.get_xlabel()) == (
+        "Leaf area index [m² m⁻²]", "Normalized difference vegetation index"
+    )  # fmt: skip
     axes = fit.plot(level=0.9)
-    x, _ = axes.lines[0].get_data()
-    assert x.mean() == pytest.approx(fit.x_mean)
+    assert axes.lines[0].get_data()[0].mean() == pytest.approx(fit.x_mean)
     assert axes.get_legend().get_texts()[0].get_text() == "90 % prediction interval"
-    with pytest.raises(ValueError, match="give both rasters or none"):
-        fit.plot(whole["truth"])
 
 
 def test_instruments_are_compared_with_common_colours(lai):
     images = fifesim.compare(lai, ["MSI", "TM"])
-    figure = images.fifesim.plot_comparison()
-    panels = [axes for axes in figure.axes if axes.images]
+    panels = [axes for axes in images.fifesim.plot_comparison().axes if axes.images]
     assert [axes.get_title().split(",")[0] for axes in panels] == ["MSI", "TM"]
     assert panels[0].images[0].get_clim() == panels[1].images[0].get_clim()
     mean = float(images["TM"]["dn"].fifesim.ndvi().mean())
     assert f"mean {mean:.3f}" in panels[1].get_title() and "30 m" in panels[1].get_title()
-    with pytest.raises(ValueError, match="no image has a red and a near infrared band"):
-        xr.DataTree.from_dict({"/TM": images["TM/dn"].isel(band=[0]).to_dataset()}).fifesim.plot_comparison()
-
-
-def make_scores(spread, seed=3):
-    """Scores by class of estimates whose intervals are too narrow by the factor `spread`."""
-    rng = np.random.default_rng(seed)
-    truth = xr.DataArray(rng.normal(size=(8, 400)), dims=("landscape", "pixel"), name="lai")
-    guess = truth + rng.normal(0, 0.5, truth.shape)
-    level = xr.DataArray([0.5, 0.9], dims="level")
-    half = spread * 0.5 * xr.DataArray([0.674, 1.645], dims="level")
-    estimate = {"lai": guess, "lai_low": guess - half, "lai_high": guess + half, "lai_sd": 0 * guess + spread * 0.5}
-    classes = xr.DataArray(np.arange(400) % 2, dims="pixel", name="cover")
-    return fifesim.score(xr.Dataset(estimate, {"level": level}), truth, by=classes)
 
 
 def test_scores_are_drawn_by_group_with_error_bars():
-    scores = make_scores(0.5)
-    figure = fifesim.output.plot_score(scores)
-    coverage, pit = figure.axes
-    drawn_artist = [container[0] for container in coverage.containers]
-    assert len(drawn_artist) == 2
-    for at, line in enumerate(drawn_artist):
-        assert np.array_equal(line.get_xdata(), [0.5, 0.9])
-        assert np.array_equal(line.get_ydata(), scores.coverage.isel(cover=at))
-    bars = coverage.containers[0][2][0].get_segments()
-    lengths = [bar[1, 1] - bar[0, 1] for bar in bars]
-    assert lengths == pytest.approx(4 * scores.coverage_se.isel(cover=0).values)
+    """Error bars extend two standard errors to each side."""
+    truth = xr.DataArray(np.random.default_rng(3).normal(size=(8, 400)), dims=("landscape", "pixel"), name="lai")
+    half, guess = xr.DataArray([0.3, 0.8], {"level": [0.5, 0.9]}, dims="level"), truth.roll(pixel=1)
+    estimate = {"lai": guess, "lai_low": guess - half, "lai_high": guess + half, "lai_sd": 0 * guess + 0.5}
+    classes = xr.DataArray(np.arange(400) % 2, dims="pixel", name="cover")
+    scores = fifesim.score(xr.Dataset(estimate), truth, by=classes)
+    coverage, pit = fifesim.output.plot_score(scores).axes
+    for at, (line, _, (bars,)) in enumerate(coverage.containers):
+        group = scores.isel(cover=at)
+        np.testing.assert_array_equal(line.get_xydata(), np.transpose([group.level, group.coverage]))
+        lengths = [bar[1, 1] - bar[0, 1] for bar in bars.get_segments()]
+        assert lengths == pytest.approx(4 * group.coverage_se.values)
     assert [patch.get_data().values.tolist() for patch in pit.patches] == scores.pit.values.tolist()
     assert list(pit.lines[0].get_ydata()) == [1, 1]
     assert [text.get_text() for text in coverage.get_legend().get_texts()] == ["cover 0", "cover 1"]
-    # The coverage of intervals that are too narrow lies below the nominal level.
-    assert (scores.coverage < scores.level).all()
-
-
-def test_scores_that_cannot_be_drawn_are_rejected():
-    with pytest.raises(ValueError, match="neither coverage nor pit"):
-        fifesim.output.plot_score(make_scores(1.0)[["rmse"]])
-    with pytest.raises(ValueError, match="select one"):
-        fifesim.output.plot_score(xr.concat([make_scores(1.0)] * 2, "product"))

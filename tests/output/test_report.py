@@ -1,31 +1,17 @@
 """Contents of a report page."""
 
-import base64
 import html
 import re
 from types import SimpleNamespace
 
-import jinja2
-import matplotlib
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import fifesim
 from fifesim.analysis.regression_labels import regress
 from fifesim.output import report
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
-
-
-def test_title_names_files_without_their_folders():
-    scenario = parse_scenario({"terrain": {"dem": "flat"}, "geometry": {"sza": 30.0, "saa": 120.0}})
-    ground = scenario.ground.model_copy(update={"lai_file": "/somewhere/leaves.tif"})
-    sensor = scenario.sensor.model_copy(update={"instrument": "/elsewhere/camera.toml"})
-    scenario = scenario.model_copy(update={"ground": ground, "sensor": sensor})
-    assert report.title(scenario) == "leaves.tif, seen by camera.toml"
-    oli = parse_scenario({"ground": {"arp": 0.15}, "sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]}})
-    assert report.title(oli).endswith("arp 0.15, seen by OLI (synthetic landscape, hypothetical overpass)")
 
 
 def test_report_lists_bands_where_5s_errs_by_more_than_two_percent():
@@ -79,6 +65,8 @@ def test_pairing_reports_the_offset_between_pixels_and_blocks(simulated_run, pag
         down, across = (float(abs(image[axis][-1] - truth[axis][image.sizes[axis] - 1])) for axis in ("y", "x"))
         assert f"up to {(down**2 + across**2) ** 0.5:.1f} m apart" in page and across > 5
     assert ("0.5 pixels further south and 0 further east" in page) is (scenario.sensor.offset == [0.5, 0.0])
+    assert ("perfectly registered" in page) is not any(scenario.sensor.offset)
+    assert "No detector noise" in page and "visibility 45 km" in page and "nadir view" in page
 
 
 def test_main_results_match_the_regression(simulated_run, page):
@@ -94,34 +82,32 @@ def test_main_results_match_the_regression(simulated_run, page):
     assert f"LAI error {report.fixed(low, 2, True)} to {report.fixed(high, 2, True)} difference of LAI" in page
 
 
-def test_finding_without_a_regression_gives_the_reason():
-    run = run_of()
-    page = page_of(run, reasons={"lai": "NDVI does not vary", "fpar": "NDVI does not vary"})
+@pytest.fixture(scope="module")
+def plain_run():
+    return run_of()
+
+
+def test_finding_without_a_regression_gives_the_reason(plain_run):
+    page = page_of(plain_run, reasons={"lai": "NDVI does not vary", "fpar": "NDVI does not vary"})
     assert re.search("No line was fitted: NDVI does not vary (?!;)", page)
     assert "R² of FPAR on NDVI none, NDVI does not vary" in page
-    assert "No line was fitted, because the bands have no NDVI." in page_of(run)
+    assert "No line was fitted, because the bands have no NDVI." in page_of(plain_run)
 
 
-def test_headline_names_instrument_place_and_time():
+def test_titles_name_instrument_place_and_time():
     far = {"crs": "EPSG:32735", "west": 600000.0, "north": 7200000.0, "width": 600.0, "height": 600.0}
     case = {"grid": far, "geometry": {"time": "2022-06-01T10:05Z"}, "atmosphere": {"altitude": 1.0}}
-    case |= {"terrain": {"dem": "flat"}, "sensor": {"instrument": "OLI"}}
-    text = report.headline(parse_scenario(case).complete())
-    assert re.fullmatch(
-        r"Simulated .*Operational Land Imager.* image, 25\.\d\d° S, 2[78]\.\d\d° E, 1 June 2022 10:05 UTC \(.*\)", text
-    )
+    case |= {"terrain": {"dem": "flat"}, "sensor": {"instrument": "OLI"}, "ground": {"arp": 0.15}}
+    text, end = report.headline(parse_scenario(case).complete()), "image, 25.32° S, 28.00° E, 1 June 2022 10:05 UTC"
+    assert text.startswith("Simulated ") and end in text
+    assert report.title(parse_scenario(case)).endswith("arp 0.15, seen by OLI (synthetic landscape)")
+    assert [report.fixed(value, 3, sign=True) for value in (-4e-4, -6e-4, 6e-4)] == ["0.000", "−0.001", "+0.001"]
 
 
-def test_page_names_inputs_and_omitted_effects(simulated_run, page):
-    scenario, *_ = simulated_run
-    assert ("perfectly registered" in page) is not any(scenario.sensor.offset)
-    assert "No detector noise" in page and "visibility 45 km" in page and "nadir view" in page
-
-
-def test_saturated_pixels_are_counted_in_the_summary():
+def test_saturated_pixels_are_counted_in_the_summary(plain_run):
     """Only where there are some; a pixel counts once, in however many bands it is saturated."""
-    scenario, image, truth, detail = run_of()
-    assert "Saturated pixels" not in page_of((scenario, image, truth, detail))
+    scenario, image, truth, detail = plain_run
+    assert "Saturated pixels" not in page_of(plain_run)
     bright = image.copy(deep=True)
     bright["dn"][:, 3, 4] = bright["dn"][0, 5, 6] = 255
     text = page_of((scenario, bright, truth, detail))
@@ -133,12 +119,11 @@ PAPER |= {"sensor": {"response": "paper"}}
 
 
 def compare_with_paper(fits=None, **sections):
-    return report.published(
-        parse_scenario(PAPER | sections).complete(), {"lai": SimpleNamespace(r2=0.931)} if fits is None else fits
-    )
+    fits = {"lai": SimpleNamespace(r2=0.931)} if fits is None else fits
+    return report.published(parse_scenario(PAPER | sections).complete(), fits)
 
 
-def test_report_explains_the_difference_from_the_published_r2():
+def test_report_explains_the_difference_from_the_published_r2(plain_run):
     found = compare_with_paper()
     assert found["r2"] == 0.61 and found["here"] == 0.931 and found["interval"] == pytest.approx(30.315, abs=5e-4)
     cells, drifting = found["drifting"]
@@ -150,33 +135,27 @@ def test_report_explains_the_difference_from_the_published_r2():
     pairs = np.stack([truth[:n, :n].ravel(), ndvi[:n, :n].ravel()])
     r2 = np.corrcoef(pairs[:, np.isfinite(pairs).all(axis=0)])[0, 1] ** 2
     assert cells == 333 and drifting == pytest.approx(r2, rel=1e-9)
-    assert 0.45 < r2 < 0.7
-    _, image, truth, detail = run_of()
+    _, image, truth, detail = plain_run
     fit = regress(truth["lai"], image["ndvi"], pair="index")
     page = page_of((parse_scenario(PAPER).complete(), image, truth, detail), {"lai": fit})
     assert f"0.61, and {fit.r2:.2f} here" in page and "30.315 m apart" in page
     assert f"R² {drifting:.2f} for 333 x 333 cells" in page
-    assert 'interval = "native" in [sensor]' in page and "fifesim reproduce" in page
 
 
-@pytest.mark.parametrize(
-    "sections",
-    [
+def test_other_runs_are_not_compared_with_the_paper():
+    for sections in (
         {"sensor": {"interval": "native", "response": "paper"}},
         {"sensor": {"instrument": "OLI"}},
         {"sensor": {}},
         {"ground": {"arp": 0.2, "distribution": "burned-grazed"}},
         {"fits": {}},
-    ],
-    ids=str,
-)
-def test_other_runs_are_not_compared_with_the_paper(sections):
-    assert compare_with_paper(**sections) is None
+    ):
+        assert compare_with_paper(**sections) is None, sections
 
 
-def test_figures_show_the_regression_and_each_pixel():
+def test_figures_show_the_regression_and_each_pixel(plain_run):
     """Each band of the histogram sums to one."""
-    _, image, truth, detail = run_of()
+    _, image, truth, detail = plain_run
     fit = regress(truth["lai"], image["ndvi"], pair="index")
     axis = report.fit_figure(image, truth, "lai", fit).axes[0]
     (line,), (density,) = axis.lines, axis.images
@@ -187,34 +166,8 @@ def test_figures_show_the_regression_and_each_pixel():
     assert counts.sum() == pytest.approx(ndvi.size) and (low, high) == pytest.approx((ndvi.min(), ndvi.max()))
     centres, step = np.linspace(low, high, 2 * counts.shape[1] + 1)[1::2], (high - low) / counts.shape[1]
     assert (counts.filled(0).sum(axis=0) @ centres) / ndvi.size == pytest.approx(float(ndvi.mean()), abs=step / 2)
-    axes = [figure.axes[0] for figure in report.histogram_figures(image, truth, detail)]
-    assert [(axis.get_title(), axis.get_xlabel()) for axis in axes[:2]] == [
-        ("Leaf area index", "LAI [m² m⁻²]"), ("True FPAR of the pixels", "FPAR")
-    ]  # fmt: skip
-    axis = axes[2]
+    lai, fpar, axis, *_ = [figure.axes[0] for figure in report.histogram_figures(image, truth, detail)]
+    assert (lai.get_title(), lai.get_xlabel()) == ("Leaf area index", "LAI [m² m⁻²]")
+    assert (fpar.get_title(), fpar.get_xlabel()) == ("True FPAR of the pixels", "FPAR")
     shares = {line.get_label(): line.get_ydata().sum() for line in axis.lines}
     assert shares == pytest.approx(dict.fromkeys(map(str, image["band"].values), 1.0))
-    assert [text.get_text() for text in axis.get_legend().get_texts()] == list(shares)
-
-
-def test_picture_is_embedded_unchanged_and_an_undefined_name_is_an_error(tmp_path):
-    template, content = tmp_path / "own.html.j2", '<img src="{{ picture | embedded }}">{{ text }}'
-    template.write_text(f'{{% extends "page.html.j2" %}}{{% block content %}}{content}{{% endblock %}}')
-    figure = Figure(figsize=(2, 1))
-    figure.subplots().plot([0, 1])
-    png = report.png(figure, 50)
-    page = report.page_html(template, picture=png, text="a < b")
-    (content,) = re.findall(r'src="data:image/png;base64,([^"]*)"', page)
-    assert base64.b64decode(content) == png
-    # A PNG holds its width and height in bytes 16 to 24.
-    assert [int.from_bytes(png[start : start + 4]) for start in (16, 20)] == [100, 50]
-    assert "a &lt; b" in page and f"matplotlib {matplotlib.__version__}" in page
-    with pytest.raises(jinja2.UndefinedError, match="text"):
-        report.page_html(template, picture=png)
-
-
-def test_zero_has_no_sign():
-    assert [report.fixed(value, 3, sign=True) for value in (-4e-4, 4e-4, -6e-4, 6e-4)] == [
-        "0.000", "0.000", "−0.001", "+0.001",
-    ]  # fmt: skip
-    assert report.fixed(-0.0, 3) == "0.000"

@@ -1,4 +1,4 @@
-"""A run folder: its rasters, its report and resuming it."""
+"""A run folder: its rasters, its report, resuming it, and its blocks."""
 
 import html
 import json
@@ -15,12 +15,13 @@ import xarray as xr
 from elevations import write
 
 import fifesim
-from fifesim.output import report, run_folder
+from fifesim.output import products, report, run_folder
 from fifesim.output.folders import UNFINISHED
 from fifesim.output.run_folder import FILES, estimate, estimate_in_words, simulate_to_folder
-from fifesim.scenario.scenario import parse_scenario, read_scenario
+from fifesim.scenario.scenario import parse_scenario
 
 FLAT = {"dem": "flat"}
+
 SMALL = {"grid": {"width": 900, "height": 600}, "ground": {"arp": 0.24, "seed": 3}, "terrain": FLAT}
 
 
@@ -31,53 +32,21 @@ def folder(tmp_path_factory):
     return folder
 
 
-def test_report_matches_regressions_and_statistics_of_its_files(folder):
-    page = (folder / "report.html").read_text(encoding="utf-8")
-    truth, ndvi = (fifesim.open_image(folder / name) for name in ("truth.tif", "image.tif"))
-    found = {name: truth.sel(band=name, drop=True).astype(float) for name in ("lai", "fpar")}
-    ndvi = ndvi.fifesim.ndvi()
-    for name, values in (found | {"ndvi": ndvi}).items():
-        (row,) = re.findall(rf"<th>{name.upper()} of the pixels</th><td[^>]*>(.*?)</td>", page)
-        assert row == f"mean {np.nanmean(values):.3f}, standard deviation {np.nanstd(values):.3f}"
-        if name != "ndvi":
-            fit = fifesim.regress(values, ndvi)
-            assert f"{fit.slope:.4f}" in page and f"R² = {fit.r2:.3f}" in page
+def page_of(folder):
+    return html.unescape((folder / "report.html").read_text(encoding="utf-8"))
 
 
-BLUR = '<th>Blur</th><td class="number">modulation transfer at the Nyquist frequency {}'
-
-
-def report_heading(folder):
-    """Title of a report, its HTML title element, and the lines below the title."""
-    page = html.unescape((folder / "report.html").read_text(encoding="utf-8"))
-    header = page[page.index("<header>") : page.index("</header>")]
-    (title,), (tag,) = re.findall(r"<h1>(.*?)</h1>", header), re.findall(r"<title>(.*?)</title>", page)
-    return title, tag, re.findall(r"<p[^>]*>(.*?)</p>", header)
-
-
-def test_report_title_and_first_line_name_the_synthetic_parts(folder):
-    title, tag, lines = report_heading(folder)
-    seen = "Simulated Landsat-5 Thematic Mapper image, FIFE site, 6 June 1987 16:35 UTC"
-    assert title == tag == f"{seen} (synthetic landscape, hypothetical overpass)"
-    said = (folder / "scenario.toml").read_text(encoding="utf-8").splitlines()[0]
-    assert said.startswith("# Synthetic landscape: leaf area is synthetic; the ground is level; only")
-    assert said.endswith("Hypothetical overpass, 6 June 1987 16:35 UTC.")
-    assert lines[0] == f"burned-grazed, arp 0.24. {said.removeprefix('# ')}"
-    assert json.loads((folder / "item.json").read_text(encoding="utf-8"))["properties"]["title"] == title
-
-
-def test_report_is_self_contained(folder):
-    page = (folder / "report.html").read_text(encoding="utf-8")
+def test_report_is_self_contained_and_names_every_parameter_with_its_unit(folder):
+    page = page_of(folder)
+    (title,), (tag,) = re.findall(r"<h1>(.*?)</h1>", page), re.findall(r"<title>(.*?)</title>", page)
+    assert title == tag == json.loads((folder / "item.json").read_text(encoding="utf-8"))["properties"]["title"]
+    assert f"burned-grazed, arp 0.24. {parse_scenario(SMALL).provenance()}" in page
     assert not re.findall(r'src="(?!data:)', page)
     *local, doi = re.findall(r'href="([^"]*)"', page)
     assert doi.startswith("https://doi.org/") and all((folder / name).is_file() for name in local)
     assert {"image.tif", "truth.tif", "scenario.toml"} <= set(local)
     # Pictures of the image, the cells, two regressions, three maps and three histograms.
     assert len(re.findall("data:image/(?:png|webp);base64,", page)) == 11
-
-
-def test_report_names_every_parameter_with_its_unit(folder):
-    page = (folder / "report.html").read_text(encoding="utf-8")
     for key, unit in (("visibility", "km"), ("cell", "m"), ("vza", "degree"), ("arp", "1")):
         assert re.search(rf"<code>{key}</code>.*?<td>{unit}</td>", page)
 
@@ -86,19 +55,10 @@ def test_single_band_has_a_report_without_ndvi(tmp_path):
     """The MTF of a detector as wide as the sampling interval is 2 / pi at the Nyquist frequency."""
     scenario = parse_scenario(SMALL | {"sensor": {"bands": ["TM5"], "response": "detector"}})
     simulate_to_folder(scenario, tmp_path / "one")
-    page = html.unescape((tmp_path / "one" / "report.html").read_text(encoding="utf-8"))
+    page = page_of(tmp_path / "one")
     assert "Leaf area and FPAR from NDVI" not in page
     said = "0.64; only the detector of TM5 is known, so the image is too sharp"
-    assert BLUR.format(said) in page
-    assert read_scenario(tmp_path / "one" / "scenario.toml").sensor.response == "detector"
-
-
-def test_report_with_terrain_shows_it_and_its_extent(tmp_path):
-    simulate_to_folder(parse_scenario(SMALL | {"terrain": {"horizon_reach": 900}}), tmp_path / "hills")
-    page = (tmp_path / "hills" / "report.html").read_text(encoding="utf-8")
-    assert len(re.findall("data:image/(?:png|webp);base64,", page)) == 15
-    assert "north 0.9 km, east 0.9 km, south 0.9 km, west 0.9 km" in page
-    assert "flint-hills" in (tmp_path / "hills" / "scenario.toml").read_text(encoding="utf-8")
+    assert f'<th>Blur</th><td class="number">modulation transfer at the Nyquist frequency {said}' in page
 
 
 HILLS = {"grid": {"width": 4500, "height": 3900}, "ground": {"seed": 3}, "terrain": {"horizon_reach": 600}}
@@ -112,19 +72,14 @@ def hills(tmp_path_factory, run_without_pictures):
     return folder
 
 
-@pytest.mark.parametrize("chunks", [None, 512, 1500, {"y": 333, "x": 1170}])
-def test_run_equals_the_chain_under_any_chunks(hills, chunks):
-    whole = -1 if chunks is None else chunks
-    tree = fifesim.simulate(parse_scenario(HILLS).complete(), chunks=whole)
+def test_run_equals_the_chain_under_other_chunks(hills):
+    assert sorted(path.name for path in hills.iterdir()) == sorted([*FILES, "scene.zarr"])
+    assert "north 0.6 km, east 0.6 km, south 0.6 km, west 0.6 km" in page_of(hills)
+    tree = fifesim.simulate(parse_scenario(HILLS).complete(), chunks={"y": 333, "x": 1170})
     np.testing.assert_array_equal(fifesim.open_image(hills / "image.tif").values, tree["image"]["dn"].values)
     truth = fifesim.open_image(hills / "truth.tif")
     for name in ("lai", "fpar"):
         np.testing.assert_array_equal(truth.sel(band=name), tree["truth"][name].values.astype(np.float32))
-
-
-def test_scene_file_holds_the_cells(hills):
-    assert sorted(path.name for path in hills.iterdir()) == sorted([*FILES, "scene.zarr"])
-    tree = fifesim.simulate(parse_scenario(HILLS).complete())
     with xr.open_zarr(hills / "scene.zarr", decode_coords="all") as scene:
         for name in ("lai", "dem", "surface_reflectance"):
             np.testing.assert_array_equal(scene[name].values, tree["scene"][name].values)
@@ -139,45 +94,30 @@ def write_lai_map(path, values):
     return {"ground": {"lai_file": str(write(path, np.full((20, 30), values), place))}}
 
 
-def test_report_of_a_map_calls_nothing_synthetic(tmp_path):
-    own = write_lai_map(tmp_path / "lai.tif", np.linspace(1, 3, 30)) | {"geometry": {"time": "1987-08-15T16:40Z"}}
-    simulate_to_folder(parse_scenario(own), tmp_path / "out")
-    title, tag, lines = report_heading(tmp_path / "out")
-    assert title == tag == "Simulated Landsat-5 Thematic Mapper image, FIFE site, 15 August 1987 16:40 UTC"
-    said = "Leaf area is from a file; the ground is level. Time as given, 15 August 1987 16:40 UTC."
-    assert lines[0] == f"lai.tif. {said}"
-
-
-def test_uniform_map_has_a_report_without_regression(tmp_path):
-    files, _ = simulate_to_folder(parse_scenario(write_lai_map(tmp_path / "lai.tif", 2.0)), tmp_path / "out")
-    assert all(path.stat().st_size > 0 for path in files)
-    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "Leaf area and FPAR from NDVI" not in page and re.search("R² of .*none, all", page, re.DOTALL)
-
-
 @pytest.mark.parametrize(("values", "offset"), [(2.0, [9.5, 0.0]), (np.nan, [0.0, 0.0])])
 def test_image_without_valid_pixels_is_an_error_with_the_reason(tmp_path, values, offset):
-    scenario = write_lai_map(tmp_path / "lai.tif", values) | {
-        "grid": {"width": 300, "height": 300},
-        "sensor": {"offset": offset},
-    }
+    sections = {"grid": {"width": 300, "height": 300}, "sensor": {"offset": offset}}
     with pytest.raises(ValueError, match=r"no pixel of the image has 0\.98.*sensor\.offset"):
-        simulate_to_folder(parse_scenario(scenario), tmp_path / "out")
+        simulate_to_folder(parse_scenario(sections | write_lai_map(tmp_path / "lai.tif", values)), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
-def test_input_that_changes_during_a_run_is_an_error(tmp_path, monkeypatch, run_without_pictures):
-    scenario = parse_scenario(write_lai_map(tmp_path / "lai.tif", 2.0))
-    write_files = run_folder._write_files
+def test_input_that_changes_during_or_after_a_run_is_an_error(tmp_path, monkeypatch, run_without_pictures):
+    scenario, write_files = parse_scenario(write_lai_map(tmp_path / "lai.tif", 2.0)), run_folder._write_files
 
     def while_another_writes(*given):
         write_files(*given)
         write_lai_map(tmp_path / "lai.tif", 3.0)
 
-    monkeypatch.setattr(run_folder, "_write_files", while_another_writes)
-    with pytest.raises(ValueError, match=r"lai\.tif changed while it was read"):
+    with monkeypatch.context() as patch, pytest.raises(ValueError, match=r"lai\.tif changed while it was read"):
+        patch.setattr(run_folder, "_write_files", while_another_writes)
         run_without_pictures(scenario, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+    run_without_pictures(scenario, tmp_path / "out")
+    assert re.search("R² of .*none, all", page_of(tmp_path / "out"), re.DOTALL), "NDVI is uniform"
+    write_lai_map(tmp_path / "lai.tif", 2.0)
+    with pytest.raises(ValueError, match=r"older than its input .*lai\.tif.*--overwrite"):
+        run_without_pictures(scenario, tmp_path / "out", resume=True)
 
 
 def test_overwriting_removes_the_cells_of_an_earlier_run(tmp_path, run_without_pictures):
@@ -190,13 +130,13 @@ def test_overwriting_removes_the_cells_of_an_earlier_run(tmp_path, run_without_p
 def test_resuming_a_finished_run_computes_nothing(folder, tmp_path, monkeypatch):
     shutil.copytree(folder, tmp_path / "out")
     monkeypatch.setattr(run_folder, "simulate", None)
-    scenario = parse_scenario(SMALL)
     files = [tmp_path / "out" / name for name in FILES]
-    assert simulate_to_folder(scenario, tmp_path / "out", resume=True) == (files, True)
+    assert simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", resume=True) == (files, True)
+    other = parse_scenario({**SMALL, "ground": {"arp": 0.15}})
     with pytest.raises(ValueError, match=r"of another scenario, with arp = 0\.24, seed = 3: name another.*--overwrite"):
-        simulate_to_folder(parse_scenario({**SMALL, "ground": {"arp": 0.15}}), tmp_path / "out", resume=True)
+        simulate_to_folder(other, tmp_path / "out", resume=True)
     with pytest.raises(ValueError, match="nothing to resume"):
-        simulate_to_folder(scenario, tmp_path / "out", resume=True, scene=True)
+        simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", resume=True, scene=True)
 
 
 def test_changed_files_of_a_finished_run_are_made_again(tmp_path, run_without_pictures):
@@ -209,27 +149,16 @@ def test_changed_files_of_a_finished_run_are_made_again(tmp_path, run_without_pi
     def contents():
         return {path.relative_to(out): path.read_bytes() for path in out.rglob("*") if path.is_file()}
 
-    def flip(path, at):
-        content = bytearray(path.read_bytes())
-        content[at] ^= 1
-        path.write_bytes(content)
-
-    def replace_with_folder(path):
-        path.unlink()
-        path.mkdir()
-
     run()
-    before = contents()
-    item = out / "item.json"
-    for name, damage in (
-        ("image.tif", lambda: (out / "image.tif").write_bytes(b"")),
-        ("truth.qml", lambda: flip(out / "truth.qml", 5)),
-        ("scene.zarr", lambda: flip(out / "scene.zarr" / "lai" / "0.0", -1)),
-        ("item.json", lambda: item.write_text(item.read_text().replace('"gsd": 30.0', '"gsd": 30.1'))),
-        ("item.json", lambda: item.write_text("[1")),
-        ("item.json", lambda: replace_with_folder(item)),
+    before, item, cells = contents(), out / "item.json", out / "scene.zarr" / "lai" / "0.0"
+    for name, path, content in (
+        ("image.tif", out / "image.tif", b""),
+        ("truth.qml", out / "truth.qml", (out / "truth.qml").read_bytes().replace(b"<", b"(", 1)),
+        ("scene.zarr", cells, cells.read_bytes()[:-1] + bytes([cells.read_bytes()[-1] ^ 1])),
+        ("item.json", item, item.read_bytes().replace(b'"gsd": 30.0', b'"gsd": 30.1')),
+        ("item.json", item, b"[1"),
     ):
-        damage()
+        path.write_bytes(content)
         with pytest.warns(UserWarning, match=rf"^{name} of the finished run changed.*made again"):
             assert not run(resume=True)[1]
         assert contents() == before
@@ -244,48 +173,29 @@ def test_changed_files_of_a_finished_run_are_made_again(tmp_path, run_without_pi
             run(resume=True)
 
 
-def test_finished_run_with_a_newer_input_is_not_resumed(tmp_path, run_without_pictures):
-    scenario = parse_scenario(write_lai_map(tmp_path / "lai.tif", 2.0))
-    run_without_pictures(scenario, tmp_path / "out")
-    run_without_pictures(scenario, tmp_path / "out", resume=True)
-    write_lai_map(tmp_path / "lai.tif", 3.0)
-    with pytest.raises(ValueError, match=r"older than its input .*lai\.tif.*--overwrite"):
-        run_without_pictures(scenario, tmp_path / "out", resume=True)
-
-
 def test_unfinished_run_refuses_another_scenario_and_recomputes_a_changed_chunk(
     tmp_path, monkeypatch, run_without_pictures
 ):
-    run_without_pictures(parse_scenario(SMALL), tmp_path / "whole", scene=True)
-
     def full(*given):
         raise OSError("disk full")
 
+    out, scenario = tmp_path / "out", parse_scenario(SMALL)
     with monkeypatch.context() as broken, pytest.raises(OSError, match=r"disk full.*--resume"):
         broken.setattr(run_folder, "_write_files", full)
-        run_without_pictures(parse_scenario(SMALL), tmp_path / "out", scene=True)
+        run_without_pictures(scenario, out, scene=True)
     with pytest.raises(ValueError, match=r"the unfinished run has another scenario, with arp = 0\.24, seed = 3"):
         run_without_pictures(
-            parse_scenario({**SMALL, "ground": {"arp": 0.15, "seed": 4}}), tmp_path / "out", scene=True, resume=True
+            parse_scenario({**SMALL, "ground": {"arp": 0.15, "seed": 4}}), out, scene=True, resume=True
         )
-    unfinished = tmp_path / "out" / UNFINISHED
-    block = unfinished / "blocks" / "scene-lai" / "c" / "0" / "0"
-    content = bytearray(block.read_bytes())
-    content[99] ^= 1
-    block.write_bytes(content)
-    (unfinished / "blocks" / "scene-lai" / "zarr.json").write_bytes(b"{}")
+    block = out / UNFINISHED / "blocks" / "scene-lai" / "c" / "0" / "0"
+    block.write_bytes(block.read_bytes()[:-1] + bytes([block.read_bytes()[-1] ^ 1]))
+    (out / UNFINISHED / "blocks" / "scene-lai" / "zarr.json").write_bytes(b"{}")
     # Left by a run that was killed while it wrote the files.
-    (unfinished / "scene.zarr" / "lai").mkdir(parents=True)
-    (unfinished / "scene.zarr" / "lai" / "0.1").write_bytes(b"half")
-    run_without_pictures(parse_scenario(SMALL), tmp_path / "out", scene=True, resume=True)
-    found, whole = (xr.open_zarr(tmp_path / name / "scene.zarr").load() for name in ("out", "whole"))
-    xr.testing.assert_identical(found, whole)
-
-
-TINY = {"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}}
-
-
-FOUND = {"cells": 72900, "pixels": 900, "tasks": 12, "threads": 2, "memory": 2**30, "disk": 2**20, "seconds": 90.0}
+    (out / UNFINISHED / "scene.zarr" / "lai").mkdir(parents=True)
+    (out / UNFINISHED / "scene.zarr" / "lai" / "0.1").write_bytes(b"half")
+    for name in ("out", "whole"):
+        run_without_pictures(scenario, tmp_path / name, scene=True, resume=name == "out")
+    xr.testing.assert_identical(*(xr.open_zarr(tmp_path / name / "scene.zarr").load() for name in ("out", "whole")))
 
 
 def test_estimate_counts_cells_and_pixels_of_the_scenario(monkeypatch):
@@ -299,9 +209,8 @@ def test_estimate_counts_cells_and_pixels_of_the_scenario(monkeypatch):
 
 def test_timed_piece_lies_in_the_middle_of_the_scene():
     """It consists of whole pixels and is no larger than a tile."""
-    scenario = parse_scenario({"grid": {"width": 24000, "height": 300}, "terrain": {"dem": "flat"}}).complete()
-    piece, whole = run_folder._piece(scenario), scenario.geobox()
-    box = piece.geobox()
+    scenario = parse_scenario({"grid": {"width": 24000, "height": 300}, "terrain": FLAT}).complete()
+    box, whole = run_folder._piece(scenario).geobox(), scenario.geobox()
     assert box.shape.y == whole.shape.y and 1900 < box.shape.x <= run_folder._PIECE
     assert np.hypot(*np.subtract(box.center_pixel.boundingbox[:2], whole.center_pixel.boundingbox[:2])) <= 30
     assert (box.affine.c - whole.affine.c) % 30 == pytest.approx(0, abs=1e-6)
@@ -325,25 +234,42 @@ def run_json(folder, *arguments, line=-1):
     return json.loads(done.stdout.splitlines()[line])
 
 
-@pytest.fixture(scope="module")
-def compiled():
-    """Compile the kernels of a run first, because compilation would count as memory of the run."""
-    estimate(parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": FLAT}), threads=2)
-
-
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is measured in kB on Linux alone")
-@pytest.mark.parametrize(
-    ("size", "dem"), [(300, "flat"), (15_000, "flat"), pytest.param(15_000, "flint-hills", marks=pytest.mark.slow)]
-)
-def test_estimated_memory_suffices(compiled, tmp_path, size, dem):
-    """The estimate exceeds the memory of a run by at most 50 %."""
+@pytest.mark.parametrize(("size", "dem"), [(300, "flat"), (15_000, "flat"), (15_000, "flint-hills")])
+def test_estimated_memory_suffices(tmp_path, size, dem):
+    """The estimate exceeds the memory of a run by at most 50 %; the first estimate compiles the kernels."""
     text = f'[grid]\nwidth = {size}\nheight = {size}\n[terrain]\ndem = "{dem}"\n'
     (tmp_path / "scenario.toml").write_text(text)
+    estimate(parse_scenario(SMALL), threads=2)
     promised, taken = run_json(tmp_path, "--dry-run", line=-2)["memory"], run_json(tmp_path, "-o", "out")
     assert taken <= promised <= 1.5 * taken
 
 
 def test_estimate_in_words_has_units_and_json_keeps_the_values():
-    text = estimate_in_words(FOUND)
+    numbers = {"cells": 72900, "pixels": 900, "tasks": 12, "threads": 2, "memory": 2**30, "disk": 2**20, "seconds": 90}
+    text = estimate_in_words(numbers)
     assert "0.1 million" in text and "1.00 GiB with 2 threads" in text and "1.00 MiB" in text
-    assert json.loads(estimate_in_words(FOUND, as_json=True)) == {"event": "estimate", **FOUND}
+    assert json.loads(estimate_in_words(numbers, as_json=True)) == {"event": "estimate", **numbers}
+
+
+@pytest.fixture(scope="module")
+def simulated_tree():
+    scenario = parse_scenario({"grid": {"width": 900, "height": 600}, "terrain": FLAT})
+    return fifesim.simulate(scenario.complete(), chunks={"y": 90, "x": 135})
+
+
+def test_each_block_is_listed_once_with_all_bands(simulated_tree):
+    """Chunks of Zarr are of one size; only the last may be smaller."""
+    found, lai = products.products_of(simulated_tree, scene=True), simulated_tree["scene"]["lai"]
+    wanted = products.wanted_blocks(found, lai)
+    assert len(wanted) == len(set(wanted)) == sum(raster.data.npartitions for raster in found.values())
+    names = {"image", "lai", "fpar", "green_fpar", "soil", "brown", "moisture", "detail"}
+    cells = {f"scene-{name}" for name in simulated_tree["scene"].data_vars}
+    assert {name for name, _ in wanted} == set(found) == names | cells
+    for raster in found.values():
+        *bands, rows, columns = raster.chunks
+        assert all(len(each) == 1 for each in bands)
+        assert all(set(sizes[:-1]) <= {sizes[0]} and sizes[-1] <= sizes[0] for sizes in (rows, columns))
+    detail = found["detail"]
+    assert detail.shape == (144, 144) and abs(float(detail["x"].mean() - lai["x"].mean())) <= 15

@@ -1,4 +1,4 @@
-"""STAC items and collections are valid and agree with the files."""
+"""Other programs open the files and the STAC item of a run at the right location and with the right values."""
 
 import hashlib
 import json
@@ -6,8 +6,10 @@ import json
 import numpy as np
 import pytest
 import rasterio
+import xarray as xr
 from rasterio.warp import transform, transform_bounds
 
+import fifesim
 from fifesim.output import stac
 from fifesim.scenario.scenario import parse_scenario
 
@@ -39,15 +41,12 @@ def test_extensions_of_an_item_are_readable_and_declared(item, small_run, pystac
     from pystac.extensions.view import ViewExtension
 
     found = pystac.Item.from_dict(item)
-    image = ProjectionExtension.ext(found.assets["image"])
+    image, view = ProjectionExtension.ext(found.assets["image"]), ViewExtension.ext(found)
     assert (image.code, image.shape) == ("EPSG:26914", [20, 30])
     assert image.transform == [30.0, 0.0, 704970.0, 0.0, -30.0, 4334220.0]
-    view = ViewExtension.ext(found)
-    with rasterio.open(small_run / "image.tif") as source:
-        tags = source.tags()
-    assert view.incidence_angle == 20.0
-    assert view.sun_elevation == pytest.approx(90 - float(tags["sza"]), abs=1e-8)
-    assert view.sun_azimuth == pytest.approx(float(tags["saa"]), abs=1e-8)
+    sun = fifesim.open_image(small_run / "image.tif")
+    angles = view.incidence_angle, view.sun_elevation, view.sun_azimuth
+    assert angles == pytest.approx((20.0, 90 - float(sun.sza), float(sun.saa)), abs=1e-8)
     # Azimuth from the nadir point of the sensor, which lies in the east, to the scene.
     assert view.azimuth == 280.0
     names = {"proj": "projection"} | {name: name for name in ("eo", "raster", "processing", "file")}
@@ -86,22 +85,10 @@ def test_bands_of_the_item_match_the_file(item, small_run):
     assert [band["eo:common_name"] for band in bands] == ["green", "red", "nir"]
     assert bands[2]["eo:solar_illumination"] == 1031.0
     assert {band["nodata"] for band in item["assets"]["truth"]["bands"]} == {"nan"}
-
-
-def test_bands_of_the_eo_extension_match_the_core_bands(item, pystac):
-    """Version 1.1.0 of the extension has eo:bands, which odc-stac uses to find names; version 2 does not."""
-    from pystac.extensions.eo import EOExtension
-
-    found = pystac.Item.from_dict(item)
-    for name, fields in (("image", ["name", "center_wavelength", "solar_illumination"]), ("truth", ["name"])):
-        core, extension = item["assets"][name]["bands"], item["assets"][name]["eo:bands"]
-        for field in fields:
-            core_field = field if field == "name" else f"eo:{field}"
-            assert [band[field] for band in extension] == [band[core_field] for band in core]
-        assert [band.name for band in EOExtension.ext(found.assets[name]).bands] == [band["name"] for band in core]
-    assert [band.common_name for band in EOExtension.ext(found.assets["image"]).bands] == ["green", "red", "nir"]
-    allowed = {"name", "common_name", "description", "center_wavelength", "full_width_half_max", "solar_illumination"}
-    assert all(set(band) <= allowed for asset in item["assets"].values() for band in asset.get("eo:bands", []))
+    # Version 1.1.0 of the extension has eo:bands, which odc-stac uses to find names; version 2 does not.
+    for band, old in zip(bands, item["assets"]["image"]["eo:bands"], strict=True):
+        assert old.items() >= {"name": band["name"], "center_wavelength": band["eo:center_wavelength"]}.items()
+        assert old["solar_illumination"] == band["eo:solar_illumination"]
 
 
 def test_footprint_encloses_the_pixels(item):
@@ -149,3 +136,48 @@ def test_band_has_the_common_name_with_the_nearest_centre():
     found = [stac._spectral(coords, number) for number in (1, 2, 3)]
     assert [band["eo:common_name"] for band in found] == ["nir08", "nir", "nir09"]
     assert [band["eo:solar_illumination"] for band in found] == coords["solar_irradiance"]
+
+
+# Corner and size of the run in the scenario [m].
+WEST, NORTH, PIXEL, ROWS, COLUMNS = 704970.0, 4334220.0, 30.0, 20, 30
+
+
+@pytest.mark.parametrize("name", ["image.tif", "truth.tif"])
+def test_files_are_valid_cloud_optimised_geotiffs(small_run, name):
+    cogeo = pytest.importorskip("rio_cogeo")
+    valid, errors, warnings = cogeo.cog_validate(small_run / name, strict=True)
+    assert valid, (errors, warnings)
+
+
+def test_odc_stac_loads_the_item(small_run, pystac):
+    stac = pytest.importorskip("odc.stac")
+    item = pystac.Item.from_file(str(small_run / "item.json"))
+    found = stac.load([item]).isel(time=0)
+    np.testing.assert_allclose(found["x"], WEST + 30 * (np.arange(30) + 0.5), rtol=0, atol=1e-3)
+    np.testing.assert_allclose(found["y"], NORTH - 30 * (np.arange(20) + 0.5), rtol=0, atol=1e-3)
+    assert found.rio.crs.to_epsg() == 26914
+    assert found["time"].values == np.datetime64("1987-06-06T16:35:00")
+    image, truth = (fifesim.open_image(small_run / name) for name in ("image.tif", "truth.tif"))
+    for name in ("TM2", "TM3", "TM4"):
+        np.testing.assert_array_equal(found[name], image.sel(band=name))
+        assert (found[name].dtype, found[name].attrs["nodata"]) == ("uint8", 0)
+    for name in ("lai", "fpar"):
+        np.testing.assert_array_equal(found[name], truth.sel(band=name))
+        assert np.isnan(found[name].attrs["nodata"])
+    for names in ({"image.2": "TM3"}, {"red": "TM3", "nir": "TM4"}):
+        chosen = stac.load([item], bands=list(names)).isel(time=0)
+        for name, band in names.items():
+            np.testing.assert_array_equal(chosen[name], found[band])
+
+
+def test_gdal_opens_the_cells_with_their_crs(small_run):
+    """The wheels of rasterio include the Zarr driver; a cell is a ninth of a pixel wide."""
+    with rasterio.Env() as env:
+        if "Zarr" not in env.drivers():
+            pytest.skip("this GDAL has no driver for Zarr")
+    cells = xr.open_zarr(small_run / "scene.zarr", decode_coords="all")
+    for name in ("lai", "surface_reflectance"):
+        with rasterio.open(f'ZARR:"{small_run}/scene.zarr":/{name}') as source:
+            assert source.crs.to_epsg() == 26914 and np.isnan(source.nodata)
+            np.testing.assert_allclose(source.bounds, (WEST, NORTH - 600, WEST + 900, NORTH), rtol=0, atol=1e-6)
+            np.testing.assert_array_equal(source.read().squeeze(), cells[name])

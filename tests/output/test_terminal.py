@@ -1,13 +1,18 @@
-"""Terminal output of commands."""
+"""Terminal output of commands: results, errors, progress, and no output without a terminal."""
 
+import json
 import logging
 import os
+import re
 import signal
+import time
 
 import pytest
 
-from fifesim.base.messages import LOG, quiet
-from fifesim.output.terminal import Exit, exit_with_error, in_time, interrupts_blocked, listening, print_lines, report
+from fifesim.base.messages import quiet
+from fifesim.output import progress
+from fifesim.output.progress import Progress, since_start, spinner, steps
+from fifesim.output.terminal import Exit, exit_with_error, in_time, interrupts_blocked, print_lines, report
 
 
 def test_last_line_gives_the_duration_and_the_file_to_open(capsys):
@@ -21,22 +26,13 @@ def test_last_line_gives_the_duration_and_the_file_to_open(capsys):
     assert capsys.readouterr().out == ""
 
 
-@pytest.mark.parametrize(
-    ("seconds", "said"), [(0.04, "0.0 s"), (59.94, "59.9 s"), (59.96, "1 min 0 s"), (3599.6, "1 h 0 min")]
-)
-def test_durations_never_show_60_seconds_or_60_minutes(seconds, said):
-    assert in_time(seconds) == said
-
-
-def test_log_is_printed_only_inside_the_context(capsys):
-    before = LOG.level
-    with listening(logging.INFO):
-        LOG.info("a name \x1b[31m")
-        LOG.debug("a part")
-    LOG.info("afterwards")
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.endswith("a name \\x1b[31m")
-    assert not LOG.handlers and LOG.level == before
+def test_durations_never_show_60_seconds_or_60_minutes():
+    assert [in_time(seconds) for seconds in (0.04, 59.94, 59.96, 3599.6)] == [
+        "0.0 s",
+        "59.9 s",
+        "1 min 0 s",
+        "1 h 0 min",
+    ]
 
 
 def test_control_characters_are_escaped(capsys):
@@ -63,3 +59,41 @@ def test_interrupt_is_delayed_until_the_context_ends():
     finally:
         signal.signal(signal.SIGINT, before)
     assert done == ["rest"] and signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def test_json_lines_report_progress(capsys):
+    with Progress("simulating", "cells", 100, done=40, as_json=True) as progress:
+        progress.advance(60)
+    first, last = map(json.loads, capsys.readouterr().out.splitlines())
+    assert (first["cells_done"], first["seconds_left"]) == (40, None)
+    assert (last["cells_done"], last["cells"], last["seconds_left"]) == (100, 100, 0)
+    assert last["cells_per_second"] > 0 and last["memory"] > 10e6
+
+
+def test_progress_is_one_line_per_minute_without_a_terminal(capsys, monkeypatch):
+    now = iter(range(0, 10**6, 25))
+    monkeypatch.setattr(time, "monotonic", lambda: float(next(now)))
+    with Progress("simulating", "cells", 8_000_000) as progress:
+        for _ in range(8):
+            progress.advance(1_000_000)
+    out, err = capsys.readouterr()
+    assert out == "" and 2 <= len(err.splitlines()) <= 5
+    line = r"simulating: \d,000,000 of 8,000,000 cells, \d\d,\d{3}\.\d/s, \d+\.\d+ GB, .* left$"
+    assert re.match(line, err.splitlines()[0]), err
+
+
+def test_short_run_without_a_terminal_prints_nothing_but_a_log(capsys, caplog):
+    with Progress("simulating", "cells", 2) as progress:
+        progress.advance(2)
+    with caplog.at_level(logging.DEBUG, logger="fifesim"):
+        assert list(steps(["a", "b"], "scenes")) == ["a", "b"]
+    with spinner("a report"):
+        pass
+    assert capsys.readouterr() == ("", "")
+    assert caplog.messages == ["scenes: 2", "scenes: 1 of 2", "scenes: 2 of 2"]
+
+
+def test_elapsed_time_counts_from_the_start_of_the_process(monkeypatch):
+    monkeypatch.setattr(progress.psutil.Process, "create_time", lambda process: 1000.0)
+    monkeypatch.setattr(time, "time", lambda: 1030.0)
+    assert since_start() == 30.0

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from elevations import write
 from lazy import no_compute
+from mistakes import cases, mistakes
 from oracles_canopy import fpar_of_green_leaves
 
 import fifesim
@@ -19,36 +20,22 @@ from fifesim.scenario.ground import (
     elevation,
     ground_scene,
     scenario_light_on_hills,
-    truth_of,
     warn_of_canopy,
 )
 from fifesim.scenario.scenario import parse_scenario
-from fifesim.scenario.simulation import setup_of
 
 SMALL = {"grid": {"width": 300.0, "height": 240.0}, "terrain": {"dem": "flat"}}
+
 STAND = {"distribution": "burned-grazed"}
+
 BACKGROUND = {"TM3": 0.1, "TM4": 0.2}
+
+GROUND = {"arp": 0.1, "seed": 11, "hotspot": 0.1, "brown": 0.2, "dissociation": 0.5, "crown_cover": 0.8}
+GROUND |= {"crown_shape": 0.7, "moisture": 0.2, "fpar_inf": 0.9, "background": BACKGROUND}
+GROUND |= {"distribution": "burned-ungrazed", "leaf_angles": "planophile", "brown_leaf": {"brown": 1.0}}
 OWN = {
-    "ground": {
-        "distribution": "burned-ungrazed",
-        "arp": 0.1,
-        "seed": 11,
-        "leaf_angles": "planophile",
-        "hotspot": 0.1,
-        "brown": 0.2,
-        "dissociation": 0.5,
-        "crown_cover": 0.8,
-        "crown_shape": 0.7,
-        "moisture": 0.2,
-        "fpar_inf": 0.9,
-        "background": BACKGROUND,
-        "brown_leaf": {"brown": 1.0},
-    },
-    "landscape": {
-        "cover": "voronoi",
-        "size": 80.0,
-        "deviations": {"soil": 0.03, "brown": 0.06, "crown_cover": 0.0},
-    },
+    "ground": GROUND,
+    "landscape": {"cover": "voronoi", "size": 80.0, "deviations": {"soil": 0.03, "brown": 0.06, "crown_cover": 0.0}},
     "classes": {
         "grass": {"share": 0.7, "hotspot": 0.2, "arp": 0.2, "leaf_angles": "spherical"},
         "wood": {"share": 0.3, "distribution": "unburned-ungrazed", "leaf_angles": "erectophile"},
@@ -64,15 +51,12 @@ def scenario():
 @pytest.fixture(scope="module")
 def by_hand(scenario):
     """The landscape of `OWN`, built by explicit calls."""
+    grass = fifesim.Canopy(hotspot=0.2, leaf_angles="spherical")
+    wood = fifesim.CoverClass(lai="unburned-ungrazed", canopy=fifesim.Canopy(leaf_angles="erectophile"))
     return fifesim.landscape(
         scenario.geobox(),
         cover=fifesim.ground.Patches("voronoi", 80, {"grass": 0.7, "wood": 0.3}),
-        classes={
-            "grass": fifesim.CoverClass(
-                lai="burned-ungrazed", canopy=fifesim.Canopy(hotspot=0.2, leaf_angles="spherical"), arp=0.2
-            ),
-            "wood": fifesim.CoverClass(lai="unburned-ungrazed", canopy=fifesim.Canopy(leaf_angles="erectophile")),
-        },
+        classes={"grass": fifesim.CoverClass(lai="burned-ungrazed", canopy=grass, arp=0.2), "wood": wood},
         arp=0.1,
         brown=fifesim.ground.Field(mean=0.2, sd=0.06, arp=0.1),
         soil=fifesim.ground.Field(sd=0.03, arp=0.1),
@@ -128,25 +112,19 @@ def test_reflectance_and_truth_match_explicit_calls(scenario, by_hand):
 
 
 def test_mapped_leaf_area_is_kept_while_other_properties_vary(tmp_path):
-    lai = make_scene(ground={"seed": 5})["lai"]
+    varied, lai = make_scene(landscape={"deviations": {"soil": 0.02}}), make_scene(ground={"seed": 5})["lai"]
     ground = {"lai_file": str(write(tmp_path / "lai.tif", lai.values, parse_scenario(SMALL).geobox().affine))}
     land = make_scene(ground=ground, landscape={"deviations": {"soil": 0.02}})
     np.testing.assert_array_equal(land["lai"], lai)
-    np.testing.assert_array_equal(land["soil"], make_scene(landscape={"deviations": {"soil": 0.02}})["soil"])
+    np.testing.assert_array_equal(land["soil"], varied["soil"])
 
 
 def test_drawn_properties_take_mean_and_arp_from_the_ground():
+    means = {"soil": -0.1, "moisture": 0.3, "brown": 0.2, "crown_cover": 0.8}
     deviations = {"soil": 0.03, "moisture": 0.1, "brown": 0.05, "crown_cover": 0.07}
-    case = parse_scenario(
-        {"ground": {"arp": 0.1, "brown": 0.2, "crown_cover": 0.8, "soil": -0.1, "moisture": 0.3}}
-        | {"landscape": {"deviations": deviations}}
-    )
-    assert drawn_properties(case) == {
-        "soil": fifesim.ground.Field(mean=-0.1, sd=0.03, arp=0.1),
-        "moisture": fifesim.ground.Field(mean=0.3, sd=0.1, arp=0.1),
-        "brown": fifesim.ground.Field(mean=0.2, sd=0.05, arp=0.1),
-        "crown_cover": fifesim.ground.Field(mean=0.8, sd=0.07, arp=0.1),
-    }
+    case = parse_scenario({"ground": {"arp": 0.1} | means, "landscape": {"deviations": deviations}})
+    expected = {name: fifesim.ground.Field(mean=means[name], sd=sd, arp=0.1) for name, sd in deviations.items()}
+    assert drawn_properties(case) == expected
 
 
 def test_fields_set_by_classes_or_drawn_are_not_passed(scenario):
@@ -158,48 +136,25 @@ def test_fields_set_by_classes_or_drawn_are_not_passed(scenario):
     assert explicit_fields(alone) == expected | {"leaf_angles": "planophile", "brown": 0.2, "soil": 0.0}
 
 
-@pytest.mark.parametrize("key", ["leaf", "background_spectra"])
-def test_ground_leaf_and_spectra_are_passed_unless_every_class_sets_them(key):
-    value = {"leaf": {"chlorophyll": 30.0}, "background_spectra": {"shade": 1.0}}[key]
-    field = {"leaf": "leaf_optics", "background_spectra": "background"}[key]
-    sections = {"ground": {key: value}, "landscape": {"cover": "voronoi"}}
-    both, one = ({"a": {key: value}, "b": {key: value}}, {"a": {key: value}, "b": {}})
-    assert field not in canopy_of(parse_scenario(sections | {"classes": both})).given
-    assert field in canopy_of(parse_scenario(sections | {"classes": one})).given
+def test_ground_leaf_and_spectra_are_passed_unless_every_class_sets_them():
+    for key, value, field in (
+        ("leaf", {"chlorophyll": 30.0}, "leaf_optics"),
+        ("background_spectra", {"shade": 1.0}, "background"),
+    ):
+        sections = {"ground": {key: value}, "landscape": {"cover": "voronoi"}}
+        for other in ({key: value}, {}):
+            case = parse_scenario(sections | {"classes": {"a": {key: value}, "b": other}})
+            assert (field in canopy_of(case).given) == (not other)
 
 
-@pytest.mark.parametrize(
-    ("sections", "dead"),
-    [
-        ({}, False),
-        ({"ground": {"brown": 0.2}}, True),
-        ({"ground": {"dissociation": 0.5}}, False),
-        ({"ground": {"brown": 0.2}, "landscape": {"deviations": {"brown": 0.05}}}, True),
-        ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"brown": 0.1}, "b": {}}}, True),
-        ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"brown": 0.0}, "b": {}}}, False),
-        ({"ground": {"brown": 0.2}, "landscape": {"cover": "voronoi"}, "classes": {"a": {"brown": 0.0}}}, False),
-    ],
-    ids=str,
-)
+@pytest.mark.parametrize(("sections", "dead"), cases("dead leaves"), ids=str)
 def test_green_fpar_is_output_only_where_some_leaves_are_dead(sections, dead):
     case = parse_scenario(SMALL | sections | {"ground": STAND | sections.get("ground", {})})
-    land = ground_scene(case, case.geobox(), 50)
-    land = land if isinstance(land, xr.Dataset) else land.to_dataset(name="lai")
-    truth = truth_of(case, setup_of(case), land)
+    truth = fifesim.simulate(case)["truth"]
     assert ("green_fpar" in truth) == dead
     if dead:
         assert truth["green_fpar"].attrs["long_name"].endswith("that green leaves absorb")
         assert float(truth["green_fpar"].mean()) < float(truth["fpar"].mean())
-
-
-LEVEL_LAND = [
-    {"landscape": {"deviations": {"soil": 0.0, "moisture": 0.0, "brown": 0.0, "crown_cover": 0.0}}},
-    {"ground": {"brown": 0.0, "dissociation": 1.0, "brown_leaf": {"brown": 1.0}}},
-    {"ground": {"crown_cover": 1.0, "crown_shape": 0.3}},
-    {"ground": {"soil": 0.0, "moisture": 0.0}, "landscape": {"deviations": {"soil": 0.0}}},
-    {"landscape": {"cover": "pastures"}, "classes": {"a": {"brown": 0.0, "crown_cover": 1.0}}},
-    {"landscape": {"cover": "levels", "size": 50.0}, "classes": {"a": {}, "b": {"hotspot": 0.0}}},
-]
 
 
 @pytest.fixture(scope="module")
@@ -207,80 +162,35 @@ def uniform_run():
     return fifesim.simulate(parse_scenario(SMALL | {"ground": STAND})).compute()
 
 
-@pytest.mark.parametrize("sections", LEVEL_LAND, ids=str)
-def test_zero_variation_gives_the_uniform_ground(uniform_run, sections):
+@pytest.mark.parametrize(("sections", "_"), cases("uniform ground"), ids=str)
+def test_zero_variation_gives_the_uniform_ground(uniform_run, sections, _):
     """Results are identical to the bit."""
     found = fifesim.simulate(parse_scenario(SMALL | sections | {"ground": STAND | sections.get("ground", {})}))
     for node, name in (("scene", "lai"), ("scene", "surface_reflectance"), ("image", "dn"), ("truth", "fpar")):
         np.testing.assert_array_equal(found[node][name], uniform_run[node][name], err_msg=name)
 
 
-def test_undrawn_properties_keep_their_value_when_others_are_drawn():
-    """With a deviation of 0, the value in [ground] still applies to the leaves."""
-    ground = {"brown": 0.15, "crown_cover": 0.8, "moisture": 0.3}
-    asked = {"deviations": {"soil": 0.02, "brown": 0.0, "crown_cover": 0.0}}
-    both = (
-        fifesim.simulate(parse_scenario(SMALL | {"ground": ground, "landscape": land}))["image"]["dn"]
-        for land in (asked, {"deviations": {"soil": 0.02}})
-    )
-    np.testing.assert_array_equal(*both)
-
-
-ELSEWHERE = {
-    "grid": {"crs": "EPSG:32633", "west": 390000, "north": 5820000, "width": 600, "height": 600, "cell": 30},
-    "geometry": {"sza": 40, "saa": 150},
-    "atmosphere": {"altitude": 0.1},
-    "terrain": {"dem": "flat"},
-}
-LEAF, SOIL = {"leaf": {"chlorophyll": 40}}, {"background_spectra": {"soil_dry": 1.0}}
-
-
-@pytest.mark.parametrize(
-    ("keys", "taken"),
-    [
-        ({"grid": {"width": 600, "height": 600}}, ""),
-        (
-            {"grid": {"width": 600, "height": 600}, "ground": {"lai_file": "lai.tif"}},
-            "lai.tif is unknown: .*soil and litter, green",
-        ),
-        (ELSEWHERE | {"ground": STAND}, r"the scene is unknown: .*soil and litter, green leaves.*\[ground\.leaf\]"),
-        (ELSEWHERE | {"ground": STAND | SOIL}, "for green leaves; give"),
-        (ELSEWHERE | {"ground": STAND | LEAF}, "for soil and litter; give"),
-        (ELSEWHERE | {"ground": LEAF | SOIL | {"brown": 0.3}}, "for dead leaves; give"),
-        (ELSEWHERE | {"ground": STAND | LEAF | SOIL}, ""),
-        (ELSEWHERE | {"ground": LEAF | SOIL}, "for dead leaves; give"),
-        (
-            ELSEWHERE | {"ground": SOIL, "landscape": {"cover": "voronoi"}, "classes": {"grass": LEAF, "crop": {}}},
-            "for green leaves; give",
-        ),
-    ],
-)
-def test_tallgrass_defaults_outside_the_site_give_a_warning(keys, taken):
-    scenario = parse_scenario(keys)
+@pytest.mark.parametrize(("stage", "keys", "taken"), mistakes("canopy"), ids=str)
+def test_tallgrass_defaults_outside_the_site_give_a_warning(stage, keys, taken):
     with warnings.catch_warnings(record=True, action="always", category=UserWarning) as said:
-        warn_of_canopy(scenario)
+        warn_of_canopy(parse_scenario(keys))
     assert len(said) == bool(taken) and all(re.search(taken, str(each.message)) for each in said)
 
 
 GRID = {"west": 707970.0, "north": 4331220.0, "width": 300.0, "height": 240.0}
 
 
-def test_hills_extend_one_cell_and_the_horizon_its_given_reach():
+def test_hills_extend_one_cell_and_the_horizon_its_given_reach_in_cells_aligned_to_the_crs():
+    """All windows of a scenario share the same horizon cells."""
     hills = parse_scenario({"grid": GRID, "terrain": {"seed": 3, "horizon_reach": 600}})
     grid = hills.geobox()
     dem, horizon, reach = elevation(hills, grid)
     assert grids.same_grid(grids.geobox(dem), grid.pad(1))
     np.testing.assert_array_equal(dem, fifesim.flint_hills(grid.pad(1), seed=3))
     assert reach == dict.fromkeys(("north", "east", "south", "west"), 600.0)
-    around, box = grids.geobox(horizon).boundingbox, grid.boundingbox
+    around, box, affine = grids.geobox(horizon).boundingbox, grid.boundingbox, grids.geobox(horizon).affine
     assert around.left <= box.left - 600 + 30 and around.right >= box.right + 600 - 30
     assert around.bottom <= box.bottom - 600 + 30 and around.top >= box.top + 600 - 30
-
-
-def test_horizon_cells_are_aligned_to_the_origin_of_the_crs():
-    """All windows of a scene then share the same horizon cells."""
-    hills = parse_scenario({"grid": GRID, "terrain": {"horizon_reach": 300}})
-    affine = grids.geobox(elevation(hills, hills.geobox())[1]).affine
     for origin, cell in ((affine.c, affine.a), (affine.f, affine.e)):
         # Cell centres of the surrounding land lie on odd multiples of half a cell.
         assert abs(((origin + cell / 2) / (cell / 2)) - round((origin + cell / 2) / (cell / 2))) < 1e-6
@@ -308,10 +218,6 @@ def test_learned_landscape_draws_the_properties_of_the_scenario(tmp_path):
     np.testing.assert_array_equal(land["moisture"], described["moisture"])
     np.testing.assert_allclose(land["soil"] * konza.properties["soil"].sd / 0.1, described["soil"], rtol=1e-12)
     assert drawn_properties(case.complete()) == drawn_properties(case) and case.complete().ground.moisture == 0.1
-    with pytest.raises(ValueError, match="one share of dead leaves: type for instance brown = 0"):
-        parse_scenario(SMALL | {"ground": {"model": "discrete-ordinates"}}).complete()
-    with pytest.raises(ValueError, match="needs uniform soil, brown, moisture: type"):
-        parse_scenario({"grid": SMALL["grid"], "terrain": {"slopes": "upright"}}).complete()
     konza.save(tmp_path / "mine.json")
     mine = parse_scenario(SMALL | {"landscape": {"learned": str(tmp_path / "mine.json")}})
     np.testing.assert_array_equal(ground_scene(mine, mine.geobox())["lai"], described["lai"])

@@ -1,30 +1,26 @@
-"""Scenarios with terrain."""
+"""Simulated scenarios compared with explicit calls, and the physical meaning of the values of a section."""
 
 import numpy as np
 import pytest
 import rasterio
-import xarray as xr
+from affine import Affine
 from elevations import write
 from lazy import no_compute
 
 import fifesim
-from fifesim.base import files
 from fifesim.base.geometry import Geometry, earth_sun_distance
 from fifesim.base.times import SITE_TIME
 from fifesim.grids import grid as grids
-from fifesim.scenario.ground import elevation
 from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.sections import Ground, Sensor
 from fifesim.sensor.description.instruments import instrument
 
 GRID = {"west": 704970.0 + 600, "north": 4334220.0 - 300, "width": 600.0, "height": 450.0}
 
-EXACT = {"ground.model": "discrete-ordinates"}
-
 
 def scenario(**terrain):
-    return parse_scenario(
-        {"grid": GRID, "ground": {"seed": 7, "arp": 0.15}, "terrain": {"horizon_reach": 900} | terrain}
-    )
+    sections = {"grid": GRID, "ground": {"seed": 7, "arp": 0.15}, "terrain": {"horizon_reach": 900} | terrain}
+    return parse_scenario(sections)
 
 
 @pytest.fixture
@@ -44,7 +40,9 @@ def hill(tmp_path):
 
 def test_terrain_matches_explicit_calls_of_the_chain(hill):
     case = scenario(dem=hill())
-    tree = fifesim.simulate(case)
+    with no_compute():
+        tree = fifesim.simulate(case, chunks={"y": 50, "x": 70})
+    assert tree["scene"]["dem"].chunks is not None
     grid = case.geobox()
     dem = fifesim.fine_dem(case.terrain.dem, grid)
     around, reach = fifesim.terrain.source_dem(case.terrain.dem, grid, 900)
@@ -57,38 +55,23 @@ def test_terrain_matches_explicit_calls_of_the_chain(hill):
     np.testing.assert_array_equal(tree["terrain"]["dem"], fifesim.aggregate(dem, 30))
     kt = fifesim.kt(level, dem, horizon=horizon)
     np.testing.assert_array_equal(tree["terrain"]["kt"], fifesim.aggregate(kt, 30))
+    assert grids.same_grid(grids.geobox(tree["terrain"]["slope"]), grids.geobox(tree["image"]["dn"]))
     assert tree["terrain"].attrs == {f"reach_{side}": distance for side, distance in reach.items()}
     assert reach == dict.fromkeys(("north", "east", "south", "west"), 300.0)
 
 
-@pytest.mark.parametrize("change", [{"seed": 8}, {"upwelling": False}, {"dem": "flat"}])
-def test_each_terrain_key_changes_the_image(change):
-    options = {"vza": 8.0, "vaa": 100.0}
-    cases = [
-        parse_scenario({"grid": GRID, "geometry": options, "terrain": {"horizon_reach": 900} | terrain})
-        for terrain in ({}, change)
-    ]
-    one, other = (fifesim.simulate(case)["image"]["dn"] for case in cases)
-    assert (one != other).any()
-
-
-def test_elevation_in_feet_is_rejected_unless_declared(hill):
-    in_feet = hill("feet.tif", unit="ft", per_metre=1 / 0.3048)
-    with pytest.raises(ValueError, match="vertical_units"):
-        fifesim.simulate(scenario(dem=in_feet))
+def test_elevation_in_feet_or_with_a_hole_is_rejected_unless_declared(hill):
     metres = fifesim.simulate(scenario(dem=hill()))["terrain"]["dem"]
-    feet = fifesim.simulate(scenario(dem=in_feet, vertical_units="ft"))["terrain"]["dem"]
-    np.testing.assert_allclose(feet, metres, rtol=1e-12)
-
-
-def test_missing_elevation_is_rejected_unless_filled(hill):
-    holed = hill("holed.tif", hole=True)
+    feet, holed = hill("feet.tif", unit="ft", per_metre=1 / 0.3048), hill("holed.tif", hole=True)
+    with pytest.raises(ValueError, match="vertical_units"):
+        fifesim.simulate(scenario(dem=feet))
+    declared = fifesim.simulate(scenario(dem=feet, vertical_units="ft"))["terrain"]["dem"]
+    np.testing.assert_allclose(declared, metres, rtol=1e-12)
     with pytest.raises(ValueError, match="fill"):
         fifesim.simulate(scenario(dem=holed))
     filled = fifesim.simulate(scenario(dem=holed, fill=60))["terrain"]["dem"]
-    whole = fifesim.simulate(scenario(dem=hill()))["terrain"]["dem"]
     # The hole is one 30 m cell at the hilltop, filled with a minimum curvature surface.
-    assert float(np.abs(filled - whole).max()) < 2.0
+    assert float(np.abs(filled - metres).max()) < 2.0
 
 
 def test_sun_below_every_slope_is_rejected(tmp_path):
@@ -100,23 +83,6 @@ def test_sun_below_every_slope_is_rejected(tmp_path):
         fifesim.simulate(parse_scenario(shaded))
 
 
-def test_scene_with_terrain_is_lazy_and_on_its_grid(hill):
-    case = scenario(dem=hill())
-    with no_compute():
-        tree = fifesim.simulate(case, chunks={"y": 50, "x": 70})
-    assert tree["scene"]["dem"].chunks is not None
-    assert grids.same_grid(grids.geobox(tree["terrain"]["slope"]), grids.geobox(tree["image"]["dn"]))
-
-
-def test_sensor_keys_equal_the_arguments_of_sense():
-    keys = {"instrument": "L4TM", "interval": 31.0, "offset": [0.25, -0.5], "noise": ["thermal"], "seed": 3}
-    case = parse_scenario({"grid": GRID, "ground": {"arp": 0.15}, "terrain": {"dem": "flat"}, "sensor": keys})
-    lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
-    toa = fifesim.to_toa(fifesim.surface_reflectance(lai, "L4TM", bands=["TM3", "TM4"]), instrument="L4TM")
-    image = fifesim.sense(toa, "L4TM", interval=31.0, offset=(0.25, -0.5), noise="all", seed=3)
-    xr.testing.assert_identical(fifesim.simulate(case)["image"]["dn"].drop_attrs(), image.drop_attrs())
-
-
 # The cells of the fixture "site", on level ground.
 LEVEL = {
     "grid": {"west": 704970.0 + 600, "north": 4334220.0 - 300, "width": 180.0, "height": 150.0},
@@ -125,111 +91,35 @@ LEVEL = {
 }
 
 
-def test_scenario_matches_the_chain(whole, site):
-    scenario = fifesim.Scenario.model_validate(LEVEL)
-    with no_compute():
-        tree = fifesim.simulate(scenario)
-    assert grids.same_grid(grids.geobox(tree["scene"]["lai"]), site)
-    np.testing.assert_array_equal(tree["scene"]["lai"], whole["lai"])
-    np.testing.assert_array_equal(tree["image"]["dn"], whole["image"])
-    np.testing.assert_array_equal(tree["image"]["ndvi"], whole["ndvi"])
-    np.testing.assert_array_equal(tree["truth"]["lai"], whole["truth"])
-    np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fifesim.fpar(whole["lai"]), 30.0))
-
-
 def test_every_key_of_a_scenario_reaches_its_stage():
     """Each key differs from its default, so an ignored key changes the bits."""
-    bands = ["TM3", "TM4"]
+    bands, place = ["TM3", "TM4"], LEVEL["grid"] | {"width": 360.0, "height": 300.0}
     leaf, back = {"TM3": (0.1, 0.08), "TM4": (0.5, 0.4)}, {"TM3": 0.1, "TM4": 0.2}
-    options = {
-        "grid": LEVEL["grid"],
-        "terrain": LEVEL["terrain"],
-        "ground": {
-            "distribution": "burned-ungrazed",
-            "arp": 0.2,
-            "seed": 11,
-            "method": "periodic",
-            "leaf_angles": "planophile",
-            "hotspot": 0.2,
-            "fpar_inf": 0.9,
-            "leaf_reflectance": {band: optics[0] for band, optics in leaf.items()},
-            "leaf_transmittance": {band: optics[1] for band, optics in leaf.items()},
-            "background": back,
-        },
-        "geometry": {"sza": 40.0, "saa": 100.0, "vza": 5.0, "vaa": 10.0},
-        "atmosphere": {"visibility": 23, "altitude": 1.0},
-        "sensor": {"bands": bands, "pixel": 50.0, "min_valid": 1.0, "response": "paper"},
-    }
-    tree = fifesim.simulate(fifesim.Scenario.model_validate(options))
-    sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(SITE_TIME))
-    grid = grids.grid_at("EPSG:26914", *LEVEL["grid"].values(), 30 / 9)
-    lai = fifesim.lai_scene(grid, "burned-ungrazed", arp=0.2, seed=11, method="periodic")
-    rho = fifesim.surface_reflectance(
-        lai,
-        bands=bands,
-        atmosphere=fifesim.Atmosphere(visibility=23, altitude=1.0),
-        geometry=sun,
-        canopy=fifesim.Canopy(leaf_optics=leaf, background=back, leaf_angles="planophile", hotspot=0.2),
+    stand = {"distribution": "burned-ungrazed", "arp": 0.2, "leaf_angles": "planophile", "hotspot": 0.2}
+    stand |= {"leaf_reflectance": {"TM3": 0.1, "TM4": 0.5}, "leaf_transmittance": {"TM3": 0.08, "TM4": 0.4}}
+    case = fifesim.Scenario(
+        grid=place,
+        terrain=LEVEL["terrain"],
+        ground=stand | {"seed": 11, "method": "periodic", "fpar_inf": 0.9, "background": back},
+        geometry={"sza": 40.0, "saa": 100.0, "vza": 5.0, "vaa": 10.0},
+        atmosphere={"visibility": 23, "altitude": 1.0},
+        sensor={"instrument": "L4TM", "bands": bands, "pixel": 50.0, "interval": 31.0, "offset": [0.25, -0.5]}
+        | {"min_valid": 1.0, "noise": ["thermal"], "seed": 3},
     )
-    paper = fifesim.instrument("TM", response="paper")
-    image = fifesim.sense(fifesim.to_toa(rho), paper, onto=grids.aligned_grid(grid, 50.0), min_valid=1.0)
+    with no_compute():
+        tree = fifesim.simulate(case)
+    sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(SITE_TIME))
+    grid = grids.grid_at("EPSG:26914", *place.values(), 30 / 9)
+    lai = fifesim.lai_scene(grid, "burned-ungrazed", arp=0.2, seed=11, method="periodic")
+    canopy = fifesim.Canopy(leaf_optics=leaf, background=back, leaf_angles="planophile", hotspot=0.2)
+    air = fifesim.Atmosphere(visibility=23, altitude=1.0)
+    rho = fifesim.surface_reflectance(lai, "L4TM", bands=bands, atmosphere=air, geometry=sun, canopy=canopy)
+    pixels = {"interval": 31.0, "offset": (0.25, -0.5), "min_valid": 1.0}
+    image = fifesim.sense(fifesim.to_toa(rho), "L4TM", noise="thermal", seed=3, **pixels)
     fpar = fifesim.fpar(lai, geometry=sun, canopy=fifesim.Canopy(leaf_angles="planophile"), fpar_inf=0.9)
     np.testing.assert_array_equal(tree["image"]["dn"], image)
     np.testing.assert_array_equal(tree["truth"]["lai"], fifesim.aggregate(lai, 50.0, min_valid=1.0))
     np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fpar, 50.0, min_valid=1.0))
-
-
-def test_coupling_slopes_and_model_keys_reach_the_chain():
-    keys = {"coupling": "directional", "visibility": 10}
-    ground = {"arp": 0.15}
-    case = parse_scenario({"grid": GRID, "ground": ground, "terrain": {"horizon_reach": 300}, "atmosphere": keys})
-    dem, horizon, _ = elevation(case, case.geobox())
-    run, plain, upright, exact = (
-        fifesim.simulate(case.replace(**changes))
-        for changes in ({}, {"coupling": "lambert"}, {"slopes": "upright"}, {"coupling": "four-stream", **EXACT})
-    )
-
-    def reflectance(slopes="kt", streams="directional"):
-        air, sun = case.model_atmosphere(), case.sun_and_view()
-        own = {"dem": dem, "horizon": horizon, "slopes": slopes} if slopes else {}
-        given = {"bands": ["TM3", "TM4"], "atmosphere": air, "geometry": sun, "streams": streams}
-        return fifesim.surface_reflectance(run["scene"]["lai"], "TM", **given, **own)
-
-    for found, streams in ((run["image"], reflectance()), (run["level"], reflectance(slopes=None))):
-        np.testing.assert_array_equal(found["dn"], fifesim.sense(fifesim.to_toa(streams), "TM"))
-    assert (run["image"]["dn"] != plain["image"]["dn"]).mean() > 0.05
-    np.testing.assert_array_equal(run["scene"]["surface_reflectance"], plain["scene"]["surface_reflectance"])
-    np.testing.assert_array_equal(upright["scene"]["surface_reflectance"], reflectance("upright", False))
-    np.testing.assert_array_equal(upright["terrain"]["kt"], plain["terrain"]["kt"])
-    assert "discrete ordinates" in exact["scene"]["surface_reflectance"].history
-
-
-def test_instrument_path_is_relative_to_the_scenario_and_its_tables_to_the_instrument(tmp_path, monkeypatch):
-    """The working directory has no effect."""
-    (tmp_path / "sensors").mkdir()
-    description = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
-    assert "avhrr_response.csv" in description
-    mine = description.replace("avhrr_response.csv", "responses.csv")
-    (tmp_path / "sensors" / "mine.toml").write_text(mine, encoding="utf-8")
-    table = files.path("avhrr_response.csv").read_text(encoding="utf-8")
-    (tmp_path / "sensors" / "responses.csv").write_text(table, encoding="utf-8")
-    bands = [band.name for band in instrument("AVHRR9").bands[:2]]
-    text = f"""
-        grid = {{ width = 9000.0, height = 9000.0, cell = 300.0 }}
-        terrain.dem = "flat"
-        sensor = {{ instrument = "sensors/mine.toml", bands = {bands}, pixel = 1500.0, min_valid = 0.5 }}
-    """
-    (tmp_path / "s.toml").write_text(text, encoding="utf-8")
-    elsewhere = tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    monkeypatch.chdir(elsewhere)
-    by_name = text.replace("sensors/mine.toml", "AVHRR9")
-    (elsewhere / "named.toml").write_text(by_name, encoding="utf-8")
-    mine, named = (
-        fifesim.simulate(fifesim.scenario.read_scenario(path).complete())["image"]["dn"].compute()
-        for path in ("../s.toml", "named.toml")
-    )
-    np.testing.assert_array_equal(mine, named)
 
 
 @pytest.mark.parametrize(
@@ -237,11 +127,8 @@ def test_instrument_path_is_relative_to_the_scenario_and_its_tables_to_the_instr
 )
 def test_polar_scene_is_simulated(crs, west, north):
     grid = {"crs": crs, "west": west, "north": north, "width": 120.0, "height": 90.0, "cell": 10.0}
-    sun = {"sza": 60.0, "saa": 0.0}
-    case = parse_scenario(
-        {"grid": grid, "geometry": sun, "terrain": {"dem": "flint-hills", "horizon_reach": 300}}
-        | {"atmosphere": {"altitude": 0.4}}
-    )
+    given = {"geometry": {"sza": 60.0, "saa": 0.0}, "atmosphere": {"altitude": 0.4}}
+    case = parse_scenario(given | {"grid": grid, "terrain": {"dem": "flint-hills", "horizon_reach": 300}})
     image = fifesim.simulate(case)["image"]["dn"].compute()
     assert image.rio.crs == crs and image.shape == (2, 3, 4) and (image[:, 1, 1:3] > 0).all()
 
@@ -264,33 +151,30 @@ def test_cells_of_a_class_equal_a_scenario_of_that_class_alone():
 
 
 def test_cover_map_is_read_and_shares_are_drawn(tmp_path):
-    grid = parse_scenario({"grid": {"width": 600, "height": 600}}).geobox()
-    write(tmp_path / "cover.tif", np.array([[5.0, 9.0], [5.0, 5.0]]), grid.affine * rasterio.Affine.scale(90))
+    small = {"grid": {"width": 600, "height": 600}, "terrain": {"dem": "flat"}}
+    write(tmp_path / "cover.tif", [[5.0, 9.0], [5.0, 5.0]], parse_scenario(small).geobox().affine * Affine.scale(90))
     classes = {"grass": {"code": 5}, "wood": {"code": 9, "distribution": "unburned-ungrazed"}}
-    mapped = {"grid": {"width": 600, "height": 600}, "terrain": {"dem": "flat"}, "classes": classes}
-    scene = fifesim.simulate(parse_scenario(mapped | {"landscape": {"cover": str(tmp_path / "cover.tif")}}))["scene"]
-    wood = (scene["cover"] == 9).compute()
+    mapped = {"landscape": {"cover": str(tmp_path / "cover.tif")}, "classes": classes}
+    wood = (fifesim.simulate(parse_scenario(small | mapped))["scene"]["cover"] == 9).compute()
     assert float(wood.mean()) == 0.25 and bool(wood[:90, 90:].all())
-    drawn = mapped | {"landscape": {"cover": "levels", "size": 20}}
-    drawn["classes"] = {"grass": {"share": 0.8}, "wood": {"share": 0.2}}
-    cover = fifesim.simulate(parse_scenario(drawn))["scene"]["cover"]
+    drawn = {"landscape": {"cover": "levels", "size": 20}, "classes": {"grass": {"share": 0.8}, "wood": {"share": 0.2}}}
+    cover = fifesim.simulate(parse_scenario(small | drawn))["scene"]["cover"]
     # There are about 600 patches, so the standard error of the share is about 0.02.
     assert 0.1 < float((cover == 2).mean()) < 0.3
 
 
+SKY = {"cloud_cover": 0.5, "length": "800 m", "base": 900.0, "top": 900.0, "seed": 4}
+
+
 def test_cloud_keys_give_the_cloud_field_and_truth_is_cloud_fraction():
-    sky = {"cloud_cover": 0.5, "length": "800 m", "base": 900.0, "top": 900.0, "seed": 4}
     scenario = fifesim.Scenario(grid={"width": 1800, "height": 1800, "cell": 10}, terrain={"dem": "flat"})
-    clouded = fifesim.Scenario(grid=scenario.grid, terrain=scenario.terrain, clouds=sky)
+    clouded = fifesim.Scenario(grid=scenario.grid, terrain=scenario.terrain, clouds=SKY)
     clear, clouded = fifesim.simulate(scenario), fifesim.simulate(clouded)
-    grid = scenario.geobox()
-    field = fifesim.cloud_field(
-        grid, 0.5, length=800, height=900, seed=4, margin=600, time=scenario.complete().geometry.time
-    )
+    time = scenario.complete().geometry.time
+    field = fifesim.cloud_field(scenario.geobox(), 0.5, length=800, height=900, seed=4, margin=600, time=time)
     cells = clear["scene"]["surface_reflectance"].fifesim.cast_clouds(field)
     for name in ("cloud", "shadow"):
-        expected = cells[name].fifesim.aggregate(30)
-        np.testing.assert_array_equal(clouded["truth"][name].values, expected.values)
+        np.testing.assert_array_equal(clouded["truth"][name].values, cells[name].fifesim.aggregate(30).values)
     hidden = cells.optical_thickness + cells.shadow_thickness + cells.overhead_thickness
     # The footprint of TM extends two pixels.
     far = (hidden.fifesim.aggregate(30).rolling(y=7, x=7, center=True).max() == 0).values
@@ -298,14 +182,11 @@ def test_cloud_keys_give_the_cloud_field_and_truth_is_cloud_fraction():
     np.testing.assert_array_equal(clouded["image"]["dn"].values[:, far], clear["image"]["dn"].values[:, far])
     bright = cells.optical_thickness.fifesim.aggregate(30).values > 20
     assert (clouded["image"]["dn"].values[0][bright] > 1.2 * clear["image"]["dn"].values[0].max()).mean() > 0.5
-    with pytest.raises(ValueError, match="base = 2000 is above top = 1000"):
-        fifesim.Scenario(clouds={"cloud_cover": 0.1, "base": 2000, "top": 1000})
 
 
 def test_complete_image_over_relief_with_clouds_has_no_missing_edge():
     """Clouds are also cast onto the elevation around the scene."""
-    sky = {"cloud_cover": 0.5, "length": "800 m", "base": 900.0, "top": 900.0, "seed": 4}
-    run = fifesim.simulate(fifesim.Scenario(grid={"width": 900, "height": 900, "cell": 15}, clouds=sky), complete=True)
+    run = fifesim.simulate(fifesim.Scenario(grid={"width": 900, "height": 900, "cell": 15}, clouds=SKY), complete=True)
     assert run["scene"]["dem"].shape == (60, 60)
     dn = run["image"]["dn"]
     assert (dn > 0).all()
@@ -313,23 +194,48 @@ def test_complete_image_over_relief_with_clouds_has_no_missing_edge():
     np.testing.assert_array_equal(run["image"]["ndvi"].isnull(), (dn == 255).any("band"))
 
 
-def test_sensors_see_the_same_clouds():
-    """Cloud fraction agrees to 0.002 in pixels of each instrument, with its footprint and grid; the edge is clear."""
-    grid = fifesim.grid_at("EPSG:26914", 690000, 4310000, 12000, 12000, cell=30)
-    sky, sun = fifesim.cloud_field(grid, 0.5, length=1500, height=900, seed=3), fifesim.Geometry(30, 140)
-    thickness = sky.optical_thickness
-    inner = (abs(thickness.y - thickness.y.mean()) < 3300) & (abs(thickness.x - thickness.x.mean()) < 3300)
-    cloud = thickness.fifesim.cast_clouds(sky.assign(optical_thickness=thickness.where(inner, 0.0)), geometry=sun).cloud
-    for name in ("TM", "OLI", "MSI", "MODIS", "AVHRR"):
-        band = fifesim.instrument(name).select(None)[0].name
-        white = cloud.expand_dims(band=[band]).rename("toa_reflectance").drop_attrs(deep=False)
-        seen = white.fifesim.sense(name, quantise=False, geometry=sun).fifesim.to_reflectance()
-        covered = float(seen.sum()) * abs(float(seen.x[1] - seen.x[0])) ** 2 / 12000**2
-        assert covered == pytest.approx(float(cloud.mean()), abs=0.002), name
-    grid = fifesim.fife_site(10, window=((0, 300), (0, 300)))
-    lai = fifesim.lai_scene(grid, seed=7, chunks="auto")
-    sky = fifesim.cloud_field(grid, 0.4, seed=8, margin=900)
-    images = lai.fifesim.compare(["TM", "OLI"], fifesim.Setup(clouds=sky, quantise=False))
-    red = [images[name]["toa_radiance"].isel(band=0).values.ravel() for name in ("TM", "OLI")]
-    # The sensors differ in blur but see the same clouds.
-    assert np.corrcoef(*(each[np.isfinite(sum(red))] for each in red))[0, 1] > 0.97
+def test_optics_by_band_need_both_and_complete_optics_are_passed_to_the_chain():
+    assert Ground().leaf_optics() is None and Ground().below_canopy() is None
+    both = Ground(leaf_reflectance={"TM3": 0.1}, leaf_transmittance={"TM3": 0.05})
+    assert both.leaf_optics() == {"TM3": (0.1, 0.05)}
+    with pytest.raises(ValueError, match="must name the same bands"):
+        Ground(leaf_reflectance={"TM3": 0.1}).leaf_optics()
+    bands = [band.response for band in instrument("TM").select(["TM3", "TM4"])]
+    keys = Ground().complete_optics(bands)
+    rho = fifesim.ground.canopy.optics.band_leaf_optics(bands)[0]
+    np.testing.assert_array_equal(list(keys["leaf_reflectance"].values()), rho)
+    assert Ground(**keys).complete_optics(bands) == keys
+
+
+def test_aerosol_file_is_found_next_to_the_scenario(tmp_path, monkeypatch):
+    """An aerosol file needs an optical thickness, and a completed scenario holds its full path."""
+    fifesim.atmosphere.aerosol_tables("urban").to_netcdf(tmp_path / "mine.nc")
+    (tmp_path / "mine.toml").write_text('[atmosphere]\naerosol = "mine.nc"\naot = 0.3\n')
+    read = fifesim.scenario.read_scenario(tmp_path / "mine.toml")
+    air = read.model_atmosphere()
+    assert (air.aerosol.name, air.aot, air.visibility) == ("mine", 0.3, None)
+    assert read.files["atmosphere", "aerosol"] == str(tmp_path / "mine.nc")
+    monkeypatch.chdir(tmp_path)
+    inside = fifesim.Scenario(atmosphere={"aerosol": "mine.nc", "aot": 0.3})
+    assert inside.complete().atmosphere.aerosol == str(tmp_path / "mine.nc")
+    with pytest.raises(ValueError, match="must be given as aot, from 0 to 2, got visibility=23"):
+        fifesim.Scenario(atmosphere={"aerosol": "mine.nc", "visibility": 23})
+
+
+def test_default_pixel_size_is_taken_from_the_bands():
+    """`sense` without `onto` uses the same size."""
+    assert (Sensor(instrument="MSI").bands, Sensor(instrument="MSI").size) == (["MSI4", "MSI8"], 10)
+    assert Sensor().size == 30 and Sensor(instrument="MODIS").size == 250 and Sensor(pixel=50.0).size == 50.0
+    assert Sensor(instrument="MSI", bands=["MSI11"]).size == 20
+    assert Sensor(instrument="MSI", bands=["MSI4", "MSI11"], pixel=20).size == 20
+
+
+def test_response_and_noise_keys_equal_the_python_arguments():
+    sharp = Sensor(response="detector").description
+    assert sharp == fifesim.instrument("TM", response="detector") != Sensor().description
+    assert Sensor(response="system").description == Sensor().description
+    assert Sensor(response="paper").description == fifesim.instrument("TM", response="paper")
+    given = {"thermal": 0.4, "shot": 0.005, "detectors": 16, "gain_spread": 0.005}
+    assert Sensor(noise=["shot"], noise_model=given).given_noise() == fifesim.NoiseModel(**given)
+    assert Sensor(instrument="OLI", noise=["thermal"], noise_model={"thermal": 1}).given_noise().along == "columns"
+    assert Sensor().given_noise() is None
