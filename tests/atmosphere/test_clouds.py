@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from oracles_clouds import disort, mie_drops, water_index
+from oracles_atmosphere import disort, mie_drops, water_index
 from scipy.interpolate import BSpline
 
 import fifesim
