@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from lazy import ODD_CHUNKS, in_chunks, no_compute
 from oracles_atmosphere import disort, mie_drops, water_index
 from scipy.interpolate import BSpline
 
@@ -16,7 +17,6 @@ from fifesim.atmosphere.clouds.field import PERIOD, CloudCover, cloud_displaceme
 from fifesim.atmosphere.clouds.layer import clouded_reflectance, drops_at, layer_light, two_stream_reflectance
 from fifesim.atmosphere.successive_orders import flux_transmittance
 from fifesim.grids import grid as grids
-from tests.lazy import ODD_CHUNKS, in_chunks, no_compute
 
 SLANT = fifesim.Geometry(50, 130, 30, 280)
 DATA = Path(__file__).parents[1] / "data" / "clouds"
