@@ -140,19 +140,6 @@ def test_block_with_too_few_valid_cells_is_missing(lai):
     assert np.isfinite(fifesim.aggregate(lai, 30.0, min_valid=0.5)).all()
 
 
-def test_blocks_can_be_weighted_by_a_line_spread_function(lai):
-    """Expected: one weight matrix per axis, computed from the line spread function directly."""
-    lsf = fifesim.instrument("TM", response="paper").line_spread
-    weights = [
-        [[lsf.cumulative(CELL * (j + 1) - 30 * (i + 0.5)) - lsf.cumulative(CELL * j - 30 * (i + 0.5)) for j in range(n)]
-         for i in range(n // 9)]
-        for n in lai.shape
-    ]  # fmt: skip
-    rows, columns = (np.array(each) / np.sum(each, axis=1, keepdims=True) for each in weights)
-    found = fifesim.aggregate(lai, 30.0, lsf=lsf)
-    np.testing.assert_allclose(found, rows @ lai.values @ columns.T, rtol=1e-12)
-
-
 # ------------------------------------------------------------------------------------------ biases and densities
 
 
@@ -166,7 +153,7 @@ def cube(lai, spread=1.0):
 
 
 def test_bias_of_linear_and_square_algorithms(lai):
-    """The bias of a linear algorithm is 0, and the bias of the square is the variance, in the units of the algorithm."""
+    """The bias of a linear algorithm is 0, and of the square it is the variance, in the units of the algorithm."""
     with no_compute():
         lazy = fifesim.scaling.scale_bias(lambda array: 3 * array + 1, in_chunks(lai, ODD_CHUNKS))
     assert float(np.abs(lazy["bias"]).max()) < 1e-14
