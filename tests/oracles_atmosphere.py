@@ -1,55 +1,18 @@
-"""Slow references for scattering: Eddington equations, non-Lambertian ground, Mie theory and discrete ordinates."""
+"""Slow references for scattering: non-Lambertian ground below an atmosphere, by a sum over the sky."""
 
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-import pytest
-from numpy.polynomial.legendre import leggauss, legvander
-from scipy.integrate import quad, solve_bvp
+from numpy.polynomial.legendre import leggauss
 
 from fifesim.atmosphere import aerosols, engines
 from fifesim.atmosphere.successive_orders import stokes_reflectance
-from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
 
 
 def henyey_greenstein(asymmetry, scattering_cosine):
     """Phase function of a given asymmetry, whose mean is 1. [1]"""
     return (1 - asymmetry**2) / (1 + asymmetry**2 - 2 * asymmetry * scattering_cosine) ** 1.5
-
-
-def eddington_intensities(tau, albedo, asymmetry, mu_s):
-    """Mean (J) and net upward (H) diffuse intensity as functions of depth, for solar flux pi and black surface. [1]"""
-
-    def slopes(depth, state):
-        mean, net = state
-        beam = albedo / 4 * np.exp(-depth / mu_s)
-        return np.stack([3 * (1 - albedo * asymmetry) * net + 3 * asymmetry * mu_s * beam, (1 - albedo) * mean - beam])
-
-    def edges(top, bottom):
-        return np.array([top[0] - 2 * top[1], bottom[0] + 2 * bottom[1]])
-
-    depths = np.linspace(0, tau, 41)
-    return solve_bvp(slopes, edges, depths, np.zeros((2, 41)), tol=1e-9).sol
-
-
-def sobolev_reflectance(tau, albedo, asymmetry, phase, mu_s, mu_v):
-    """Integral along the view of the Eddington source function, with exact single scattering. [1]"""
-    field = eddington_intensities(tau, albedo, asymmetry, mu_s)
-
-    def emitted(depth):
-        mean, net = field(depth)
-        once = albedo / 4 * phase * np.exp(-depth / mu_s)
-        return (albedo * mean + 3 * albedo * asymmetry * mu_v * net + once) * np.exp(-depth / mu_v) / mu_v
-
-    return quad(emitted, 0, tau, epsabs=1e-12, epsrel=1e-10)[0] / mu_s
-
-
-def eddington_flux(tau, albedo, asymmetry, mu_s):
-    """Plane albedo and total transmittance from the Eddington fluxes. [1]"""
-    field = eddington_intensities(tau, albedo, asymmetry, mu_s)
-    return 4 * field(0)[1] / mu_s, np.exp(-tau / mu_s) - 4 * field(tau)[1] / mu_s
 
 
 class Ground(NamedTuple):
@@ -158,85 +121,3 @@ def mixed_stokes(atmosphere, wavelength, sza, vza, raa, *, at_ground=False, grou
         optics = *depths, *aerosol, phase, polarization
         found.append(stokes_reflectance(*optics, sza, vza, raa, **options))
     return np.stack(found, axis=-1)
-
-
-# ------------------------------------------------------------------------------------------ clouds
-
-
-POINTS, WEIGHTS = leggauss(1200)
-
-
-def mie_coefficients(index, size):
-    """Coefficients a and b of spheres of size parameter `size`, shape (order, size). [1]"""
-    size = np.asarray(size, float)
-    orders = int(size.max() + 4.05 * size.max() ** (1 / 3) + 2)
-    inner = index * size
-    derivative = np.zeros((orders + 16, size.size), complex)
-    for n in range(orders + 15, 0, -1):
-        derivative[n - 1] = n / inner - 1 / (derivative[n] + n / inner)
-    a, b = np.zeros((2, orders, size.size), complex)
-    psi_before, psi, chi_before, chi = np.cos(size), np.sin(size), -np.sin(size), np.cos(size)
-    for n in range(1, orders + 1):
-        psi_before, psi = psi, (2 * n - 1) / size * psi - psi_before
-        chi_before, chi = chi, (2 * n - 1) / size * chi - chi_before
-        # Beyond its last order, the wave of a small sphere grows by rounding.
-        kept = n <= size + 4.05 * size ** (1 / 3) + 2
-        psi, chi = np.where(kept, psi, 0.0), np.where(kept, chi, 1.0)
-        for found, factor in ((a, derivative[n] / index), (b, derivative[n] * index)):
-            left = factor + n / size
-            xi, xi_before = psi - 1j * chi, psi_before - 1j * chi_before
-            found[n - 1] = np.where(kept, (left * psi - psi_before) / (left * xi - xi_before), 0)
-    return a, b
-
-
-def mie_drops(index, wavelength, cosines, radii=4001):
-    """
-    Single scattering albedo, and phase function at some cosines, of drops with the sizes of `cloud_phase.csv`. [1]
-
-    Gamma distribution by Hansen & Travis (1974), Eq. 2.56, with effective radius 10 um and variance 0.1, and Bohren &
-    Huffman (1983), Eqs. 4.47, 4.61, 4.62, 4.74 and 4.88.
-    """
-    radii = np.linspace(0.4, 36.0, radii)
-    number = (radii / 10) ** 7 * np.exp(-radii)
-    size = 2 * np.pi * radii / wavelength
-    a, b = mie_coefficients(index, size)
-    n = np.arange(1, len(a) + 1)
-    pi, tau = np.zeros((2, n.size + 1, np.size(cosines)))
-    pi[1], tau[1] = 1, cosines
-    for k in range(2, n.size + 1):
-        pi[k] = (2 * k - 1) / (k - 1) * cosines * pi[k - 1] - k / (k - 1) * pi[k - 2]
-        tau[k] = k * cosines * pi[k] - (k + 1) * pi[k - 1]
-    factor = (2 * n + 1) / (n * (n + 1))
-    first = (a.T * factor) @ pi[1:] + (b.T * factor) @ tau[1:]
-    second = (a.T * factor) @ tau[1:] + (b.T * factor) @ pi[1:]
-    scattered = number @ ((2 * n + 1) @ (np.abs(a) ** 2 + np.abs(b) ** 2))
-    extinct = number @ ((2 * n + 1) @ (a + b).real)
-    return scattered / extinct, number @ (np.abs(first) ** 2 + np.abs(second) ** 2) / scattered
-
-
-@cache
-def mie_moments(wavelength):
-    """Single scattering albedo and Legendre moments of the phase function of drops, to the last. [1]"""
-    albedo, phase = mie_drops(water_index(wavelength), wavelength, POINTS)
-    return albedo, WEIGHTS * phase @ legvander(POINTS, 900) / 2
-
-
-def water_index(wavelength):
-    """Complex refractive index of water [1], by Hale & Querry (1973) and the absorption of PROSPECT-D."""
-    real, water = files.table("water_index.csv"), files.table("prospect_d.csv")
-    absorption = np.interp(wavelength, water["wavelength"], water["water"])
-    imaginary = absorption * wavelength * 1e-4 / (4 * np.pi)
-    return complex(np.interp(wavelength, real["wavelength"], real["refractive_index"]), imaginary)
-
-
-def disort(thickness, wavelength, sza, raa, ground=0.0, streams=64):
-    """Cosines and reflectance of discrete ordinates upward, with exact single scattering, and transmittance."""
-    pydisort = pytest.importorskip("PythonicDISORT.pydisort").pydisort
-    albedo, moments = mie_moments(wavelength)
-    mu_s, depth, half = np.cos(np.radians(sza)), np.array([thickness]), streams // 2
-    options = {"NT_cor": True, "BDRF_Fourier_modes": [ground] if ground else []}
-    mu, _, down, _, radiance = pydisort(
-        depth, np.array([min(albedo, 1 - 1e-9)]), streams, moments[None] / moments[0], mu_s, np.pi, np.pi, NLeg=streams,
-        NFourier=streams, f_arr=moments[streams : streams + 1], **options,
-    )  # fmt: skip
-    return mu[:half], radiance(0.0, np.radians(raa))[:half] / mu_s, np.squeeze(sum(down(depth)) / (np.pi * mu_s))

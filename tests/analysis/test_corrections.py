@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from lazy import no_compute
+from lazy import in_chunks, no_compute
 
 import fifesim
 from fifesim.analysis import corrections
-from fifesim.base.surface_kernels import li_sparse, ross_li, ross_thick
+from fifesim.base.surface_kernels import li_sparse, ross_li, ross_thick, rpv
 
 DATA = Path(__file__).parents[1] / "data"
 GRID = fifesim.fife_site(10.0, window=((0, 300), (0, 300)))
@@ -40,6 +40,8 @@ def test_ross_li_kernels():
     seen, nadir = (ross_li(*weights, sza=t.sza, vza=vza, raa=t.raa) for vza in (t.vza, 0 * t.vza))
     np.testing.assert_allclose(seen, t.reflectance, rtol=0, atol=1e-9)
     np.testing.assert_allclose(corrections.c_factor(seen, nadir), t.c_factor, rtol=1e-9)
+    there, back = (rpv(0.1, 0.7, -0.1, 0.3, sza=s, vza=v, raa=70.0) for s, v in ((20.0, 55.0), (55.0, 20.0)))
+    assert there == pytest.approx(back, rel=1e-14)
 
 
 def test_topographic_corrections():
@@ -80,7 +82,7 @@ def test_corrections_have_the_same_bits_in_any_chunks_and_do_not_change_level_gr
     whole = hilly.fifesim.topographic_correction(DEM, method)
     for chunks in ({"y": 70, "x": 90}, {"band": 1, "y": 41, "x": 100}):
         with no_compute():
-            lazy = hilly.chunk(chunks).fifesim.topographic_correction(DEM.chunk(y=70, x=300), method)
+            lazy = in_chunks(hilly, chunks).fifesim.topographic_correction(DEM.chunk(y=70, x=300), method)
         for scheduler in ("synchronous", "threads"):
             found = lazy.compute(scheduler=scheduler)
             np.testing.assert_array_equal(found, whole)

@@ -72,15 +72,6 @@ def test_maximum_of_normals_agrees_with_the_table():
     np.testing.assert_allclose(found, known[["mean", "sd"]], rtol=1e-9, atol=1e-12)
 
 
-def test_bias_of_a_maximum_composite_follows_the_maximum_of_normals():
-    """Within 3 standard errors, for independent errors of NDVI."""
-    ndvi = 0.5 + 0.03 * np.random.default_rng(5).standard_normal((40_000, 5))
-    best = indices.values_of_date(ndvi, date_of_maximum(ndvi), np.nan)
-    mean, sd = indices.maximum_of_normals(5)
-    assert abs((best.mean() - 0.5) / 0.03 - mean) < 3 * sd / 200
-    assert abs(best.std() / 0.03 / sd - 1) < 0.02
-
-
 def reflectance(lai, wavelengths):
     bands = xr.DataArray(np.linspace(0.1, 0.6, len(wavelengths)), dims="band")
     cube = (lai * bands + 0.02).transpose("band", "y", "x")

@@ -17,14 +17,7 @@ from fifesim.atmosphere.aerosols import (
     known_aerosol,
     phase_moments,
 )
-from fifesim.atmosphere.mixtures import (
-    COMPONENTS,
-    MODELS,
-    canonical,
-    cross_sections,
-    mixture,
-    phase,
-)
+from fifesim.atmosphere.mixtures import COMPONENTS, MODELS, canonical, cross_sections, mixture, phase
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base import files
 

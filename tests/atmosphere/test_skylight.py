@@ -12,13 +12,7 @@ from verification.benchmarks import _between
 import fifesim
 from fifesim.atmosphere.column import matrix_moments
 from fifesim.atmosphere.coupling import apparent_reflectance
-from fifesim.atmosphere.skylight import (
-    GroundStreams,
-    atmospheric_sky,
-    directional_coupling,
-    ground_streams,
-    mixed_sky,
-)
+from fifesim.atmosphere.skylight import GroundStreams, atmospheric_sky, directional_coupling, ground_streams, mixed_sky
 from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
 from fifesim.base.geometry import scattering_angle_cosine
 from fifesim.base.surface_kernels import RPV
@@ -45,12 +39,6 @@ def test_equal_reflectances_give_the_lambertian_result():
     expected = apparent_reflectance(r, path, tss + tsd, too + tdo, albedo, gas)
     air = tss, tsd, too, tdo, albedo, path, gas
     np.testing.assert_allclose(directional_coupling(GroundStreams(*[r] * 9), *air), expected, rtol=1e-12)
-
-
-def test_weights_are_normalized():
-    for zenith in (0.0, 35.0, 60.0):
-        streams = ground_streams(lambda sza, vza, raa: 0.3 + 0 * raa, sky(zenith), sky(45.0), zenith, 45.0, 70.0)
-        np.testing.assert_allclose(streams, 0.3, rtol=1e-12)
 
 
 def test_sky_streams_equal_sums_over_a_fine_grid():
