@@ -145,6 +145,8 @@ def test_surroundings_are_matched_by_band_name(scene):
     around = raster(np.broadcast_to([[[0.5]], [[0.1]], [[0.3]]], (3, 9, 9)), 3000.0)
     named = around.assign_coords(band=["TM4", "TM3", "TM1"])
     xr.testing.assert_identical(environment(scene, named), environment(scene, around[[2, 1]]))
+    with pytest.raises(ValueError, match="the surroundings have the bands TM1, TM4, the scene TM1, TM3"):
+        environment(scene, named[[2, 0]])
     numbers = xr.DataArray([0.1, 0.3], {"band": ["TM3", "TM1"]})
     xr.testing.assert_identical(environment(scene, numbers), environment(scene, [0.3, 0.1]))
 
