@@ -11,7 +11,7 @@ from fifesim.base.geometry import Geometry
 from fifesim.ground.terrain import flint_hills, horizon, spline
 from fifesim.ground.terrain import lit_slopes as lights
 from fifesim.ground.terrain import slope as terrain
-from verification.deviations import Deviation, largest
+from verification.tables import Deviation, largest
 
 _deviation = partial(Deviation, "terrain")
 
@@ -136,9 +136,6 @@ def _hills():
     yield _deviation("variance of smooth noise", abs(np.mean(noise**2) - 1), 0.015, "1", "B-spline of degree 11")
 
 
-ELEVATION_CHECKS = (_upsampling, _unknown_cells, _ways, _erosion, _hills)
-
-
 _PLANES = tuple((slope, aspect) for slope in (0.5, 12.0, 45.0, 75.0) for aspect in (0.0, 37.0, 135.0, 201.5, 359.0))
 
 
@@ -195,23 +192,6 @@ def _skies():
     foot = [_sky_view(wall, 90.0, valley) for wall, valley in zip(walls, valleys, strict=True)]
     worst = 100 * largest(foot, (1 + np.cos(np.radians(2 * walls))) / 2, relative=True)
     yield _deviation("sky seen from the foot of its wall", worst, 0.5, "%", "(1 + cos 2 wall) / 2")
-
-
-def _valley_of_cells():
-    """Check a valley with walls of 20 degrees and 300 m below a level upland, on the floor and half way up."""
-    wall, half, cell, reach = np.radians(20.0), 30, 10.0, 1000.0
-    x = (np.arange(6 * half + 1) - 3 * half) * cell
-    ground = np.broadcast_to(np.minimum(np.abs(x), half * cell) * np.tan(wall), (5, x.size))
-    m, n = horizon.horizon_margin(cell, cell, reach)
-    padded = np.pad(np.pad(ground, ((m, m), (0, 0)), mode="edge"), ((0, 0), (n, n)), constant_values=np.nan)
-    directions = horizon.azimuths(32)
-    slope, aspect = terrain.slope_aspect(np.pad(ground, 1, mode="edge"), cell, cell)
-    zenith = horizon.horizon_zenith(padded, cell, cell, directions, reach)
-    sky = _sky_view(slope, aspect, zenith)[2]
-    rim = np.arctan(np.tan(wall) / 3)  # the far one, half a depth up and three quarters of a width away
-    found, analytic = sky[[3 * half, 3 * half + half // 2]], [np.cos(wall), (1 + np.cos(rim + wall)) / 2]
-    worst = 100 * largest(found, analytic, relative=True)
-    yield _deviation("sky of a valley of cells, floor and wall", worst, 0.5, "%", "sines of its two limits")
 
 
 def _any_sky():
@@ -305,4 +285,4 @@ def _shadow():
     yield _deviation("length of its shadow", worst, 2.0, "m", "20 m / tan(elevation)")
 
 
-CHECKS = (_slopes, _skies, _any_sky, _valley_of_cells, _horizons, _light, _shadow, *ELEVATION_CHECKS)
+CHECKS = (_slopes, _skies, _any_sky, _horizons, _light, _shadow, _upsampling, _unknown_cells, _ways, _erosion, _hills)
