@@ -227,7 +227,7 @@ def _crowns():
 
 def known_crowns(scene):
     """Reflectance of a RAMI-3 scene whose crowns are known leaf by leaf: columns vza, raa [degree] and brf [1]."""
-    # HET01, spheres, is from Eradiate; HET04, spheres and cylinders, from the Monte Carlo code of make_crown_scenes.py.
+    # HET01, spheres, is from Eradiate; HET04, spheres and cylinders, from a Monte Carlo code.
     if scene == "HET01":
         return tables.table("spheres_of_leaves.csv")
     return tables.table("crown_scenes.csv").query("scene == @scene")
