@@ -49,7 +49,7 @@ def test_designs_have_the_scatter_of_instruments_written_for_them(tmp_path):
 
 
 def test_rounding_has_the_scatter_of_digital_numbers(tmp_path):
-    """Eight bits, and noise of 0.1 digital numbers; with fewer bits, rounding depends on the signal or exceeds noise."""
+    """Eight bits, noise of 0.1 digital numbers; with fewer bits, rounding depends on the signal or exceeds noise."""
     paths = [_camera(tmp_path, 30.0, bits=bits, mtf_at_nyquist=0.3) for bits in (8, 7)]
     with pytest.raises(ValueError, match=r"at most 0.03, and noise has 0.0\d+ digital numbers"):
         fifesim.trade(paths[1], {"registration": [0.0]}, _level())
