@@ -6,11 +6,10 @@ from itertools import product
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.polynomial.legendre import leggauss, legval
+from numpy.polynomial.legendre import leggauss
 from scipy.integrate import quad
 
 from fifesim.atmosphere import adjacency, adjacency_labels
-from fifesim.atmosphere import column as phase_expansion
 from fifesim.atmosphere.aerosols import aerosol_optics, aerosol_phase
 from fifesim.atmosphere.coupling import (
     BandTerms,
@@ -21,10 +20,8 @@ from fifesim.atmosphere.coupling import (
     target_reflectance,
 )
 from fifesim.atmosphere.engines import band_terms, scattering
-from fifesim.atmosphere.gases import DEPOLARIZATION, rayleigh_phase
 from fifesim.atmosphere.lookup import once_reflectance, scattered_once, varying_diffuse_fraction, varying_reflectance
 from fifesim.atmosphere.models import Atmosphere
-from fifesim.atmosphere.successive_orders import path_reflectance
 from fifesim.base.bands import Band
 from fifesim.base.geometry import relative_azimuth, scattering_angle_cosine
 from fifesim.grids import grid as grids
@@ -115,19 +112,6 @@ def _successive_orders():
         yield _from_6s(f"successive orders, {band}, {name}, rms", percent, bound, "%")
 
 
-def _light():
-    """Check the parts of the transmittances; 5S adds the albedos of molecules and aerosol, an error of 0.05 in haze."""
-    table = tables.table("sixs_adjacency.csv")
-    hazy = table[table["visibility"] == 10]
-    names = ("transmittance_down", "direct_transmittance_up", "diffuse_up_molecules", "diffuse_up_aerosol")
-    for engine, albedo, bound in (("5S", 0.05, 0.004), ("successive-orders", 0.002, 0.0015)):
-        terms = _terms(hazy, engine)
-        worst = np.max([largest(getattr(terms, name), hazy[name]) for name in names])
-        yield _from_6s(f"{engine}, transmittances in haze", worst, bound, "1")
-        worst = largest(terms.spherical_albedo, hazy["spherical_albedo"])
-        yield _from_6s(f"{engine}, spherical albedo in haze", worst, albedo, "1")
-
-
 def _sunbeam():
     """Check that direct light falls off with the total optical depth, and that the rest is skylight."""
     wavelength, sza, vza = np.array([0.47, 0.86]), 50.0, np.array([0.0, 30.0])
@@ -195,43 +179,6 @@ _SINE = np.sqrt(1 - _COSINE**2)
 _PURE_RAYLEIGH = np.array([[1, 0, 0, 0], [0, 0, 0, 0], [0.1, 0.6, 0, np.sqrt(6) / 10]])
 
 
-def _expansions():
-    """Check the expansion of the scattering matrix of molecules, a polynomial of the second degree in the cosine."""
-    anisotropy = 2 * (1 - DEPOLARIZATION) / (2 + DEPOLARIZATION)
-    phase, crossed = rayleigh_phase(_COSINE), -0.75 * anisotropy * _SINE**2
-    expansion = phase_expansion.rayleigh_expansion(4)
-    beta, alpha, zeta, gamma = expansion.T
-    linear, polarizing = (phase_expansion.wigner(order, 2, _COSINE, 4) for order in (2, 0))
-    found = legval(_COSINE, beta), (alpha + zeta) @ linear, -gamma @ polarizing
-    worst = largest(found, [phase, 0.75 * anisotropy * (1 + _COSINE) ** 2, crossed])
-    yield _deviation("series of the scattering matrix of molecules", worst, 1e-12, "1", "Rayleigh")
-    moments = phase_expansion.matrix_moments(phase, -crossed / phase, _COSINE, _WEIGHTS, 4)
-    # Both of the linear ones are taken from F11.
-    from_phase = linear @ (_WEIGHTS * phase) / 2
-    orders = 2 * np.arange(4) + 1
-    worst = largest(moments.T, [beta / orders, from_phase, from_phase, gamma / orders])
-    yield _deviation("moments of the scattering matrix of molecules", worst, 1e-12, "1", "Rayleigh")
-    asymmetry, orders = 0.7, np.arange(12)
-    moments = np.outer(asymmetry ** np.arange(40.0), [1.0, 0.5, 0.25, 0.0])
-    expansion, peak = phase_expansion.truncated_expansion(moments, orders.size)
-    forward = np.outer(orders >= 0, [1, 0, 0, 0]) + np.outer(orders >= 2, [0, 1, 1, 0])
-    expected = (2 * orders[:, None] + 1) * (moments[: orders.size] - asymmetry**12 * forward) / (1 - asymmetry**12)
-    worst = np.maximum(largest(expansion, expected), largest(peak, asymmetry**12))
-    yield _deviation("series without the forward peak", worst, 1e-12, "1", "Henyey and Greenstein")
-
-
-def _spheres():
-    series = tables.table("spheres_expansion.csv")
-    coefficients = series[["beta", "alpha", "zeta", "gamma"]].to_numpy()
-    moments = coefficients / (2 * series["order"].to_numpy()[:, None] + 1)
-    table = tables.table("spheres_radiance.csv")
-    (mu_v, views), (raa, azimuths) = (np.unique(table[name], return_inverse=True) for name in ("mu_v", "raa"))
-    sza, vza = np.degrees(np.arccos(0.6)), np.degrees(np.arccos(mu_v))
-    phase = legval(scattering_angle_cosine(sza, vza[:, None], raa), coefficients[:, 0])
-    found = 0.6 * path_reflectance(0.0, 1.0, 0.973527, moments, phase, sza, vza, raa)[views, azimuths]
-    yield _deviation("polarized light of spheres", largest(found, table["intensity"]), 6e-5, "1", "Siewert (2000)")
-
-
 def _once():
     """Check single scattering, exact backscatter included; the phase function is tabulated at 0.25 degrees."""
     band, worst = instrument("TM").select(["TM3"])[0].response, 0.0
@@ -255,26 +202,6 @@ def _both_ways(depth, mu_s, mu_v):
 
 
 _PATH_WEIGHTS = 0.3, 0.6  # of molecules and aerosol; a tenth is from the target itself
-
-
-def _functions():
-    """Check the environment function against the published one and against 6S, the latter by its transmittances."""
-    nadir = tables.table("sixs_environment.csv")
-    found = adjacency.environment_function(1000 * nadir["radius"].to_numpy())
-    worst = largest(found, nadir[["molecules", "aerosol"]].to_numpy().T)
-    yield _deviation("environment function, nadir", worst, 1e-6, "1", "6SV1.1")
-    table = {name: column.to_numpy() for name, column in tables.table("sixs_adjacency.csv").items()}
-    up = table["diffuse_up_molecules"], table["diffuse_up_aerosol"]
-    share = adjacency.mixed_environment_function(1000 * table["radius"], table["vza"], *up)
-    without_scattering = largest(adjacency.mixed_environment_function(60.0, 0.0, 0.0, 0.0), 1.0)
-    worst = np.maximum(largest(share, table["environment_function"]), without_scattering)
-    yield _deviation("environment function, mixed", worst, 0.002, "1", "6SV1.1")
-    around = share * table["target_reflectance"] + (1 - share) * table["environment_reflectance"]
-    table["path_reflectance"] = table["path_reflectance"] / table["gas_transmittance"]
-    terms = TargetTerms(*(table[name] for name in TargetTerms._fields))
-    found = inhomogeneous_reflectance(table["target_reflectance"], around, terms)
-    worst = largest(found, table["toa_reflectance"])
-    yield _deviation("round target, apparent reflectance", worst, 0.002, "1", "6SV1.1")
 
 
 def _density(radius):
@@ -357,6 +284,6 @@ def _scene_and_back():
 
 
 CHECKS = (
-    _expansions, _spheres, _once, _columns, _optical_depths, _light, _sunbeam, _there_and_back, _varying, _five_s,
-    _successive_orders, _functions, _point_spread, _direct_sums, _part_of_a_scene, _scene_and_back,
+    _once, _columns, _optical_depths, _sunbeam, _there_and_back, _varying, _five_s,
+    _successive_orders, _point_spread, _direct_sums, _part_of_a_scene, _scene_and_back,
 )  # fmt: skip

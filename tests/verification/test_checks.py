@@ -15,7 +15,7 @@ from verification import areas, atmosphere, canopy, tables
 TESTS = Path(__file__).parents[1]
 
 # Checks with many cases of successive orders.
-SLOW = (atmosphere._light, atmosphere._successive_orders, canopy._foliage_tables)
+SLOW = (atmosphere._successive_orders, canopy._foliage_tables)
 CHECKS = [
     pytest.param(check, marks=[pytest.mark.slow] if check in SLOW else [], id=f"{area}-{check.__name__}")
     for area, checks in areas.AREAS.items()

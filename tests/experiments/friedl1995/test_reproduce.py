@@ -153,36 +153,16 @@ def test_mistake_prints_one_line_and_writes_nothing(quick, tmp_path, stage, argu
     assert not (tmp_path / "out").exists()
 
 
-def test_densities_of_figure_6_are_reflected_at_zero(found):
-    """The curve of the cells begins at 0.853, as the distribution; without reflection it begins at 0.447."""
-    axis = figures.plot(6, found).axes[0]
-    cells = axis.get_lines()[0].get_ydata()
-    known = float(fifesim.ground.lai_distribution("burned-grazed").pdf(0))
-    assert cells[0] == pytest.approx(known, rel=0.03)
-
-
-@pytest.mark.parametrize(
-    ("number", "panel", "points", "x", "y"),
-    [
-        (5, 0, 0, "boa_ndvi", "lai"),
-        (5, 0, 1, "ndvi", "lai"),
-        (5, 1, 1, "ndvi", "fpar"),
-        (8, 0, 0, "boa_ndvi", "ndvi_of_mean"),
-        (9, 0, 0, "boa_red", "toa_red"),
-        (9, -1, 0, "boa_nir", "toa_nir"),
-    ],
-)
-def test_axes_show_the_quantities_of_the_paper(found, number, panel, points, x, y):
-    """Figure 8 shows the difference in the lower panels."""
-    axis = figures.plot(number, found, reading="native").axes[panel]
-    arp = float(found["arp"][-1 if panel == -1 else 0])
-    values = figures.sample(found, "native", arp)
-    drawn = axis.collections[points].get_offsets()
-    assert all(each.size == 200 and np.isfinite(each).all() for each in values.values())
-    np.testing.assert_allclose(drawn, np.stack([values[x], values[y]], axis=1), rtol=1e-12)
-    if number == 8:
-        below = figures.plot(8, found).axes[3].collections[0].get_offsets()
-        np.testing.assert_allclose(below[:, 1], drawn[:, 1] - drawn[:, 0], rtol=1e-12)
+def test_figures_of_the_paper_show_their_quantities(found):
+    """Figure 5, NDVI below the atmosphere and of the image over LAI, and Figure 9, reflectance; the last arp is below."""
+    for number, panel, points, pair in (
+        (5, 0, 0, ("boa_ndvi", "lai")),
+        (5, 1, 1, ("ndvi", "fpar")),
+        (9, -1, 0, ("boa_nir", "toa_nir")),
+    ):
+        drawn = figures.plot(number, found, reading="native").axes[panel].collections[points].get_offsets()
+        values = figures.sample(found, "native", float(found["arp"][-1 if panel == -1 else 0]))
+        np.testing.assert_allclose(drawn, np.stack([values[name] for name in pair], axis=1), rtol=1e-12)
 
 
 def test_figure_of_table_2_shows_the_values_of_the_table(found):

@@ -73,19 +73,6 @@ def test_linear_pixels_with_noise_have_the_scatter_of_their_variances():
     assert lines[0].truth_variance == pytest.approx(0.25 * lines[0].image_variance)
 
 
-def test_only_the_distance_of_truth_and_image_matters():
-    field = prepare(correlation_of(0.2), {"lai": np.exp(0.5 * DEVIATES)})
-
-    def scatter(truth, image, function=lambda means: np.exp(-means[0])):
-        truth, image = (Footprint(_BOX, _BOX, place) for place in (truth, image))
-        truth = Pixel(("lai",), (truth,), mean_of_cells)
-        return field.regressions([truth], Pixel(("lai",), (image,), function))[0].scatter
-
-    near = scatter((0, 0), (3, -1))
-    assert scatter((40, 7), (43, 6)) == scatter((3, 0), (0, 1)) == pytest.approx(near, abs=1e-12)
-    assert abs(scatter((0, 0), (3, -2)) - near) > 0.01
-
-
 def _flat(width=990, arp=0.15, distribution="burned-grazed", **sections):
     grid = {"width": width, "height": width} | sections.pop("grid", {})
     ground = {"arp": arp, "distribution": distribution}

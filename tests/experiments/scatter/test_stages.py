@@ -1,9 +1,7 @@
 """Images with ideal stages, ground with ideal (uniform) properties, and the shares of the stages."""
 
-import re
 import warnings
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,14 +16,11 @@ from fifesim.experiments.scatter.stages import (
     IDEAL_PROPERTIES,
     STAGES,
     STEP,
-    _Scene,
     along_tangent,
     displaced_pixels,
     ground_with,
-    images_of,
     middle_cells,
     pixels,
-    scene_of,
     spread_out,
     varying_ground,
     working_stages,
@@ -38,14 +33,6 @@ from fifesim.scenario.scenario import Scenario, parse_scenario
 def of(seen, **at_work):
     """NDVI with the named stages active and all others ideal."""
     return seen.ndvi[tuple(int(at_work.get(stage.replace(" ", "_"), 0)) for stage in seen.stages)]
-
-
-def test_physics_page_lists_the_stages_and_their_ideals():
-    page = (Path(__file__).parents[3] / "docs" / "physics.md").read_text(encoding="utf-8")
-    _, _, table = page.partition("| stage | ideal |\n|---|---|\n")
-    rows = dict(re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", table.partition("\n\n")[0], re.MULTILINE))
-    assert list(rows) == list(STAGES)
-    assert {name: rows[name] for name in IDEAL_PROPERTIES} == IDEAL_PROPERTIES
 
 
 @pytest.mark.parametrize("clumped", [False, True])
@@ -101,16 +88,6 @@ def test_displaced_pixels_equal_separate_runs(rough):
         np.testing.assert_array_equal(seen.truth["fpar"], alone.truth["fpar"])
 
 
-@pytest.mark.parametrize("hills", [False, True])
-def test_plain_arrays_and_labelled_functions_give_the_same_pixels(scenario, monkeypatch, hills):
-    case = scenario(dem="flint-hills" if hills else "flat")
-    plain = pixels(case)
-    monkeypatch.setattr(_Scene, "is_stand", lambda scene, ground: False)
-    labelled = pixels(case)
-    np.testing.assert_array_equal(plain.ndvi, labelled.ndvi)
-    np.testing.assert_array_equal(plain.truth["fpar"], labelled.truth["fpar"])
-
-
 def test_adjacency_equals_the_labelled_chain(scenario):
     case = scenario()
     hazy = case.model_copy(update={"atmosphere": case.atmosphere.model_copy(update={"adjacency": True})})
@@ -137,10 +114,6 @@ def test_coupling_stage_equals_the_change_of_the_simulation(scenario, dem):
         # The fused pass has a separate table, within 1e-5, so that counts may differ by one.
         np.testing.assert_allclose(found, run["image"]["ndvi"].values.ravel(), atol=0.01)
     assert 1e-3 < abs(both[1] - both[0]).mean() < 0.03
-    no_air = [slice(None)] * seen.ndvi.ndim
-    no_air[seen.stages.index("atmosphere")] = 0
-    without = np.moveaxis(seen.ndvi[tuple(no_air)], at - (at > seen.stages.index("atmosphere")), 0)
-    np.testing.assert_array_equal(*without)
 
 
 def test_tangent_has_the_value_and_slope_of_the_curve_at_the_middle():
@@ -150,18 +123,6 @@ def test_tangent_has_the_value_and_slope_of_the_curve_at_the_middle():
     left = np.exp(-extinction * 1.2)
     np.testing.assert_allclose(found, 1 - left + extinction * left * (lai - 1.2), rtol=0, atol=STEP**2 / 10)
     assert np.ptp(np.diff(found.ravel()) / np.diff(lai.ravel())) < 1e-10
-
-
-def test_quantisation_changes_ndvi_of_cells_and_of_means_alike():
-    """The quantisation error is the same for NDVI of cells and of means, and at most one or two counts."""
-    sections = {"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}, "sensor": {"offset": [0.0, 1.0]}}
-    scene = scene_of(Scenario(ground={"arp": 0.15}, **sections))
-    red, nir = np.random.default_rng(2).uniform([[[0.04]], [[0.2]]], [[[0.1]], [[0.4]]], (2, 90, 90))
-    cells = np.stack([red, nir, (nir - red) / (nir + red)])
-    found = images_of(scene, cells, ((False, True), (False,), (False,), (False, True), (False,)))[:, 0, 0, :, 0]
-    steps = found[:, 1] - found[:, 0]
-    np.testing.assert_allclose(steps[0], steps[1], atol=1e-12)
-    assert 1e-4 < np.abs(steps).max() < 0.03
 
 
 def test_ideal_block_has_its_mean_or_the_class_of_its_middle_cell():
