@@ -113,14 +113,6 @@ def test_uncertainty_is_that_of_the_blur():
     assert np.isnan(fifesim.trade("TM", designs | {"mtf": [0.3]}, _level()).r2_uncertainty).all()
 
 
-def test_bands_are_compared_on_the_same_ground():
-    pairs = [["MSI4", "MSI8"], ["MSI5", "MSI8A"]]
-    found = fifesim.trade("MSI", {"bands": pairs[:1], "pixel": [10.0], "registration": [0.0]}, _level())
-    assert found["bands"].values.tolist() == ["MSI4, MSI8"] and "pixel" in found.dims
-    alone = fifesim.trade("MSI", {"pixel": [10.0], "registration": [0.0]}, _level())
-    np.testing.assert_allclose(found.r2.squeeze("bands"), alone.r2)
-
-
 def test_unknown_geolocation_is_no_silent_zero(tmp_path):
     with pytest.warns(UserWarning, match="geolocation error of Camera 30 is unknown and taken as 0"):
         fifesim.trade(_camera(tmp_path, 30.0), {"pixel": [30.0]}, _level())

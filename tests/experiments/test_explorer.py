@@ -204,18 +204,16 @@ def test_data_have_valid_axis_ranges_and_file_names_without_folders(sweep, outco
     assert data["ranges"]["lai"][0] >= 0 and data["ranges"]["fpar"][1] <= 1
 
 
-ARRAYS = {
-    "a": np.arange(5, dtype=np.uint8),
-    "b": np.array([[1, 256], [65535, 0]], np.uint16),
-    "c": np.array([0.1, np.nan], np.float32),
-    "d": np.array([[np.pi]]),
-}
-
-
 def test_packed_arrays_are_recovered():
-    text, places = packed(ARRAYS)
+    arrays = {
+        "a": np.arange(5, dtype=np.uint8),
+        "b": np.array([[1, 256], [65535, 0]], np.uint16),
+        "c": np.array([0.1, np.nan], np.float32),
+        "d": np.array([[np.pi]]),
+    }
+    text, places = packed(arrays)
     whole = zlib.decompress(base64.b64decode(text))
-    for name, array in ARRAYS.items():
+    for name, array in arrays.items():
         place = places[name]
         assert place["start"] % 8 == 0 and tuple(place["shape"]) == array.shape
         part = np.frombuffer(whole[place["start"] :][: array.nbytes], np.uint8)
@@ -266,48 +264,29 @@ def test_command_writes_one_page_and_overwrites_only_on_request(sweep, small, tm
     assert CliRunner().invoke(app, [*command, "--overwrite"]).exit_code == 0
 
 
-READY = "document.body?.classList.contains('ready')"
-in_a_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
-
-
-def looked_at(page, folder, look):
-    """Result of the coroutine `look` on the page; the page must have no errors and request no other address."""
-
-    async def visit():
-        async with opened(page, folder) as browser:
-            await browser.until(READY)
-            found = await look(browser)
-            assert browser.errors == []
-            assert browser.addresses == [page.absolute().as_uri()]
-            return found
-
-    return asyncio.run(visit())
-
-
-async def press(browser, element, key):
-    """Press a key on an element of the page."""
-    await browser.evaluate(f"document.getElementById('{element}').focus()")
-    await browser.press(key)
-
-
-@in_a_browser
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
 def test_displayed_numbers_match_the_public_functions(page, sweep, tmp_path):
     """
     Sliders are moved by keyboard. R2, slope, intercept and shares are compared with a run of the displayed scenario.
     """
 
-    async def look(browser):
+    async def look():
         moves = {"arp": "ArrowRight", "registration": "End", "instrument": "Home", "sza": "ArrowRight"}
-        for slider, key in moves.items():
-            await press(browser, slider, key)
-        shown = {name: await browser.text(name) for name in ("r2", "slope", "intercept", "n", "toml", "headline")}
-        stages = await browser.evaluate(
-            "[...document.querySelectorAll('.budget li:not(.scale)')].map((row) => row.innerText)"
-        )
-        own = "(() => { const { ndvi, truth } = window.explorer.pixels(); return [[...ndvi], [...truth]]; })()"
-        return shown, stages, await browser.evaluate(own)
+        async with opened(page, tmp_path) as browser:
+            await browser.until("document.body?.classList.contains('ready')")
+            for slider, key in moves.items():
+                await browser.evaluate(f"document.getElementById('{slider}').focus()")
+                await browser.press(key)
+            shown = {name: await browser.text(name) for name in ("r2", "slope", "intercept", "n", "toml", "headline")}
+            stages = await browser.evaluate(
+                "[...document.querySelectorAll('.budget li:not(.scale)')].map((row) => row.innerText)"
+            )
+            own = "(() => { const { ndvi, truth } = window.explorer.pixels(); return [[...ndvi], [...truth]]; })()"
+            pixels = await browser.evaluate(own)
+            assert browser.errors == [] and browser.addresses == [page.absolute().as_uri()]
+            return shown, stages, pixels
 
-    shown, stages, (ndvi, truth) = looked_at(page, tmp_path, look)
+    shown, stages, (ndvi, truth) = asyncio.run(look())
     scenario = parse_scenario(tomllib.loads(shown["toml"]))
     assert (scenario.ground.arp, scenario.sensor.offset) == (sweep.arps[1], list(sweep.offsets[1]))
     assert scenario.geometry.sza == sweep.szas[1] and scenario.sensor.instrument == "HRV"
@@ -325,23 +304,3 @@ def test_displayed_numbers_match_the_public_functions(page, sweep, tmp_path):
     np.testing.assert_allclose(np.array(ndvi, float).ravel(), run["image"]["ndvi"].values.ravel(), rtol=1e-12)
     rows, columns = run["image"]["ndvi"].shape
     np.testing.assert_allclose(np.array(truth, float), run["truth"]["lai"].values[:rows, :columns].ravel(), atol=1e-4)
-
-
-@in_a_browser
-def test_scenario_of_a_landscape_is_written_completely(sweep, outcomes, tmp_path):
-    """Classes are separate tables; deviations and similar keys are inline tables."""
-    window = sweep.scenario.grid.model_dump()
-    values = fifesim.scenario.default_scenario().model_dump(exclude_unset=True) | {
-        "grid": window,
-        "terrain": {"dem": "flat"},
-    }
-    values["landscape"] = {"cover": "pastures", "deviations": {"soil": 0.02}}
-    values["classes"] = {"one": {"share": 0.4, "brown": 0.1}, "other": {"share": 0.6}}
-    own = replace(sweep, scenario=parse_scenario(values))
-    page = tmp_path / "land.html"
-    page.write_text(explorer_page(own, outcomes), encoding="utf-8")
-    folder = tmp_path / "browser"
-    folder.mkdir()
-    text = looked_at(page, folder, lambda browser: browser.text("toml"))
-    start = replace(own.settings[0], instrument="TM")
-    assert parse_scenario(tomllib.loads(text)).complete() == own.at(start)

@@ -154,7 +154,7 @@ def test_mistake_prints_one_line_and_writes_nothing(quick, tmp_path, stage, argu
 
 
 def test_figures_of_the_paper_show_their_quantities(found):
-    """Figure 5, NDVI below the atmosphere and of the image over LAI, and Figure 9, reflectance; the last arp is below."""
+    """Figure 5, LAI and FPAR over NDVI below the atmosphere and of the image, and Figure 9, reflectance of both."""
     for number, panel, points, pair in (
         (5, 0, 0, ("boa_ndvi", "lai")),
         (5, 1, 1, ("ndvi", "fpar")),

@@ -165,27 +165,6 @@ def test_readings_share_their_ground():
     assert (several["r2"].sel(reading="aligned") != several["r2"].sel(reading="narrow")).all()
 
 
-def test_effects_are_tabulated_and_an_unchanged_case_has_none(monkeypatch):
-    """Four readings, one size and an unchanged case, for one realisation of scenes of 10 x 10 pixels."""
-    case, few = Case(cells=90), ("native", "aligned", "offset", "blur-48.6")
-    monkeypatch.setattr(effects, "SIZES", (90,))
-    monkeypatch.setattr(effects, "READINGS", {name: READINGS[name] for name in few})
-    table = effects.readings(case, [1])
-    assert list(zip(table["dem"], table["name"], strict=True)) == [
-        *(("flat", name) for name in few), ("flint-hills", "native"), ("flint-hills", "aligned"),
-    ]  # fmt: skip
-    rows = table.set_index(["name", "dem"])
-    # Blur narrows NDVI and thus steepens slopes; relief adds scatter to aligned pixels.
-    assert rows.loc[("blur-48.6", "flat"), "lai_slope_factor"] > 1.3 * rows.loc[("aligned", "flat"), "lai_slope_factor"]
-    scatter = rows["r2 burned-ungrazed 0.05"]
-    assert scatter[("aligned", "flint-hills")] < scatter[("aligned", "flat")]
-    assert effects.sizes(case, [1])["lai_r2_rms"][0] == table["lai_r2_rms"][0]
-    assert len({change.name for change in effects.changes(case)}) == 10
-    monkeypatch.setattr(effects, "changes", lambda case: [effects.Change("itself", "1", "1", case)])
-    (row,) = effects.effects_of_numbers(case, [1]).to_dict("records")
-    assert all(value == 0 for name, value in row.items() if name not in ("name", "before", "after"))
-
-
 @pytest.mark.parametrize(("column", "change"), [("r2", 0.13), ("intercept", -0.3), ("slope", 0.5)])
 def test_number_beyond_its_limit_is_named(found, column, change):
     """Table 2 with the published values, in which a sample has a standard deviation of 0.1, with one changed number."""
@@ -199,11 +178,3 @@ def test_number_beyond_its_limit_is_named(found, column, change):
     assert [row["name"] for row in effects.limits(other, table) if not row["met"]] == []
     told = {row["name"]: row["deviations"] for row in effects.limits(other, table)}
     assert told["R² of LAI, largest difference of nine rows"] == pytest.approx(1.2)
-
-
-def test_blur_readings_have_the_widths_measured_in_flight():
-    """The transfer function is 0.5 at the frequency whose half period is the effective field of view."""
-    for name, metres in (("blur-40.8", 40.8), ("blur-48.6", 48.6)):
-        spread = Case(reading=READINGS[name]).instrument.line_spread
-        assert float(spread.mtf(1 / (2 * metres))) == pytest.approx(0.5, abs=1e-4)
-    assert Case(reading=READINGS["narrow"]).instrument.line_spread.width == pytest.approx(7 / 9 * 30.32, abs=0.005)

@@ -6,7 +6,7 @@ import pytest
 
 import fifesim
 from fifesim.analysis.scaling import shapley
-from fifesim.experiments.scatter import endtoend, errors
+from fifesim.experiments.scatter import endtoend
 from fifesim.experiments.scatter.errors import ERROR_STAGES
 from fifesim.experiments.scatter.shares import budget_cases
 
@@ -130,22 +130,6 @@ def test_report_has_the_numbers_of_the_budget(tmp_path):
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert f"{table.loc['total', 'bias']:+.1f} %" in page and page.count("data:image/png") == 2
     assert fifesim.scenario.read_scenario(tmp_path / "out" / "scenario.toml").sensor.offset == [0.3, 0.0]
-
-
-def test_maps_show_the_retrieval_and_the_width_of_its_interval(retrieval):
-    (case,) = budget_cases(fifesim.Scenario(**BURNED), realisations=1, cells=333)
-    run = fifesim.simulate(case)
-    image, truth = run["image"]["dn"], run["truth"]["lai"]
-    for each in ("line", retrieval):
-        lai, width = endtoend.estimated(image, truth, each)
-        inside = np.isfinite(lai.values)
-        assert inside.sum() > 60 and (width.values[inside] > 0).all()
-        # The 80 % interval contains most of the truth.
-        near = np.abs(lai.values - truth.values)[inside] < width.values[inside] / 2
-        assert 0.4 < near.mean() <= 1
-    figure = endtoend.map_figure(case, errors.target_of("photosynthesis"), retrieval)
-    titles = [axis.get_title() for axis in figure.axes if axis.get_title()]
-    assert titles[0].startswith("1. Truth: GPP of cells of 3.33 m [g m-2 d-1]") and len(titles) == 6
 
 
 def test_sensitivity_matches_a_linear_function():
