@@ -1,4 +1,4 @@
-"""`fifesim.reproduce`, its scenario files, its page, and Figures 3 to 9."""
+"""`fifesim.reproduce`, its scenario files, its page, and the data of Figures 3 to 9."""
 
 import builtins
 import json
@@ -6,7 +6,6 @@ import re
 
 import numpy as np
 import pandas as pd
-import paper_figures as figures
 import pytest
 import rasterio
 import xarray as xr
@@ -151,18 +150,6 @@ def test_mistake_prints_one_line_and_writes_nothing(quick, tmp_path, stage, argu
     assert result.exit_code == 2
     assert said in result.stderr and len(result.stderr.strip().splitlines()) == 1
     assert not (tmp_path / "out").exists()
-
-
-def test_figures_of_the_paper_show_their_quantities(found):
-    """Figure 5, LAI and FPAR over NDVI below the atmosphere and of the image, and Figure 9, reflectance of both."""
-    for number, panel, points, pair in (
-        (5, 0, 0, ("boa_ndvi", "lai")),
-        (5, 1, 1, ("ndvi", "fpar")),
-        (9, -1, 0, ("boa_nir", "toa_nir")),
-    ):
-        drawn = figures.plot(number, found, reading="native").axes[panel].collections[points].get_offsets()
-        values = figures.sample(found, "native", float(found["arp"][-1 if panel == -1 else 0]))
-        np.testing.assert_allclose(drawn, np.stack([values[name] for name in pair], axis=1), rtol=1e-12)
 
 
 def test_figure_of_table_2_shows_the_values_of_the_table(found):

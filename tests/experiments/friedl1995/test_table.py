@@ -60,7 +60,7 @@ def test_regression_line_agrees_with_scipy():
 
 def test_table_2_agrees_with_the_paper(tables):
     """
-    Table 2 is within the limits that the page on the paper states.
+    Table 2 is within the limits that the page on the paper states, and a literal reading is beyond them in R2.
 
     Three realisations of 1296 pixels leave standard errors of 0.012 in R2 and 2 % in slopes. The limits of single rows
     cover these errors in addition to the differences found over twenty realisations, 0.10 and 12 %.
@@ -69,6 +69,8 @@ def test_table_2_agrees_with_the_paper(tables):
     assert list(native.columns[:6]) == ["variable", "distribution", "arp", "intercept", "slope", "r2"]
     rows = effects.limits(native, tables["aligned"])
     assert [row["name"] for row in rows if not row["met"]] == []
+    missed = [row["name"] for row in effects.limits(tables["aligned"], native) if not row["met"]]
+    assert "R² of LAI, largest difference of nine rows" in missed and (tables["aligned"]["r2"] > 0.78).all()
 
 
 def test_rows_of_the_table_are_in_the_order_of_the_paper(found, tables):
@@ -163,18 +165,3 @@ def test_readings_share_their_ground():
     alone = friedl1995_table.realise_scenes(Case(cells=90, reading=READINGS["narrow"]), [5], **options)
     np.testing.assert_array_equal(several["r2"].sel(reading="narrow"), alone["r2"].sel(reading="narrow"))
     assert (several["r2"].sel(reading="aligned") != several["r2"].sel(reading="narrow")).all()
-
-
-@pytest.mark.parametrize(("column", "change"), [("r2", 0.13), ("intercept", -0.3), ("slope", 0.5)])
-def test_number_beyond_its_limit_is_named(found, column, change):
-    """Table 2 with the published values, in which a sample has a standard deviation of 0.1, with one changed number."""
-    table = friedl1995_table.table2(found.sel(reading="native"))
-    for each in friedl1995_table.COEFFICIENTS:
-        table[each], table[f"{each}_deviation_200"] = table[f"paper_{each}"], 0.1
-    other = table.copy()
-    table.loc[table.index[table["variable"] == "lai"][0], column] += change
-    missed = [row["name"] for row in effects.limits(table, other) if not row["met"]]
-    assert len(missed) == 1 and missed[0].startswith(f"{'R²' if column == 'r2' else column} of LAI")
-    assert [row["name"] for row in effects.limits(other, table) if not row["met"]] == []
-    told = {row["name"]: row["deviations"] for row in effects.limits(other, table)}
-    assert told["R² of LAI, largest difference of nine rows"] == pytest.approx(1.2)
