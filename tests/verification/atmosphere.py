@@ -172,13 +172,6 @@ def _one_cell(air, bands, reflectance, altitude, sza, saa, vza, vaa):
     return apparent_reflectance(reflectance, **terms.uniform)
 
 
-_COSINE, _WEIGHTS = leggauss(40)
-_SINE = np.sqrt(1 - _COSINE**2)
-
-# Moments of Rayleigh's scattering matrix without depolarization.
-_PURE_RAYLEIGH = np.array([[1, 0, 0, 0], [0, 0, 0, 0], [0.1, 0.6, 0, np.sqrt(6) / 10]])
-
-
 def _once():
     """Check single scattering, exact backscatter included; the phase function is tabulated at 0.25 degrees."""
     band, worst = instrument("TM").select(["TM3"])[0].response, 0.0
