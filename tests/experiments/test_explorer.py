@@ -86,6 +86,9 @@ def test_sliders_have_the_values_of_the_scenario():
     sweep = sweep_of(parse_scenario(own | {"sensor": {"instrument": "OLI", "offset": [0.3, 0.4]}}))
     assert sweep.arps == (0.15, 0.2, 0.249) and sweep.hazes == (10.0, 30.0, 45.0) and sweep.szas == (20.0, 33.0, 60.0)
     assert "OLI" in sweep.instruments and (0.3, 0.4) in sweep.offsets and len(sweep.offsets) == 4
+    words = explorer.slider_words(sweep)
+    assert [each["start"] for each in words[:3]] == [1, 1, 1] and words[1]["marks"] == ["10 km", "30 km", "45 km"]
+    assert set(explorer.STAGE_WORDS) == {CURVATURE, *STAGES}
 
 
 def test_setting_changes_only_its_values_of_the_scenario(small):
@@ -237,17 +240,6 @@ def test_stepped_values_are_within_half_a_step(kind, levels):
     assert codes.tolist() == [1, 1, 1] and low == 2.5
     with pytest.raises(ValueError, match="x is of type int64: packed takes uint8"):
         packed({"x": np.arange(3)})
-
-
-def test_sliders_start_at_the_scenario_and_show_its_values(sweep, small):
-    arp, haze, sza, instrument, registration = explorer.slider_words(sweep)
-    assert arp["start"] == haze["start"] == 0 and "leaf area is correlated up to 8 m, arp 0.15" in arp["texts"][0]
-    assert haze["marks"] == ["45 km"] and sza["texts"][0] == "28.5° from overhead"
-    assert instrument["marks"] == ["HRV", "TM"] and registration["texts"] == ["none", "0.50 pixel"]
-    values = small.model_dump(exclude_unset=True) | {"atmosphere": {"aot": 0.15}}
-    haze = explorer.slider_words(sweep_of(parse_scenario(values)))[1]
-    assert haze["texts"][haze["start"]] == "aerosol optical thickness 0.15"
-    assert set(explorer.STAGE_WORDS) == {CURVATURE, *STAGES}
 
 
 def test_command_writes_one_page_and_overwrites_only_on_request(sweep, small, tmp_path, monkeypatch):
