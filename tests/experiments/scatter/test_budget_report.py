@@ -17,7 +17,7 @@ from fifesim.experiments.scatter.stages import STAGES, VARIABLES
 
 
 def test_every_stage_belongs_to_one_mechanism():
-    """Shares of 1 to 8 % for the stages in order and a curvature of 9 %, in two equal realisations."""
+    """Shares of 1, 2, 3 ... % for the stages in order and a curvature of 9 %, in two equal realisations."""
     known = dict(zip(STAGES, np.arange(1, len(STAGES) + 1) / 100, strict=True)) | {CURVATURE: 0.09}
     shares = np.broadcast_to([known[name] for name in STAGES], (2, len(VARIABLES), len(STAGES)))
     curvature, total = np.full(shares.shape[:2], 0.09), np.full(shares.shape[:2], sum(known.values()))
