@@ -160,8 +160,8 @@ def test_equivalent_noise_and_range_grow_with_arp_as_published(found):
 
 def test_readings_share_their_ground():
     """A reading gives the same numbers alone and together with other readings."""
-    options = {"distributions": ["burned-grazed"], "arps": [0.15]}
-    several = friedl1995_table.realise_scenes(Case(cells=90), [5], [READINGS["aligned"], READINGS["narrow"]], **options)
-    alone = friedl1995_table.realise_scenes(Case(cells=90, reading=READINGS["narrow"]), [5], **options)
+    options, narrow = {"distributions": ["burned-grazed"], "arps": [0.15]}, READINGS["narrow"]
+    several = friedl1995_table.realise_scenes(effects.Case(cells=90), [5], [READINGS["aligned"], narrow], **options)
+    alone = friedl1995_table.realise_scenes(effects.Case(cells=90, reading=narrow), [5], **options)
     np.testing.assert_array_equal(several["r2"].sel(reading="narrow"), alone["r2"].sel(reading="narrow"))
     assert (several["r2"].sel(reading="aligned") != several["r2"].sel(reading="narrow")).all()
