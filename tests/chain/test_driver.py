@@ -1,23 +1,78 @@
-"""The chain on plain arrays compared with the labelled steps."""
+"""The chain by a Setup, on plain arrays and in one pass, compared with the labelled steps."""
 
 from dataclasses import fields, replace
 
+import dask
 import numpy as np
 import pytest
 import xarray as xr
+from lazy import no_compute
 
 import fifesim
 from fifesim.chain.driver import Driver, cell_block_means, varying_parts
+from fifesim.chain.landscapes import seen_reflectance, seen_through_air
 from fifesim.chain.setup import image_of, reflectance_of
 from fifesim.grids import grid as grids
+from fifesim.grids.windows import origin_of
 from fifesim.ground.terrain.labels import light_on_slopes
 
+# ------------------------------------------------------------------------------------------ Setup
+
+# Every field of ground, atmosphere and sampling differs from its default, as arguments of the public functions.
+GROUND = {
+    "bands": ("TM3", "TM4"),
+    "atmosphere": fifesim.Atmosphere(visibility=23),
+    "geometry": fifesim.Geometry(40.0, 100.0, 5.0, 10.0),
+    "canopy": fifesim.Canopy(hotspot=0.2, brown=0.3, soil=0.03),
+    "upwelling": False,
+}
+SENSOR = {
+    "interval": (20.0, 25.0),
+    "offset": (0.2, -0.1),
+    "min_valid": 0.9,
+    "noise": ("thermal",),
+    "noise_models": fifesim.NoiseModel(thermal=2.0, shot=0.0),
+    "seed": 5,
+    "quantise": False,
+}
+
+
+def test_all_fields_reach_their_steps(lai, site):
+    dem = fifesim.flint_hills(site.pad(1), seed=7)
+    horizon = fifesim.horizon(fifesim.flint_hills(site.pad(40), seed=7))
+    air = {"adjacency": True, "surroundings": 0.3}
+    sky = fifesim.cloud_field(site, 0.8, seed=2, length=300, height=100, margin=500)
+    setup = fifesim.Setup(instrument="TM", dem=dem, horizon=horizon, clouds=sky, **GROUND, **air, **SENSOR)
+    rho = fifesim.surface_reflectance(lai, "TM", dem=dem, horizon=horizon, **GROUND)
+    xr.testing.assert_identical(reflectance_of(setup, lai), rho)
+    cells = fifesim.atmosphere.cast_clouds(rho, sky, dem=dem)
+    assert cells.cloud.any()
+    image = fifesim.sense(fifesim.to_toa(rho, **air, clouds=cells), "TM", **SENSOR)
+    xr.testing.assert_identical(image_of(setup, rho), image)
+    told = {"instrument", "dem", "horizon", "clouds", *GROUND, *air, *SENSOR}
+    upright = replace(setup, slopes="upright", canopy=fifesim.Canopy(hotspot=0.2))
+    own = GROUND | {"canopy": upright.canopy, "slopes": "upright"}
+    expected = fifesim.surface_reflectance(lai, "TM", dem=dem, horizon=horizon, **own)
+    xr.testing.assert_identical(reflectance_of(upright, lai), expected)
+    # Coupling has separate tests.
+    assert {field.name for field in fields(fifesim.Setup)} - told == {"onto", "slopes", "coupling"}
+
+
+def test_pixels_can_be_on_a_given_grid(lai, site, whole):
+    pixels = fifesim.grid_at(site.crs, site.affine.c + 7.0, site.affine.f - 11.0, 90, 60, 30)
+    setup = fifesim.Setup(bands=("TM3", "TM4"), onto=pixels)
+    xr.testing.assert_identical(image_of(setup, whole["rho"]), whole["toa"].fifesim.sense("TM", onto=pixels))
+
+
+def test_defaults_equal_the_defaults_of_the_functions(lai, whole):
+    setup = fifesim.Setup(bands=("TM3", "TM4"))
+    xr.testing.assert_identical(image_of(setup, reflectance_of(setup, lai)), whole["image"])
+
+
+# ------------------------------------------------------------------------------------------ plain arrays
+
 GRID = fifesim.fife_site(10.0, ((300, 348), (200, 254)))
-
-
-@pytest.fixture(scope="module")
-def lai():
-    return fifesim.lai_scene(GRID, arp=0.2, seed=3)
+LAI = fifesim.lai_scene(GRID, arp=0.2, seed=3)
 
 
 @pytest.fixture(scope="module")
@@ -28,33 +83,27 @@ def setup():
     )
 
 
-def test_steps_equal_the_labelled_steps_to_the_bit(lai, setup):
-    driver, labelled = Driver(setup), reflectance_of(setup, lai)
-    level = driver.reflectance(lai.values)
+def test_steps_equal_the_labelled_steps_to_the_bit(setup):
+    driver, labelled = Driver(setup), reflectance_of(setup, LAI)
+    level = driver.reflectance(LAI.values)
     np.testing.assert_array_equal(level, labelled)
     toa = labelled.fifesim.to_toa()
     np.testing.assert_array_equal(driver.toa(level), toa)
     np.testing.assert_array_equal(driver.ndvi(driver.toa(level)), fifesim.ndvi(toa))
+    means = cell_block_means(LAI.values, GRID, 35.0, 0.8)
+    np.testing.assert_array_equal(means, fifesim.aggregate(LAI, 35.0, min_valid=0.8))
     for leaves in ("all", "green"):
-        expected = fifesim.fpar(lai, geometry=setup.geometry, canopy=fifesim.Canopy(brown=0.1), leaves=leaves)
-        np.testing.assert_array_equal(driver.fpar(lai.values, 0.94, leaves), expected)
+        expected = fifesim.fpar(LAI, geometry=setup.geometry, canopy=fifesim.Canopy(brown=0.1), leaves=leaves)
+        np.testing.assert_array_equal(driver.fpar(LAI.values, 0.94, leaves), expected)
 
 
-def test_saturated_counts_are_no_data_as_in_the_labelled_steps(lai, setup):
-    toa = reflectance_of(setup, lai).fifesim.to_toa()
+def test_saturated_counts_are_no_data_as_in_the_labelled_steps(setup):
+    toa = reflectance_of(setup, LAI).fifesim.to_toa()
     image = fifesim.sense(toa.where(toa.x > toa.x[30], 0.9), "TM")
     assert 0 < (image == 255).mean() < 1
     expected = image.fifesim.to_reflectance()
     np.testing.assert_array_equal(Driver(setup).planetary(image.values), expected)
     np.testing.assert_array_equal(np.isnan(expected), (image == 255) | (image == 0))
-
-
-def test_slopes_equal_the_labelled_steps(lai, setup):
-    dem = fifesim.flint_hills(GRID.pad(1), seed=2)
-    setup = replace(setup, upwelling=False)
-    light = light_on_slopes(dem, grids.geobox(lai), setup.geometry)
-    found = Driver(setup).on_slopes(Driver(setup).reflectance(lai.values), light)
-    np.testing.assert_array_equal(found, reflectance_of(replace(setup, dem=dem), lai))
 
 
 def test_reflectance_is_recovered_from_digital_numbers(setup):
@@ -68,9 +117,9 @@ def test_reflectance_is_recovered_from_digital_numbers(setup):
     np.testing.assert_allclose(analogue.planetary(analogue.recorded(analogue.radiance(reflectance))), reflectance)
 
 
-def test_varying_parts_are_named(lai, setup):
+def test_varying_parts_are_named(setup):
     with pytest.raises(ValueError, match="do not support dem, adjacency, brown: use"):
-        Driver(replace(setup, dem=lai, adjacency=True, canopy=fifesim.Canopy(brown=lai)))
+        Driver(replace(setup, dem=LAI, adjacency=True, canopy=fifesim.Canopy(brown=LAI)))
     assert varying_parts(replace(setup, offset=(np.zeros(3), 0.0))) == ["a drifting offset"]
     angles = xr.Dataset({"sza": 30.0, "saa": 120.0})
     assert varying_parts(replace(setup, geometry=angles)) == ["angles by cell"]
@@ -107,11 +156,11 @@ FIELDS = {
 
 
 @pytest.mark.parametrize("name", [each.name for each in fields(fifesim.Setup)])
-def test_each_field_changes_the_image_and_arrays_support_or_refuse_it(lai, setup, name):
+def test_each_field_changes_the_image_and_arrays_support_or_refuse_it(setup, name):
     value, others = FIELDS[name]
     base = replace(setup, **{key: each for key, each in others.items() if key != name})
     changed = replace(base, **{name: value})
-    before, expected = (image_of(each, reflectance_of(each, lai), lai) for each in (base, changed))
+    before, expected = (image_of(each, reflectance_of(each, LAI), LAI) for each in (base, changed))
     assert before.dtype != expected.dtype or not np.array_equal(before, expected, equal_nan=True)
     # Elevation is not a field of the setup of a driver but an argument of its steps.
     level, dem = replace(changed, dem=None, horizon=None), changed.dem
@@ -119,36 +168,84 @@ def test_each_field_changes_the_image_and_arrays_support_or_refuse_it(lai, setup
         assert name in {*varying_parts(level), "surroundings"}
         return
     driver = Driver(level)
-    found = driver.reflectance(lai.values)
+    found = driver.reflectance(LAI.values)
     if dem is not None:
-        found = driver.on_slopes(found, light_on_slopes(dem, grids.geobox(lai), changed.geometry, changed.horizon))
-    np.testing.assert_array_equal(driver.image(driver.toa(found), GRID), expected)
+        found = driver.on_slopes(found, light_on_slopes(dem, grids.geobox(LAI), changed.geometry, changed.horizon))
+    image = driver.image(driver.toa(found), GRID)
+    assert image.dtype == expected.dtype
+    np.testing.assert_array_equal(image, expected)
+    assert grids.same_grid(driver.pixels(GRID, level)[0], grids.geobox(expected))
 
 
-@pytest.mark.parametrize(
-    "own",
-    [
-        {},
-        {"interval": "native", "offset": (0.4, -0.3)},
-        {"instrument": "OLI", "bands": ("B4", "B5"), "noise": ("thermal",), "seed": 5},
-        {"quantise": False, "interval": 45.0, "min_valid": 0.8},
-    ],
-)
-def test_image_equals_the_labelled_image_to_the_bit(lai, own):
-    setup = fifesim.Setup(**{"bands": ("TM3", "TM4"), "geometry": fifesim.fife_geometry()} | own)
-    driver, level = Driver(setup), reflectance_of(setup, lai)
-    found, expected = driver.image(driver.toa(level.values), GRID), image_of(setup, level)
-    assert found.dtype == expected.dtype
-    np.testing.assert_array_equal(found, expected)
-    assert grids.same_grid(driver.pixels(GRID, setup)[0], grids.geobox(expected))
-    means = cell_block_means(lai.values, GRID, 35.0, setup.min_valid)
-    np.testing.assert_array_equal(means, fifesim.aggregate(lai, 35.0, min_valid=setup.min_valid))
-
-
-def test_shared_driver_draws_noise_by_seed(lai):
+def test_shared_driver_draws_noise_by_seed():
     setup = fifesim.Setup("OLI", bands=("B4", "B5"), geometry=fifesim.fife_geometry(), noise=("thermal",))
     driver = Driver(setup)
-    toa = driver.toa(driver.reflectance(lai.values))
+    toa = driver.toa(driver.reflectance(LAI.values))
     images = [driver.image(toa, GRID, replace(setup, seed=seed)) for seed in (1, 2)]
     assert (images[0] != images[1]).any()
     np.testing.assert_array_equal(images[1], Driver(replace(setup, seed=2)).image(toa, GRID))
+
+
+# ------------------------------------------------------------------------------------------ one pass
+
+BANDS = ["TM2", "TM3", "TM4"]
+
+
+def scene(**chunks):
+    return fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 90), (0, 72))), arp=0.15, seed=7, chunks=chunks)
+
+
+def chains(lai, exact=False, **canopy):
+    reflectance = lai.fifesim.surface_reflectance("TM", bands=BANDS, canopy=fifesim.Canopy(**canopy), exact=exact)
+    return reflectance, reflectance.fifesim.to_toa()
+
+
+@pytest.mark.parametrize(
+    "canopy", [{}, {"hotspot": 0.1, "soil": 0.05}, {"brown": 0.2}, {"crown_cover": 0.7}, {"exact": True}]
+)
+def test_one_pass_equals_two_passes_to_the_bit(canopy):
+    """One pass is used if cells differ only in leaf area."""
+    with no_compute():
+        reflectance, lazy = chains(scene(y=31, x=29), **canopy)
+        once = seen_through_air(reflectance) is not None
+    assert once == (not {"brown", "crown_cover", "exact"} & set(canopy))
+    kept = [name for name in reflectance.data.dask.layers if "call" in name and name in lazy.data.dask.layers]
+    assert not (once and kept)
+    xr.testing.assert_identical(lazy.compute(), chains(scene(y=31, x=29).compute(), **canopy)[1])
+
+
+def test_changed_reflectance_is_not_recomputed():
+    reflectance, _ = chains(scene(y=90, x=40))
+    halved = (0.5 * reflectance).assign_attrs(reflectance.attrs)
+    assert seen_through_air(halved) is None and seen_through_air(reflectance.compute()) is None
+    half = halved.fifesim.to_toa().compute()
+    assert float(half.mean()) < 0.9 * float(reflectance.fifesim.to_toa().mean())
+
+
+def test_missing_cells_are_missing():
+    lai = np.array([[0.0, np.nan, 2.5]])
+    canopy = origin_of(chains(scene(y=90, x=40))[0])
+    names = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
+    clear = dict(zip(names, np.repeat([[0.0], [1.0], [1.0], [0.0], [1.0]], 3, axis=1), strict=True))
+    found = seen_reflectance(lai, background=canopy.background, scene=canopy.scene, terms=clear)
+    assert np.isnan(found[:, 0, 1]).all()
+    # Without atmosphere, bare ground has the reflectance of the background.
+    np.testing.assert_allclose(found[:, 0, 0], canopy.background, rtol=1e-9)
+
+
+def test_image_and_index_together_compute_the_scene_once_and_equal_each_alone():
+    """Also the truth; results are identical to the bit."""
+    made = []
+
+    def counted(block):
+        made.append(block.shape)
+        return block
+
+    lai = scene(y=45, x=36)
+    lai = lai.copy(data=lai.data.map_blocks(counted, dtype=float, meta=np.empty((0, 0))))
+    image = chains(lai)[1].fifesim.sense("TM")
+    each = image, image.fifesim.ndvi(), lai.fifesim.aggregate(30)
+    together = dask.compute(*each, scheduler="synchronous")
+    assert len(made) == lai.data.npartitions
+    for one, alone in zip(together, each, strict=True):
+        np.testing.assert_array_equal(one, alone.compute())

@@ -1,4 +1,4 @@
-"""Landscapes through the chain: classes with different canopies, and the closed form of a pixel of two classes."""
+"""Landscapes through the chain: classes with different canopies, their defaults, and a closed form of two classes."""
 
 import warnings
 
@@ -7,10 +7,9 @@ import pytest
 import xarray as xr
 from elevations import labelled
 from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
-from oracles_canopy import four_streams, fpar_of_green_leaves
+from oracles_canopy import fpar_of_green_leaves
 
 import fifesim
-from fifesim.atmosphere import engines
 from fifesim.grids import grid as grids
 
 TM34 = ["TM3", "TM4"]
@@ -96,67 +95,28 @@ def test_cells_without_class_or_leaf_area_have_no_reflectance(land, rho):
     np.testing.assert_array_equal(made.values[:, ~missing], rho.values[:, ~missing])
 
 
-def test_landscape_is_restored_from_a_file(tmp_path, land, rho):
-    land.to_netcdf(tmp_path / "land.nc")
-    again = xr.open_dataset(tmp_path / "land.nc", decode_coords="all")
-    xr.testing.assert_equal(seen(again), rho)
-
-
-@pytest.mark.parametrize(
-    "call, message",
-    [
-        (lambda land: seen(land[["cover"]]), "a landscape needs a variable lai, this Dataset has cover"),
-        (lambda land: seen(land.assign(cover=land.cover.drop_attrs())), "the classes of the cover are unknown"),
-        (lambda land: seen(land, BARE), "background is given and also defined by all classes of the landscape"),
-    ],
-)
-def test_unusable_landscapes_and_arguments_are_refused(land, call, message):
-    with pytest.raises(ValueError, match=message):
-        call(land)
-
-
-# A canopy of one leaf inclination over dark ground, next to bare soil.
-LEAF, DARK, SOIL, DENSE = {"TM3": (0.07, 0.04), "TM4": (0.46, 0.41)}, 0.08, 0.19, 2.3
-
-
-def two_uniform_classes():
-    """Two classes that divide pixels of 9 x 9 cells after 0, 1, ... 9 rows."""
-    grid = fifesim.fife_site(30 / 9, window=((0, 9), (0, 90)))
-    codes = np.where(np.arange(9)[:, None] < np.repeat(np.arange(10), 9), 1, 2)
-    dense = fifesim.Canopy(leaf_optics=LEAF, background=DARK, leaf_angles="45: 1")
-    soil = fifesim.CoverClass(lai=0, canopy=fifesim.Canopy(leaf_optics=LEAF, background=SOIL))
-    table = {"canopy": fifesim.CoverClass(lai=DENSE, canopy=dense), "soil": soil}
-    return fifesim.landscape(grid, cover=labelled(grid, codes).drop_attrs(deep=False), classes=table)
-
-
 def test_pixel_of_two_uniform_classes_agrees_with_the_closed_form():
     r"""
     Mean reflectance, NDVI and its bias for shares f and 1 - f, to 1e-9.
 
     With S the sum and N the NDVI of a class, the bias is
-    :math:`f (1 - f) (N_a - N_b) (S_b - S_a) / (f S_a + (1 - f) S_b)`. Canopy reflectance is from the leaf equations,
-    solved by a matrix exponential.
+    :math:`f (1 - f) (N_a - N_b) (S_b - S_a) / (f S_a + (1 - f) S_b)`. Rows of a canopy divide pixels of 9 x 9 cells
+    after 0, 1, ... 9 rows; the other rows are soil.
     """
-    sun = fifesim.Geometry(30.0, 120.0, 20.0, 80.0)
-    land = two_uniform_classes()
-    air = {"geometry": sun, "atmosphere": fifesim.Atmosphere()}
-    cells = land.fifesim.surface_reflectance("TM", bands=TM34, exact=True, **air)
-    responses = tuple(band.response for band in fifesim.instrument("TM").select(TM34))
-    sky = engines.band_terms(fifesim.Atmosphere(), responses, sun.sza, sun.vza, sun.raa).diffuse_fraction
-    dense = []
-    for (rho, tau), share in zip(LEAF.values(), sky, strict=True):
-        c = four_streams(DENSE, rho, tau, sun.sza, sun.vza, sun.raa, 45.0)
-        below = DARK / (1 - DARK * c["rdd"])
-        up = c["too"] + c["tdo"]
-        direct = c["rso"] + (c["tss"] + c["tsd"]) * below * up
-        dense.append((1 - share) * direct + share * (c["rdo"] + c["tdd"] * below * up))
+    grid = fifesim.fife_site(30 / 9, window=((0, 9), (0, 90)))
+    codes = np.where(np.arange(9)[:, None] < np.repeat(np.arange(10), 9), 1, 2)
+    soil = fifesim.CoverClass(lai=0, canopy=fifesim.Canopy(background=0.19))
+    classes = {"grass": fifesim.CoverClass(lai=2.3, canopy=GRASS), "soil": soil}
+    land = fifesim.landscape(grid, cover=labelled(grid, codes).drop_attrs(deep=False), classes=classes)
+    cells = seen(land, exact=True)
+    dense = cells.values[:, 0, -1]
+    np.testing.assert_allclose(cells.values[:, codes == 2], 0.19, rtol=0, atol=1e-12)
     f = np.arange(10) / 9
-    red, nir = (f * each + (1 - f) * SOIL for each in dense)
+    red, nir = (f * each + (1 - f) * 0.19 for each in dense)
     mean = cells.fifesim.aggregate(30)
     np.testing.assert_allclose(mean[:, 0], [red, nir], rtol=0, atol=1e-9)
-    ndvi = mean.fifesim.ndvi()
-    np.testing.assert_allclose(ndvi[0], (nir - red) / (nir + red), rtol=0, atol=1e-9)
-    sums, ratio = (sum(dense), 2 * SOIL), ((dense[1] - dense[0]) / sum(dense), 0.0)
+    np.testing.assert_allclose(mean.fifesim.ndvi()[0], (nir - red) / (nir + red), rtol=0, atol=1e-9)
+    sums, ratio = (sum(dense), 2 * 0.19), ((dense[1] - dense[0]) / sum(dense), 0.0)
     bias = f * (1 - f) * (ratio[0] - ratio[1]) * (sums[1] - sums[0]) / (f * sums[0] + (1 - f) * sums[1])
     np.testing.assert_allclose(fifesim.scaling.scale_bias(fifesim.ndvi, cells)["bias"][0], bias, rtol=0, atol=1e-9)
     assert np.abs(bias).max() > 0.01
@@ -216,11 +176,8 @@ def test_variables_of_a_landscape_override_its_classes(site, land):
     brown = (land.lai / 5).drop_attrs(deep=False).rename("brown")
     scene = landscape_of(site, fifesim.CoverClass(lai="burned-grazed", canopy=fifesim.Canopy(brown=0.9)), brown=brown)
     made, grass = seen(scene), (land.cover == 1).values
-    np.testing.assert_array_equal(
-        made.values[:, grass], seen(scene.lai, fifesim.Canopy(brown=scene.brown)).values[:, grass]
-    )
-    with pytest.raises(ValueError, match="brown is given and also a variable of the landscape"):
-        seen(scene, fifesim.Canopy(brown=0.1))
+    alone = seen(scene.lai, fifesim.Canopy(brown=scene.brown))
+    np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
     number = seen(fifesim.landscape(site, lai=land.lai, brown=0.3))
     xr.testing.assert_equal(number, seen(land.lai, fifesim.Canopy(brown=0.3)))
 
@@ -235,33 +192,76 @@ def test_landscape_of_several_dates_is_computed_by_date(land, rho):
     assert means.lai.dims == ("time", "y", "x") and means.class_share.dims == ("class", "y", "x")
 
 
-ALONE = {
-    "surface_reflectance": lambda scene: scene.fifesim.surface_reflectance("TM", bands=["TM3"]),
-    "fpar": lambda scene: scene.fifesim.fpar(),
-    "light": lambda scene: scene.fifesim.light(),
-    "gpp": lambda scene: scene.fifesim.gpp(),
-    "evapotranspiration": lambda scene: scene.fifesim.evapotranspiration(),
-    "compare": lambda scene: scene.fifesim.compare(["TM"]),
-}
-
-
-@pytest.mark.parametrize("verb", ALONE)
+@pytest.mark.parametrize("verb", ["surface_reflectance", "compare", "fpar", "light", "gpp", "evapotranspiration"])
 def test_leaf_area_of_a_landscape_alone_warns_once_of_the_rest(site, verb):
+    def call(scene):
+        return getattr(scene.fifesim, verb)(*{"surface_reflectance": ["TM"], "compare": [["TM"]]}.get(verb, []))
+
     land = fifesim.landscape(site, cover="pastures", soil=0.1, brown=0.2, seed=7)
     with pytest.warns(UserWarning, match=r"landscape with brown, soil, which.*land\.fifesim\.surface") as found:
-        ALONE[verb](land.lai)
+        call(land.lai)
     assert sum("landscape with" in str(each.message) for each in found) == 1
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", UserWarning)
-        ALONE[verb](land)
-        ALONE[verb](land.lai.assign_attrs(landscape=""))
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        call(land)
+        call(land.lai.assign_attrs(landscape=""))
+        # The paper's treatments differ in leaf area only.
+        call(fifesim.landscape(site, cover="pastures", seed=7).lai)
 
 
-def test_leaf_area_of_a_landscape_may_be_used_alone_where_nothing_is_lost(site, land):
-    """The paper's treatments differ in leaf area only, and statistics of leaf area need nothing else."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", UserWarning)
-        fifesim.landscape(site, cover="pastures", seed=7).lai.fifesim.fpar()
-        truth = land.lai.fifesim.aggregate(30)
-        fifesim.regress(truth, 0.5 * truth)
-    assert land.lai.attrs["landscape"] == "cover"
+# ------------------------------------------------------------------------------------------ stands
+
+SITE = fifesim.fife_site(30, window=((0, 12), (0, 12)))
+ELSEWHERE = fifesim.grid_at("EPSG:32633", 390000, 5820000, 360, 360, 30)
+KNOWN = {"atmosphere": fifesim.Atmosphere(altitude=0.1), "geometry": fifesim.Geometry(40.0, 150.0)}
+DRY_SOIL = {"background": {"soil_dry": 1.0}}
+GREEN_LEAF = {"leaf_optics": fifesim.Leaf()}
+
+
+def own_map():
+    return fifesim.open_lai(fifesim.lai_scene(SITE, seed=7), SITE)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "using FIFE's tallgrass for soil and litter, green leaves; give background=.*give leaf_optics="),
+        (DRY_SOIL, "the vegetation of lai is unknown: using FIFE's tallgrass for green leaves; give leaf_optics="),
+        (GREEN_LEAF, r"tallgrass for soil and litter; give background=\{'soil_dry': 1.0\}"),
+        (GREEN_LEAF | DRY_SOIL | {"brown": 0.2}, "tallgrass for dead leaves; give brown_leaf="),
+    ],
+)
+def test_assumed_tallgrass_on_a_user_map_is_a_warning(given, message):
+    lai = own_map()
+    for function in (
+        lambda: lai.fifesim.surface_reflectance("TM", **KNOWN, canopy=fifesim.Canopy(**given)),
+        lambda: fifesim.compare(lai, ["TM"], fifesim.Setup(**KNOWN, canopy=fifesim.Canopy(**given))),
+    ):
+        with pytest.warns(UserWarning, match=message) as said:
+            function()
+        assert len([each for each in said if "vegetation" in str(each.message)]) == 1
+        assert {each.filename for each in said if each.category is UserWarning} == {__file__}
+
+
+def test_given_canopy_is_no_warning():
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        canopy = fifesim.Canopy(**GREEN_LEAF, **DRY_SOIL)
+        own_map().fifesim.surface_reflectance("TM", **KNOWN, canopy=canopy)
+        dead = canopy.replace(brown=0.2, brown_leaf=fifesim.Leaf(chlorophyll=0, brown=1))
+        own_map().fifesim.surface_reflectance("TM", **KNOWN, canopy=dead)
+        fifesim.lai_scene(SITE, seed=7).fifesim.surface_reflectance("TM")
+        of_fife = fifesim.landscape(SITE, cover="pastures", seed=7).fifesim.surface_reflectance("TM")
+    assert of_fife.notnull().all()
+
+
+def test_classes_with_leaves_need_optics():
+    """Water needs no leaves, and arguments of the call fill the gaps of a class."""
+    water = fifesim.CoverClass(lai=0, canopy=fifesim.Canopy(background=0.03))
+    forest = fifesim.CoverClass(lai=4.0, canopy=fifesim.Canopy(leaf_optics=fifesim.Leaf(chlorophyll=50)))
+    patches = fifesim.ground.Patches("voronoi", 100)
+    land = fifesim.landscape(ELSEWHERE, cover=patches, classes={"water": water, "forest": forest}, seed=7)
+    with pytest.warns(
+        UserWarning, match="vegetation of lai is unknown: using FIFE's tallgrass for soil and litter; give background"
+    ):
+        land.fifesim.surface_reflectance("TM", **KNOWN)
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        land.fifesim.surface_reflectance("TM", **KNOWN, canopy=fifesim.Canopy(background=0.1))
