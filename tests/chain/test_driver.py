@@ -16,61 +16,6 @@ from fifesim.grids import grid as grids
 from fifesim.grids.windows import origin_of
 from fifesim.ground.terrain.labels import light_on_slopes
 
-# ------------------------------------------------------------------------------------------ Setup
-
-# Every field of ground, atmosphere and sampling differs from its default, as arguments of the public functions.
-GROUND = {
-    "bands": ("TM3", "TM4"),
-    "atmosphere": fifesim.Atmosphere(visibility=23),
-    "geometry": fifesim.Geometry(40.0, 100.0, 5.0, 10.0),
-    "canopy": fifesim.Canopy(hotspot=0.2, brown=0.3, soil=0.03),
-    "upwelling": False,
-}
-SENSOR = {
-    "interval": (20.0, 25.0),
-    "offset": (0.2, -0.1),
-    "min_valid": 0.9,
-    "noise": ("thermal",),
-    "noise_models": fifesim.NoiseModel(thermal=2.0, shot=0.0),
-    "seed": 5,
-    "quantise": False,
-}
-
-
-def test_all_fields_reach_their_steps(lai, site):
-    dem = fifesim.flint_hills(site.pad(1), seed=7)
-    horizon = fifesim.horizon(fifesim.flint_hills(site.pad(40), seed=7))
-    air = {"adjacency": True, "surroundings": 0.3}
-    sky = fifesim.cloud_field(site, 0.8, seed=2, length=300, height=100, margin=500)
-    setup = fifesim.Setup(instrument="TM", dem=dem, horizon=horizon, clouds=sky, **GROUND, **air, **SENSOR)
-    rho = fifesim.surface_reflectance(lai, "TM", dem=dem, horizon=horizon, **GROUND)
-    xr.testing.assert_identical(reflectance_of(setup, lai), rho)
-    cells = fifesim.atmosphere.cast_clouds(rho, sky, dem=dem)
-    assert cells.cloud.any()
-    image = fifesim.sense(fifesim.to_toa(rho, **air, clouds=cells), "TM", **SENSOR)
-    xr.testing.assert_identical(image_of(setup, rho), image)
-    told = {"instrument", "dem", "horizon", "clouds", *GROUND, *air, *SENSOR}
-    upright = replace(setup, slopes="upright", canopy=fifesim.Canopy(hotspot=0.2))
-    own = GROUND | {"canopy": upright.canopy, "slopes": "upright"}
-    expected = fifesim.surface_reflectance(lai, "TM", dem=dem, horizon=horizon, **own)
-    xr.testing.assert_identical(reflectance_of(upright, lai), expected)
-    # Coupling has separate tests.
-    assert {field.name for field in fields(fifesim.Setup)} - told == {"onto", "slopes", "coupling"}
-
-
-def test_pixels_can_be_on_a_given_grid(lai, site, whole):
-    pixels = fifesim.grid_at(site.crs, site.affine.c + 7.0, site.affine.f - 11.0, 90, 60, 30)
-    setup = fifesim.Setup(bands=("TM3", "TM4"), onto=pixels)
-    xr.testing.assert_identical(image_of(setup, whole["rho"]), whole["toa"].fifesim.sense("TM", onto=pixels))
-
-
-def test_defaults_equal_the_defaults_of_the_functions(lai, whole):
-    setup = fifesim.Setup(bands=("TM3", "TM4"))
-    xr.testing.assert_identical(image_of(setup, reflectance_of(setup, lai)), whole["image"])
-
-
-# ------------------------------------------------------------------------------------------ plain arrays
-
 GRID = fifesim.fife_site(10.0, ((300, 348), (200, 254)))
 LAI = fifesim.lai_scene(GRID, arp=0.2, seed=3)
 
@@ -155,6 +100,27 @@ FIELDS = {
 }
 
 
+def by_functions(setup):
+    """Image by the public functions, with the fields of a setup as arguments."""
+
+    def given(names):
+        return {name: getattr(setup, name) for name in names.split()}
+
+    ground = given("instrument bands atmosphere geometry canopy dem horizon upwelling slopes")
+    rho = fifesim.surface_reflectance(LAI, streams=setup.coupling == "four-stream", **ground)
+    clouds = setup.clouds
+    if clouds is not None:
+        clouds = fifesim.atmosphere.cast_clouds(rho, clouds, dem=setup.dem)
+    toa = fifesim.to_toa(rho, clouds=clouds, **given("coupling adjacency surroundings"))
+    pixels = given("instrument onto interval offset min_valid noise noise_models seed quantise")
+    return fifesim.sense(toa, **pixels)
+
+
+def test_defaults_equal_the_defaults_of_the_functions(lai, whole):
+    setup = fifesim.Setup(bands=("TM3", "TM4"))
+    xr.testing.assert_identical(image_of(setup, reflectance_of(setup, lai)), whole["image"])
+
+
 @pytest.mark.parametrize("name", [each.name for each in fields(fifesim.Setup)])
 def test_each_field_changes_the_image_and_arrays_support_or_refuse_it(setup, name):
     value, others = FIELDS[name]
@@ -162,6 +128,7 @@ def test_each_field_changes_the_image_and_arrays_support_or_refuse_it(setup, nam
     changed = replace(base, **{name: value})
     before, expected = (image_of(each, reflectance_of(each, LAI), LAI) for each in (base, changed))
     assert before.dtype != expected.dtype or not np.array_equal(before, expected, equal_nan=True)
+    xr.testing.assert_identical(expected, by_functions(changed))
     # Elevation is not a field of the setup of a driver but an argument of its steps.
     level, dem = replace(changed, dem=None, horizon=None), changed.dem
     if varying_parts(level):
