@@ -1,0 +1,386 @@
+"""
+Any file opens as a raster or is rejected in one line, and edited files open with the right values or are rejected.
+
+To draw a thousand files: ``FIFESIM_DRAWS=1000 pytest tests/properties/test_drawn_files.py``
+"""
+
+import json
+import os
+import tempfile
+import warnings
+from collections import Counter
+from copy import deepcopy
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+import rasterio.shutil
+import rasterio.warp
+import rioxarray
+import xarray as xr
+from affine import Affine
+from edits import Copy
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import fifesim
+from fifesim.grids.grid import place
+from fifesim.grids.opening import errors_of_gdal
+
+DRAWS = os.environ.get("FIFESIM_DRAWS")
+WEST, NORTH = 708000.0, 4332000.0
+GRID = fifesim.grid_at("EPSG:26914", WEST, NORTH, 900.0, 720.0, 30.0)
+
+# ------------------------------------------------------------------------------------------ any file
+
+NUMBERS = st.sampled_from([0.0, 1.0, -1.0, 0.5, 1e-300, 1e300, float("nan"), float("inf"), -9999.0, 1e-9, 300.0])
+COORDINATE = {"dims": ["band"], "values": ["a", "b"], "dtype": "<U500000000", "attrs": None}
+TAGS = [
+    *("1", "[1]", "null", "{}", "", "[" * 100_000, "NaN", "x" * 1_100_000, '"\x1b[2J"', '{"name": [1], "dims": "yx"}'),
+    *('{"dims": ["z", "y", "x"], "attrs": {"a": {"b": []}}}', json.dumps({"coords": {"gain": COORDINATE}})),
+]
+PLACED = Affine(30, 0, WEST - 50, 0, -30, NORTH + 50)
+TURNED = [PLACED @ Affine.rotation(angle) for angle in (90, 180, 30, 1e-4)]
+
+# ORDINARY is the normal raster, and DRAWN the values that replace up to four of its keys.
+ORDINARY = {
+    "driver": "GTiff", "dtype": "float32", "shape": (40, 40), "count": 1, "crs": "EPSG:26914", "transform": PLACED,
+    "nodata": None, "scaling": (1.0, 0.0), "tag": None, "unit": None,
+}  # fmt: skip
+DRAWN = {
+    "driver": st.sampled_from(["COG", "COG", "PNG", "HFA", "ENVI", "AAIGrid", "VRT", "JPEG"]),
+    "dtype": st.sampled_from(["uint8", "int8", "uint16", "int16", "int32", "float64", "complex128", "complex_int16"]),
+    "shape": st.tuples(st.integers(1, 40), st.integers(1, 40)),
+    "count": st.sampled_from([2, 3, 7]),
+    "crs": st.sampled_from(
+        [*("EPSG:32614", "EPSG:26714", "EPSG:4326", "EPSG:26914+5703", "EPSG:4979", "EPSG:4978", "EPSG:3031")]
+        + ["EPSG:2225", "EPSG:5703", None, 'LOCAL_CS["bench",UNIT["metre",1]]', "+proj=geos +h=35785831 +units=m"]
+    ),
+    "transform": st.sampled_from([5.0, 0.5, 3.3, 1e-4, 1e-12]).map(lambda cell: PLACED @ Affine.scale(cell / 30))
+    | st.sampled_from([*TURNED, Affine(1e-4, 0, -96.6, 0, -1e-4, 39.12), Affine.identity(), Affine.scale(1, -1)])
+    | st.lists(NUMBERS | st.sampled_from([WEST, NORTH]), min_size=6, max_size=6).map(lambda six: Affine(*six)),
+    "nodata": NUMBERS,
+    "scaling": st.tuples(NUMBERS, NUMBERS),
+    "tag": st.sampled_from(TAGS),
+    "unit": st.sampled_from(["m", "ft", "\x1b[2J", "W m-2 sr-1 um-1", "u" * 3000]),
+}
+# Bytes to flip, and the share of the file that is left.
+FLIPS = st.lists(st.tuples(st.floats(0, 1) | st.floats(0, 0.1), st.integers(1, 255)), min_size=1, max_size=5)
+DAMAGE = st.just(([], 1.0)) | st.just(([], 1.0)) | st.tuples(FLIPS, st.sampled_from([1.0, 1.0, 0.99, 0.9, 0.5, 0.0]))
+DOORS = {
+    "image": lambda path: fifesim.open_image(path),
+    "lazy image": lambda path: fifesim.open_image(path, chunks={"y": 7}),
+    "lai": lambda path: fifesim.open_lai(path, GRID),
+    "lazy lai": lambda path: fifesim.open_lai(path, GRID, chunks=9),
+    "dem": lambda path: fifesim.fine_dem(path, GRID, fill=60),
+}
+
+
+def write(path, *, driver, dtype, shape, count, crs, transform, nodata, scaling, tag, unit):
+    """Write a file and return its path."""
+    profile = {"driver": "GTiff", "dtype": dtype, "height": shape[0], "width": shape[1], "count": count}
+    with rasterio.open(path, "w", **profile, nodata=nodata) as sink:
+        sink.crs, sink.transform = crs, transform
+        cells = np.random.default_rng(0).integers(0, 9, (count, *shape))
+        sink.write(cells.astype("complex64" if dtype.startswith("complex") else dtype))
+        sink.scales, sink.offsets, sink.units = [scaling[0]] * count, [scaling[1]] * count, [unit] * count
+        if tag is not None:
+            sink.update_tags(FIFESIM=tag)
+    if driver != "GTiff":
+        rasterio.shutil.copy(path, f"{path}.other", driver=driver)
+        return Path(f"{path}.other")
+    return Path(path)
+
+
+def check_opened(door, path):
+    """Whether a file opens as a raster by a door; otherwise, check the message."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        warnings.simplefilter("ignore", PendingDeprecationWarning)
+        try:
+            found = DOORS[door](path).compute()
+        except (ValueError, OSError) as error:
+            assert type(error) in (ValueError, OSError), f"{type(error)}: {error}"
+            assert 0 < len(str(error)) <= 500 and str(error).isprintable(), str(error)
+            return False
+        finally:
+            # Several blocks can give the same warning; by default, Python shows it once.
+            assert len({str(each.message) for each in caught}) <= 2, [str(each.message) for each in caught]
+    assert {"y", "x"} <= set(found.dims) and found.size and found.dtype.kind in "iuf"
+    if "image" not in door:
+        assert found.dtype == float and found.shape == tuple(GRID.shape) and not np.isinf(found).any()
+    return True
+
+
+def test_drawn_rasters_open_or_are_rejected_in_one_line():
+    opened = set()
+
+    @settings(max_examples=int(DRAWS or 80))
+    @given(st.data(), st.sets(st.sampled_from(sorted(DRAWN)), max_size=4), DAMAGE, st.sampled_from(sorted(DOORS)))
+    def draw(data, keys, damage, door):
+        raster = ORDINARY | {key: data.draw(DRAWN[key]) for key in sorted(keys)}
+        with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                with errors_of_gdal("cannot draw"):
+                    path = write(f"{folder}/drawn.tif", **raster)
+            except (OSError, ValueError, OverflowError, TypeError, SystemError):
+                # Some drawn files cannot be written; test the partial file.
+                path = Path(f"{folder}/drawn.tif")
+                path.touch()
+            content, (flips, share) = bytearray(path.read_bytes()), damage
+            for at, value in flips if content else ():
+                content[int(at * (len(content) - 1))] ^= value
+            path.write_bytes(content[: int(share * len(content))])
+            opened.add(check_opened(door, path))
+
+    draw()
+    assert opened == {True, False}
+
+
+# ------------------------------------------------------------------------------------------ edited files
+
+
+def cells(seed, bands, low, high):
+    """Bands of similar values, so that swapped bands look plausible."""
+    return np.random.default_rng(seed).uniform(low, high, (bands, *GRID.shape))
+
+
+def digital_numbers(instrument, names, dtype, largest, **scale):
+    values = np.rint(cells(1, len(names), 1, largest)).astype(dtype)
+    values[:, :2, 3:9] = 0
+    dn = place(xr.DataArray(values, dims=("band", "y", "x"), coords={"band": names}), GRID)
+    return fifesim.calibrate(dn, instrument, geometry=fifesim.Geometry(sza=30.0, saa=120.0), **scale)
+
+
+def variables():
+    lai, fpar, moisture = (
+        place(xr.DataArray(each, dims=("y", "x"), attrs={"units": "1"}), GRID) for each in cells(2, 3, 0.1, 0.9)
+    )
+    lai[4:6, 7:12] = np.nan
+    return xr.Dataset({"lai": lai, "fpar": fpar, "moisture": moisture})
+
+
+KINDS = {
+    "TM": lambda: digital_numbers("TM", ["TM2", "TM3", "TM4"], np.uint8, 255),
+    "MSI": lambda: digital_numbers(
+        "MSI", ["MSI3", "MSI4", "MSI8"], np.uint16, 4000, gain=[0.05, 0.041, 0.028], offset=[-49.5, -41.0, -28.3]
+    ),
+    "truth": variables,
+    "reflectance": lambda: digital_numbers("TM", ["TM1", "TM3", "TM4"], np.uint8, 90).fifesim.to_reflectance(),
+    "lai": lambda: variables()["lai"],
+}
+
+
+@cache
+def written(kind):
+    """Copy of a file of one kind, with the physical values and the wavelengths of its bands by name."""
+    raster = KINDS[kind]()
+    with tempfile.TemporaryDirectory() as folder:
+        path = raster.fifesim.to_geotiff(Path(folder) / "written.tif")
+        copy, opened = Copy(path), fifesim.open_image(path)
+    physical = fifesim.sensor.to_radiance(raster) if "gain" in opened.coords else opened
+    centres = opened["wavelength"].values if "wavelength" in opened.coords else []
+    wavelengths = dict(zip(copy.descriptions, centres, strict=False))
+    return copy, np.atleast_3d(physical.values.astype(float)).reshape(copy.values.shape), wavelengths
+
+
+class Edited:
+    """An edited copy of a file, with the true names and values of its bands."""
+
+    def __init__(self, kind):
+        self.copy, self.physical, self.wavelengths = deepcopy(written(kind))
+        self.names = list(self.copy.descriptions)
+        self.counted = kind in ("TM", "MSI")
+        # Whether a scale that the file can have converts the stored values to the physical values.
+        self.sound = True
+
+    def rename(self, bands):
+        self.names, self.physical = [self.names[band] for band in bands], self.physical[bands]
+
+    def resample(self, crs, transform, shape):
+        """Resample to another grid by nearest neighbour."""
+        copy, nodata = self.copy, self.copy.nodata
+        missing = nodata if nodata is not None else np.nan if copy.values.dtype.kind == "f" else 0
+        how = {"src_crs": copy.crs, "src_transform": copy.transform, "dst_crs": crs, "dst_transform": transform}
+        found = []
+        for values, fill in ((copy.values, missing), (self.physical, np.nan)):
+            out = np.full((len(values), *shape), fill, values.dtype)
+            found.append(rasterio.warp.reproject(values, out, src_nodata=fill, dst_nodata=fill, **how)[0])
+        (copy.values, self.physical), copy.crs, copy.transform = found, crs, transform
+
+
+def select(edited, number):
+    bands = [[2, 1, 0], [1, 2, 0], [1, 0, 2], [0, 2, 1], [0], [1], [0, 1], [1, 0], [2], [2, 0]][number % 10]
+    bands = [band for band in bands if band < len(edited.names)] or [0]
+    edited.copy.select(bands)
+    edited.rename(bands)
+
+
+def reorder_values(edited, number):
+    """Reorder values only: rioxarray keeps the old descriptions and scales, and drops units."""
+    bands = list(range(len(edited.names)))[::-1]
+    edited.copy.values = edited.copy.values[bands]
+    edited.copy.units = [None] * len(bands)
+    edited.rename(bands)
+
+
+def crop(edited, number):
+    _, height, width = edited.copy.values.shape
+    top, left = number % max(1, height // 3), number % max(1, width // 4)
+    rows, columns = slice(top, top + 6 + number % 5), slice(left, left + 8)
+    edited.copy.crop(rows, columns)
+    edited.physical = edited.physical[:, rows, columns]
+
+
+def rescale(edited, number):
+    """Rescale like ``gdal_translate -scale``, which keeps scales and drops units."""
+    edited.copy.values = edited.copy.values.astype(float) * [1 / 255, 100 / 255, 2.0, 0.5, 1000.0][number % 5]
+    edited.copy.convert([np.float32, np.uint8, np.uint16][number % 3])
+    edited.copy.units = [None] * len(edited.names)
+    edited.sound = False
+
+
+def widen(edited, number):
+    dtypes = [np.uint16, np.int32, np.float32, np.float64] if edited.copy.values.dtype.kind in "iu" else [np.float64]
+    edited.copy.convert(dtypes[number % len(dtypes)])
+
+
+def reproject(edited, number):
+    copy, crs = edited.copy, rasterio.crs.CRS.from_epsg(32615)
+    _, height, width = copy.values.shape
+    bounds = rasterio.transform.array_bounds(height, width, copy.transform)
+    transform, width, height = rasterio.warp.calculate_default_transform(copy.crs, crs, width, height, *bounds)
+    edited.resample(crs, transform, (height, width))
+
+
+def shift(edited, number):
+    copy = edited.copy
+    transform = copy.transform @ copy.transform.translation(0.25 + number % 3 / 4, 0.4)
+    edited.resample(copy.crs, transform, copy.values.shape[1:])
+
+
+def other_nodata(edited, number):
+    copy = edited.copy
+    copy.nodata = 200 if copy.values.dtype == np.uint8 else 999
+    edited.physical[copy.values == copy.nodata] = np.nan
+
+
+def arithmetic(edited, number):
+    values = edited.copy.values
+    changed = [values * 0.5, values + 1.0, values * -1.0, values // 2][number % 4]
+    edited.copy.values = changed if number % 3 else changed.astype(values.dtype)
+    edited.sound = False
+
+
+def drop(edited, number):
+    """Drop the tag, the descriptions, or scales and units."""
+    copy, count = edited.copy, len(edited.names)
+    if number % 3 == 0:
+        copy.tags.pop("FIFESIM", None)
+    elif number % 3 == 1:
+        copy.descriptions = [None] * count
+    else:
+        copy.scales, copy.offsets, copy.units = [1.0] * count, [0.0] * count, [None] * count
+
+
+HARMLESS = [select, crop, widen, reproject, shift]
+OTHERS = [reorder_values, rescale, other_nodata, arithmetic, drop]
+EDIT = st.tuples(st.sampled_from(HARMLESS + OTHERS), st.integers(0, 59))
+
+
+def leave_evidence(drawn):
+    """Whether the edits leave metadata that can contradict descriptions and values."""
+    edits, untagged = {edit for edit, _ in drawn}, (drop in dict(drawn) and dict(drawn)[drop] % 3 == 0)
+    resampled = bool(edits & {reproject, shift})
+    return not (
+        (untagged and edits & {reorder_values, other_nodata, arithmetic}) or (arithmetic in edits and resampled)
+    )
+
+
+EDITS = st.lists(EDIT, min_size=1, max_size=3, unique_by=lambda drawn: drawn[0]).filter(leave_evidence)
+
+
+def check_values(found, edited, tagged):
+    """Check names, wavelengths and physical values of an opened file."""
+    found = found if "band" in found.dims else found.expand_dims(band=[found.name])
+    names = found["band"].values.tolist()
+    nameless = not tagged and names == [f"band{number}" for number in range(1, len(names) + 1)]
+    assert nameless or names == edited.names
+    if "wavelength" in found.coords:
+        expected = [edited.wavelengths[name] for name in edited.names]
+        np.testing.assert_allclose(found["wavelength"], expected, rtol=1e-8)
+    calibrated = "gain" in found.coords
+    radiance = fifesim.sensor.to_radiance(found) if calibrated else found
+    units = found.attrs.get("units")
+    claimed = calibrated or (units == "W m-2 sr-1 um-1" if edited.counted else tagged or units is not None)
+    if not claimed:
+        assert not tagged
+        return "plain"
+    # Values may become missing, which is not a wrong number.
+    assert edited.sound or np.isnan(radiance).all(), "values that stand for nothing were read as physical ones"
+    np.testing.assert_allclose(radiance, edited.physical if edited.sound else np.nan, rtol=3e-7, atol=1e-9)
+    return "right"
+
+
+def outcome(kind, edits):
+    """Outcome for an edited file: ``right``, ``plain`` without a claim, or ``refused``."""
+    edited = Edited(kind)
+    for edit, number in edits:
+        edit(edited, number)
+    with tempfile.TemporaryDirectory() as folder:
+        path = edited.copy.write(Path(folder) / "edited.tif")
+        chunks = {"y": 7, "x": 11} if edits[0][1] % 2 else None
+        try:
+            found = fifesim.open_image(path, chunks=chunks).compute()
+        except ValueError as error:
+            assert "edited.tif" in str(error), error
+            return "refused"
+    return check_values(found, edited, "FIFESIM" in edited.copy.tags)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_edited_files_open_correctly_or_are_rejected():
+    outcomes, kept = Counter(), Counter()
+
+    @settings(max_examples=int(DRAWS or 150), derandomize=True, suppress_health_check=list(HealthCheck))
+    @given(kind=st.sampled_from(sorted(KINDS)), edits=EDITS)
+    def draw(kind, edits):
+        came = outcome(kind, edits)
+        outcomes[came] += 1
+        names = {edit for edit, _ in edits}
+        # GDAL drops the units when cropping, and resampled cells are recognised by units only.
+        if names <= set(HARMLESS) and not (crop in names and names & {reproject, shift}):
+            kept[came] += 1
+            assert came == "right", "an ordinary edit was refused"
+
+    draw()
+    assert outcomes.total() >= 100
+    assert outcomes["right"] > outcomes.total() / 4 and outcomes["refused"] > outcomes.total() / 8
+    assert kept["right"] > outcomes.total() / 8
+
+
+@pytest.mark.parametrize("masked", [True, False], ids=["masked", "stored"])
+@pytest.mark.parametrize("change", ["none", "crop", "reorder", "half"])
+@pytest.mark.parametrize("kind", ["TM", "truth"])
+@pytest.mark.filterwarnings("ignore")
+def test_files_written_by_rioxarray_open_correctly_or_are_rejected(tmp_path, kind, change, masked):
+    """rioxarray writes descriptions and scales of other bands than the values, and unscales silently."""
+    edited = Edited(kind)
+    opened = rioxarray.open_rasterio(edited.copy.write(tmp_path / "written.tif"), mask_and_scale=masked)
+    changed = {
+        "none": opened,
+        "crop": opened.isel(x=slice(3, 17), y=slice(2, 20)),
+        "reorder": opened.isel(band=[2, 1, 0]),
+        "half": opened * 0.5,
+    }[change]
+    path = tmp_path / "edited.tif"
+    changed.rio.to_raster(path)
+    if change in ("none", "crop") and (kind == "truth" or not masked):
+        edited.physical = edited.physical[:, 2:20, 3:17] if change == "crop" else edited.physical
+        assert check_values(fifesim.open_image(path), edited, True) == "right"
+    else:
+        with pytest.raises(ValueError, match=r"edited\.tif"):
+            fifesim.open_image(path)
