@@ -53,19 +53,10 @@ def test_all_images_are_computed_in_one_pass(lai):
         xr.testing.assert_identical(array, fifesim.compare(lai, [name])[name]["dn"])
 
 
-def test_bands_and_options_reach_the_instruments(lai):
-    leaf = {"TM2": (0.16, 0.12), "TM5": (0.28, 0.31)} | dict.fromkeys(("OLI4", "OLI5"), (0.3, 0.3))
-    canopy = fifesim.Canopy(background=0.2, leaf_optics=leaf)
-    setup = fifesim.Setup(interval=(20.0, 25.0), quantise=False, canopy=canopy)
-    images = fifesim.compare(lai, ["TM", "OLI"], setup, bands={"TM": ["TM2", "TM5"]})
-    assert images["TM"]["toa_radiance"]["band"].values.tolist() == ["TM2", "TM5"]
-    for name in ("TM", "OLI"):
-        assert grids.cell_size(grids.geobox(images[name]["toa_radiance"])) == (20.0, 25.0)
-
-
 def test_resolutions_are_separate_nodes_and_rows(lai):
     """NDVI is missing without a red and a near infrared band."""
-    images = fifesim.compare(lai, ["MSI", "TM"], bands={"MSI": ["MSI4", "MSI11"]})
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        images = fifesim.compare(lai, ["MSI", "TM"], bands={"MSI": ["MSI4", "MSI11"]})
     assert sorted(node.path for node in images.leaves) == ["/MSI/10m", "/MSI/20m", "/TM"]
     assert images["MSI/20m/dn"]["band"].values.tolist() == ["MSI11"]
     table = images.fifesim.comparison_table()
@@ -85,20 +76,6 @@ def test_table_has_one_row_per_instrument(lai):
     fit = fifesim.regress(lai.fifesim.aggregate(30), ndvi)
     found = table.loc["TM", ["slope", "intercept", "r2", "n"]]
     np.testing.assert_allclose(found.astype(float), [fit.slope, fit.intercept, fit.r2, fit.n], rtol=1e-10)
-
-
-def test_origins_of_blur_are_stated_and_different_origins_are_a_warning(lai):
-    """Blur is measured, assumed, and unknown (only the detector is known)."""
-    grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
-    with pytest.warns(UserWarning, match=r"blur in-flight \(MSI\), assumed \(OLI\), unknown \(SuperDove\)") as caught:
-        images = fifesim.compare(fifesim.lai_scene(grid, seed=7), ["MSI", "OLI", "SuperDove"])
-    assert not any("noise" in str(each.message) for each in caught)
-    table = fifesim.sensor.comparison_table(images)
-    assert table["blur"].to_dict() == {"MSI": "in-flight ± 0.03", "OLI": "assumed ± 0.06", "SuperDove": "–"}
-    assert table["geolocation"].to_dict() == {"MSI": "in-flight ± 1 m", "OLI": "in-flight ± 4 m", "SuperDove": "–"}
-    assert table.loc["OLI", "noise"] == "pre-launch within a factor of 1.05" and table.loc["SuperDove", "noise"] == "–"
-    with warnings.catch_warnings(action="error", category=UserWarning):
-        fifesim.compare(lai, ["MSI", "MSI-C", "TM"])
 
 
 # ------------------------------------------------------------------------------------------ engines
