@@ -74,9 +74,3 @@ def test_functions_are_methods_of_rasters_and_their_stub_names_their_module():
             kind = re.match(r"xarray\.(\w+)", first[1]) if first is not None else None
         assert (kind is not None) == bool(found.methods_of), name
         assert kind is None or kind[1] in found.methods_of, name
-
-
-def test_repr_lists_the_methods(lai):
-    said = repr(lai.fifesim)
-    assert {*METHODS} <= {*said.replace(",", " ").split()} and "comparison_table" not in said
-    assert max(map(len, said.splitlines())) <= 100
