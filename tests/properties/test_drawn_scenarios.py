@@ -151,9 +151,8 @@ ANYTHING = st.sampled_from([datetime(1987, 6, 6, 16, 35), {"a": [1]}, ["a", math
 
 def limits(field):
     """Ends of the valid range of a key."""
-    return [
-        float(getattr(each, end)) for each in field.metadata for end in ("ge", "gt", "le", "lt") if hasattr(each, end)
-    ]
+    ends = ("ge", "gt", "le", "lt")
+    return [float(getattr(each, end)) for each in field.metadata for end in ends if hasattr(each, end)]
 
 
 def numbers(field):
@@ -203,21 +202,13 @@ def scenarios(draw):
         # The grid is the whole site or the extent of a map.
         del found["grid"]
         found["ground"] = {"lai_file": "lai.tif"} if draw(st.booleans()) else {}
-    classes = [("classes", "grass"), ("classes", "wood")]
-    places = st.sampled_from([*((name,) for name in Keys.model_fields if name != "classes"), *classes])
+    sections = st.sampled_from([name for name in Keys.model_fields if name != "classes"])
     wild = draw(st.integers(0, 2)) == 0
     for _ in range(draw(st.integers(1, 3))):
-        place = draw(places)
-        fields = Keys.section(place).model_fields
-        key = draw(st.sampled_from(list(fields)))
-        value = of_type(fields[key].annotation, fields[key])
-        table = found
-        for name in place:
-            table = table.setdefault(name, {})
-        table[key] = draw(value | odd(fields[key]) if wild else value)
-        if place in classes and draw(st.integers(0, 3)):
-            cover = draw(st.sampled_from(["voronoi", "levels", "pastures"]))
-            found.setdefault("landscape", {}).setdefault("cover", cover)
+        name = draw(sections)
+        key, field = draw(st.sampled_from(list(Keys.section((name,)).model_fields.items())))
+        value = of_type(field.annotation, field)
+        found.setdefault(name, {})[key] = draw(value | odd(field) if wild else value)
     if wild and draw(st.integers(0, 3)) == 0:
         unknown = draw(st.text() | st.just("k" * 5000))
         draw(st.sampled_from([found, found["terrain"]]))[unknown] = draw(ANYTHING)

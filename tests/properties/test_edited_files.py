@@ -24,6 +24,7 @@ from hypothesis import strategies as st
 import fifesim
 from fifesim.grids.grid import place
 
+COUNT = int(os.environ.get("FIFESIM_DRAWS", 150))
 GRID = fifesim.grid_at("EPSG:26914", 708000.0, 4332000.0, 900.0, 720.0, 30.0)
 
 
@@ -209,11 +210,7 @@ def outcome(kind, edits):
 def test_edited_files_open_correctly_or_are_rejected():
     outcomes, kept = Counter(), Counter()
 
-    @settings(
-        max_examples=int(os.environ.get("FIFESIM_DRAWS", 150)),
-        derandomize=True,
-        suppress_health_check=list(HealthCheck),
-    )
+    @settings(max_examples=COUNT, derandomize=True, suppress_health_check=list(HealthCheck))
     @given(kind=st.sampled_from(sorted(KINDS)), edits=EDITS)
     def draw(kind, edits):
         came = outcome(kind, edits)
