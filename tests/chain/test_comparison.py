@@ -44,7 +44,7 @@ def test_resolutions_are_separate_nodes_and_rows(lai):
     assert sorted(node.path for node in images.leaves) == ["/MSI/10m", "/MSI/20m", "/TM"]
     assert images["MSI/20m/dn"]["band"].values.tolist() == ["MSI11"]
     table = images.fifesim.comparison_table()
-    assert table.index.tolist() == ["MSI/10m", "MSI/20m", "TM"] and "r2" not in table
+    assert table.index.tolist() == ["TM", "MSI/10m", "MSI/20m"] and "r2" not in table
     assert np.isnan(table.loc["MSI/10m", "ndvi_mean"]) and table.loc["MSI/10m", "bands"] == "MSI4"
 
 
