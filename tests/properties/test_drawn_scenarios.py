@@ -2,7 +2,7 @@
 Statements about drawn canopies, chunks and scenario files.
 
 Any scenario file runs or is rejected with a short message. Its keys are drawn from the schema, so that new keys need no
-change here. The suite draws 150 scenarios. To draw more:
+change here. The suite draws 50 scenarios. To draw more:
 
     FIFESIM_DRAWS=10000 pytest tests/properties/test_drawn_scenarios.py
 """
@@ -268,7 +268,7 @@ def few(scenario):
     return cheap and near and math.prod(scenario.geobox().shape) <= 3000
 
 
-@settings(max_examples=int(os.environ.get("FIFESIM_DRAWS", 150)))
+@settings(max_examples=int(os.environ.get("FIFESIM_DRAWS", 50)))
 @given(scenarios())
 def test_drawn_scenario_runs_or_is_rejected_in_a_few_lines(folder, drawn):
     """Digital numbers are within their bits, and LAI and FPAR are physical."""

@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 import fifesim
 from fifesim.grids.grid import place
 
-COUNT = int(os.environ.get("FIFESIM_DRAWS", 150))
+COUNT = int(os.environ.get("FIFESIM_DRAWS", 110))
 GRID = fifesim.grid_at("EPSG:26914", 708000.0, 4332000.0, 900.0, 720.0, 30.0)
 
 
