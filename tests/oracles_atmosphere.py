@@ -35,13 +35,6 @@ class Air(NamedTuple):
     albedo: float
     sky: object  # radiance at the ground, function of sza, vza (n, 1) and raa (m,): pi L / (E0 mu_s)
 
-    def over_lambertian(self, reflectance):
-        return self.path + self.down * self.up * reflectance / (1 - self.albedo * reflectance)
-
-    @property
-    def skylight(self):
-        return 1 - self.direct_down / self.down
-
 
 def sky_directions(air, zenith, flux, *, fine):
     """
