@@ -14,7 +14,8 @@ sys.path.append(str(DOCS.parent / "tests"))
 
 def write():
     """Write the table, with what this build finds."""
-    from verification.areas import AREA_STAGES, deviations
+    from verification.areas import deviations
+    from verification.deviations import AREA_STAGES
 
     # The matrices are small, so threads would mostly wait for each other.
     with threadpool_limits(1, user_api="blas"):

@@ -1,18 +1,70 @@
-"""Slow references for scattering: non-Lambertian ground below an atmosphere, by a sum over the sky."""
+"""Slow references for scattering: numerical Eddington equations, and non-Lambertian ground."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
+from scipy.integrate import quad, solve_bvp
 
 from fifesim.atmosphere import aerosols, engines
 from fifesim.atmosphere.successive_orders import stokes_reflectance
 from fifesim.base.geometry import scattering_angle_cosine
 
+# Siewert (2000), problem IIA: beta, alpha, zeta and gamma of spheres.
+SIEWERT = np.array(
+    [
+        [1, 0, 0, 0],
+        [2.104031, 0, 0, 0],
+        [2.095158, 3.726079, 3.615946, -0.116688],
+        [1.414939, 2.202868, 2.240516, -0.209370],
+        [0.703593, 1.190694, 1.139473, -0.227137],
+        [0.235001, 0.391203, 0.365605, -0.144524],
+        [0.064039, 0.105556, 0.082779, -0.052640],
+        [0.012837, 0.020484, 0.013649, -0.012400],
+        [0.002010, 0.003097, 0.001721, -0.002093],
+        [0.000246, 0.000366, 0.000172, -0.000267],
+        [0.000024, 0.000035, 0.000014, -0.000027],
+        [0.000002, 0.000003, 0.000001, -0.000002],
+    ]
+)
+
 
 def henyey_greenstein(asymmetry, scattering_cosine):
     """Phase function of a given asymmetry, whose mean is 1. [1]"""
     return (1 - asymmetry**2) / (1 + asymmetry**2 - 2 * asymmetry * scattering_cosine) ** 1.5
+
+
+def eddington_intensities(tau, albedo, asymmetry, mu_s):
+    """Mean (J) and net upward (H) diffuse intensity as functions of depth, for solar flux pi and black surface. [1]"""
+
+    def slopes(depth, state):
+        mean, net = state
+        beam = albedo / 4 * np.exp(-depth / mu_s)
+        return np.stack([3 * (1 - albedo * asymmetry) * net + 3 * asymmetry * mu_s * beam, (1 - albedo) * mean - beam])
+
+    def edges(top, bottom):
+        return np.array([top[0] - 2 * top[1], bottom[0] + 2 * bottom[1]])
+
+    depths = np.linspace(0, tau, 41)
+    return solve_bvp(slopes, edges, depths, np.zeros((2, 41)), tol=1e-9).sol
+
+
+def sobolev_reflectance(tau, albedo, asymmetry, phase, mu_s, mu_v):
+    """Integral along the view of the Eddington source function, with exact single scattering. [1]"""
+    field = eddington_intensities(tau, albedo, asymmetry, mu_s)
+
+    def emitted(depth):
+        mean, net = field(depth)
+        once = albedo / 4 * phase * np.exp(-depth / mu_s)
+        return (albedo * mean + 3 * albedo * asymmetry * mu_v * net + once) * np.exp(-depth / mu_v) / mu_v
+
+    return quad(emitted, 0, tau, epsabs=1e-12, epsrel=1e-10)[0] / mu_s
+
+
+def eddington_flux(tau, albedo, asymmetry, mu_s):
+    """Plane albedo and total transmittance from the Eddington fluxes. [1]"""
+    field = eddington_intensities(tau, albedo, asymmetry, mu_s)
+    return 4 * field(0)[1] / mu_s, np.exp(-tau / mu_s) - 4 * field(tau)[1] / mu_s
 
 
 class Ground(NamedTuple):
@@ -34,6 +86,13 @@ class Air(NamedTuple):
     direct_up: float
     albedo: float
     sky: object  # radiance at the ground, function of sza, vza (n, 1) and raa (m,): pi L / (E0 mu_s)
+
+    def over_lambertian(self, reflectance):
+        return self.path + self.down * self.up * reflectance / (1 - self.albedo * reflectance)
+
+    @property
+    def skylight(self):
+        return 1 - self.direct_down / self.down
 
 
 def sky_directions(air, zenith, flux, *, fine):

@@ -8,9 +8,10 @@ import pandas as pd
 from scipy import stats
 
 from fifesim.analysis import regression, scaling, scores
+from fifesim.analysis.indices import normalized_difference
 from fifesim.analysis.regression import fit, row_sums
 from fifesim.base.footprints import Boxcar, axis_operator
-from verification.tables import Deviation, largest
+from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "analysis")
 
@@ -42,6 +43,12 @@ def _regression():
     found = [line.confidence_interval(at), line.prediction_interval(at)]
     expected = [[intercept + slope * at - each, intercept + slope * at + each] for each in half]
     yield _deviation("intervals of a line", largest(found, expected), 1e-10, "1", "covariance of numpy.polyfit")
+
+
+def _indices():
+    nir, red = np.random.default_rng(0).uniform(0.01, 1, (2, 100))
+    worst = largest(normalized_difference(nir, red), np.tanh(np.log(nir / red) / 2))
+    yield _deviation("normalized difference", worst, 1e-12, "1", "tanh(log(nir / red) / 2)")
 
 
 def _increments():
@@ -107,7 +114,16 @@ def _footprint_variance():
 
 
 def _scales():
-    """Check the second-order bias for normal variables whose means are known, and the linearity of NDVI."""
+    """Check derivatives by differences, and the second-order bias for normal variables whose means are known."""
+    red, nir, h = 0.08, 0.3, 1e-4
+    steps = [(a, b) for a in ((h, 0.0), (0.0, h)) for b in ((h, 0.0), (0.0, h))]
+    signs = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
+    differences = [
+        sum(k * normalized_difference(nir + s * a[1] + t * b[1], red + s * a[0] + t * b[0]) for s, t, k in signs)
+        for a, b in steps
+    ]
+    worst = largest(scaling.ndvi_hessian(red, nir).ravel(), np.array(differences) / (4 * h * h))
+    yield _deviation("second derivatives of NDVI", worst, 1e-4, "1", "differences")
     mean, deviation, extinction = 1.2, 0.05, 0.57
     exact = 0.94 * np.exp(-extinction * mean) * -np.expm1((extinction * deviation) ** 2 / 2)
     worst = largest(scaling.beer_bias(mean, deviation**2, extinction, 0.94), exact, relative=True)
@@ -152,4 +168,4 @@ def _causes():
     yield _deviation("a cause by itself, and taken away", worst, 1e-12, "1", "two of eight sets")
 
 
-CHECKS = (_regression, _increments, _lags, _footprint_variance, _scales, _densities, _causes)
+CHECKS = (_regression, _indices, _increments, _lags, _footprint_variance, _scales, _densities, _causes)

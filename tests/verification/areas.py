@@ -1,18 +1,25 @@
 """Every check of the package, area by area."""
 
-from verification import analysis, atmosphere, benchmarks, canopy, landscape, sensor, terrain
+from verification import (
+    analysis,
+    atmosphere,
+    benchmarks,
+    canopy,
+    landscape,
+    scan,
+    scattering,
+    sensor,
+    terrain,
+)
 
 AREAS = {
     "random field": landscape.CHECKS,
-    "canopy": (*canopy.CHECKS, *benchmarks.CANOPY),
+    "canopy": (*canopy.CHECKS, *canopy.FOLIAGE_CHECKS, *benchmarks.CANOPY),
     "terrain": terrain.CHECKS,
-    "atmosphere": (*benchmarks.CHECKS, *atmosphere.CHECKS),
-    "sensor": sensor.CHECKS,
+    "atmosphere": (*scattering.CHECKS, *benchmarks.CHECKS, *scattering.ADJACENCY_CHECKS, *atmosphere.CHECKS),
+    "sensor": (*sensor.CHECKS, *sensor.LINE_SPREAD_CHECKS, *scan.CHECKS),
     "analysis": analysis.CHECKS,
 }
-# Stage of Figure 1 of each area, in processing order.
-AREA_STAGES = dict.fromkeys(("random field", "canopy", "terrain"), "Ground")
-AREA_STAGES |= {"atmosphere": "Atmosphere", "sensor": "Sensor", "analysis": "Analysis"}
 
 
 def deviations():

@@ -10,7 +10,7 @@ from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflec
 from fifesim.base.geometry import scattering_angle_cosine
 from fifesim.ground.canopy.sail_model import sail, with_background
 from verification import tables
-from verification.tables import Deviation, largest
+from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "atmosphere")
 

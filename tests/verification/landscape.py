@@ -7,6 +7,7 @@ from scipy.stats import norm
 
 from fifesim.ground.landscape.autoregression import (
     FIELD_TILE,
+    autocorrelation,
     field_variance,
     periodic_field,
     philox,
@@ -14,11 +15,42 @@ from fifesim.ground.landscape.autoregression import (
     white_noise,
 )
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map, treatments
-from verification.tables import Deviation, largest
+from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "random field")
 
 _ARPS = (0.15, 0.24)
+_SIZE = 1024  # cells on a side: many correlation lengths
+
+
+def _covariances(arp):
+    """Covariances by lag on a torus, by the transform of the spectrum of the process."""
+    wave = np.cos(2 * np.pi * np.fft.fftfreq(512))
+    return np.fft.ifft2((1 - 2 * arp * (wave[:, None] + wave)) ** -2.0).real
+
+
+def _moments():
+    variance = largest([field_variance(arp) / _covariances(arp)[0, 0] for arp in _ARPS], 1)
+    yield _deviation("variance", variance, 1e-12, "1", "integral of the spectrum")
+    lags = np.arange(40)
+    found, expected = [], []
+    for arp in _ARPS:
+        found.append(autocorrelation(arp, lags))
+        expected.append(_covariances(arp)[0, lags] / _covariances(arp)[0, 0])
+    yield _deviation("autocorrelation by lag", largest(found, expected), 1e-12, "1", "transform of the spectrum")
+
+
+def _samples():
+    """Check sample covariances within 4 standard errors, by Bartlett for correlated cells."""
+    for arp in _ARPS:
+        field = streaming_field(20, arp, -_SIZE // 2, 17, (_SIZE, _SIZE))
+        correlations = _covariances(arp) / _covariances(arp)[0, 0]
+        error = np.sqrt(2 * np.sum(correlations**2) / field.size)
+        pairs = [field[:-1] * field[1:], field[:, :-1] * field[:, 1:]]
+        one = [np.mean(product) - correlations[0, 1] for product in pairs]
+        source = f"spectrum, standard error {error:.1g}"
+        yield _deviation(f"variance of a field, arp {arp:g}", abs(np.mean(field**2) - 1), 4 * error, "1", source)
+        yield _deviation(f"correlation at one cell, arp {arp:g}", largest(one, 0), 4 * error, "1", source)
 
 
 def _equation():
@@ -29,6 +61,22 @@ def _equation():
         neighbours = sum(np.roll(field, step, axis) for step in (-1, 1) for axis in (0, 1))
         worst = np.maximum(worst, largest(field - arp * neighbours, noise))
     yield _deviation("a field is its neighbours and noise", worst, 1e-12, "1", "its own equation, cell by cell")
+
+
+def _generator():
+    """Check the generator with the counters and keys of kat_vectors of Random123."""
+    known = {
+        ("00000000 00000000 00000000 00000000", "00000000 00000000"): "6627e8d5 e169c58d bc57ac4c 9b00dbd8",
+        ("ffffffff ffffffff ffffffff ffffffff", "ffffffff ffffffff"): "408f276d 41c83b0e a20bc7c6 6d5451fd",
+        ("243f6a88 85a308d3 13198a2e 03707344", "a4093822 299f31d0"): "d16cfe09 94fdcceb 5001e420 24126ea1",
+    }
+    wrong = [philox(*_words(counter), *_words(key)) != _words(answer) for (counter, key), answer in known.items()]
+    source = "Salmon et al. (2011), known answers"
+    yield _deviation("words of Philox-4x32-10", float(np.sum(wrong)), 0.0, "word", source)
+
+
+def _words(text):
+    return np.array([int(word, 16) for word in text.split()], np.uint64)
 
 
 def _halves(*numbers):
@@ -99,4 +147,4 @@ def _tiles():
     yield _deviation("tiles are their neighbours and noise", worst, 1e-5, "1", "its own equation, cell by cell")
 
 
-CHECKS = (_equation, _white_noise, _tiles, _quantiles)
+CHECKS = (_moments, _samples, _equation, _generator, _white_noise, _tiles, _quantiles)

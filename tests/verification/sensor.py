@@ -1,24 +1,22 @@
-"""Checks of the sensor: images by quadrature, line spreads, calibration, bands, noise and scans."""
+"""Checks of the sensor: images by quadrature, line spreads, calibration, bands and noise."""
 
 from functools import partial
+from itertools import product
 
 import numpy as np
-import pyproj
 import xarray as xr
 from scipy.integrate import quad, trapezoid
 from scipy.signal import butter, freqs
 from scipy.stats import norm
 
-from fifesim.base.bands import Band, solar_irradiance_steps, solar_spectrum
+from fifesim.base.bands import NEAR_INFRARED, RED, Band, nearest_band, solar_irradiance_steps, solar_spectrum
 from fifesim.base.footprints import Boxcar, axis_operator, regularize
-from fifesim.base.geometry import fife_geometry
 from fifesim.grids import grid as grids
 from fifesim.grids.reductions import areas, regularized
-from fifesim.sensor.response import calibration, scan
+from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.response import calibration
 from fifesim.sensor.response.noise import NoiseModel, add_noise, fixed_pattern, line_noise
-from fifesim.sensor.response.scan import Footprints, apply_operator, footprint_operator
 from fifesim.sensor.response.spatial import (
-    AggregatedSpread,
     CosineSpread,
     Diffraction,
     GaussianSpread,
@@ -26,8 +24,7 @@ from fifesim.sensor.response.spatial import (
     SystemSpread,
     TableSpread,
 )
-from fifesim.sensor.scan_labels import scan_geometry, sense_swath
-from verification.tables import Deviation, integral, largest
+from verification.deviations import Deviation, integral, largest
 
 _deviation = partial(Deviation, "sensor")
 
@@ -95,19 +92,90 @@ def _parts():
     yield _deviation("line spread of two Gaussians", worst, 1e-5, "1", "their variances add")
 
 
+def _instruments():
+    """Check angles on the ground, and a measured transfer: 40.8 m is half of the period with a transfer of one half."""
+    tm, measured = instrument("TM", "paper"), instrument("L4TM").line_spread
+    angles = tm.line_spread.width / (9 * 4.778e-6 * 705e3), tm.ground_interval / (43e-6 * 705e3)
+    found = [*angles, measured.mtf(0.5 / 40.8) / 0.5]
+    yield _deviation("TM's line spread on the ground", largest(found, 1), 1e-4, "1", "Schowengerdt et al. (1985)")
+    at_nyquist = GaussianSpread.from_mtf(0.3, 30.0)
+    worst = largest(at_nyquist.mtf(1 / 60), 0.3)
+    yield _deviation("Gaussian of a given transfer", worst, 1e-12, "1", "its definition")
+
+
+LINE_SPREAD_CHECKS = (_shapes, _parts, _instruments)
+
+
 _WIDTH = 9 * 4.778e-6 * 705e3  # of TM's line spread [m]
 _PIXEL = 30.0
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(40)
 
 
-def _weights(cells, cell, pixels, origin):
-    """Weights of cells in pixels, shape (pixels, cells): integrals of the line spread function over the cells."""
-    left = np.arange(cells) * cell - (origin + (np.arange(pixels) + 0.5) * _PIXEL)[:, None]
-    low, high = np.clip([left, left + cell], -_WIDTH / 2, _WIDTH / 2)
+def _integral(low, high, frequency=0.0):
+    """Integral of the normalized line spread function times a cosine, from low to high around the centre [m]."""
+    low, high = np.clip([low, high], -_WIDTH / 2, _WIDTH / 2)
     middle, half = (low + high) / 2, (high - low) / 2
-    density = np.cos(2 * np.pi * (middle[..., None] + half[..., None] * _NODES) / (3 * _WIDTH))
+    x = middle[..., None] + half[..., None] * _NODES
+    density = np.cos(2 * np.pi * x / (3 * _WIDTH)) * np.cos(2 * np.pi * frequency * x)
     area = _WIDTH / 2 * np.sum(_WEIGHTS * np.cos(np.pi * _NODES / 3))
     return half * (density @ _WEIGHTS) / area
+
+
+def _axis(cell, cells, pixels, origin):
+    return axis_operator(
+        CosineSpread(_WIDTH),
+        cell_origin=0.0,
+        cell_size=cell,
+        n_cells=cells,
+        pixel_origin=origin,
+        pixel_size=_PIXEL,
+        n_pixels=pixels,
+    )
+
+
+def _impulse():
+    """Check the image of one bright cell of 30/9 m on pixels with an offset of 7 m."""
+    cell, origin, bright = 30 / 9, 37.123, (31, 26)
+    scene = np.zeros((70, 70))
+    scene[bright] = 1.0
+    axis = _axis(cell, 70, 4, origin)
+    centres = origin + (np.arange(4) + 0.5) * _PIXEL
+    rows, columns = (_integral(place * cell - centres, (place + 1) * cell - centres) for place in bright)
+    found = largest(regularize(scene, axis, axis, min_valid=1.0), np.outer(rows, columns))
+    yield _deviation("image of one bright cell", found, 1e-12, "1", "cosine line spread, quadrature")
+
+
+def _wave():
+    """Check the image of a wave on cells of 5 mm; the two cells at the ends of the support cost 3e-8."""
+    cell, cells = 5e-3, 30_000
+    single = _axis(_WIDTH, 1, 1, (_WIDTH - _PIXEL) / 2)
+    columns = _axis(cell, cells, 2, 37.3)
+    centres = 37.3 + (np.arange(2) + 0.5) * _PIXEL
+    image, transfer = 0.0, 0.0
+    for wavelength in (400.0, 90.0, 45.4, 21.0):
+        k = 2 * np.pi / wavelength
+        scene = np.diff(np.sin(k * np.arange(cells + 1) * cell)) / (k * cell)
+        expected = _integral(np.array(-_WIDTH), np.array(_WIDTH), 1 / wavelength)
+        image = np.maximum(image, largest(regularize(scene[None], single, columns), expected * np.cos(k * centres)))
+        transfer = np.maximum(transfer, largest(CosineSpread(_WIDTH).mtf(1 / wavelength), expected))
+    yield _deviation("image of waves of 21 to 400 m", image, 1e-7, "1", "its Fourier transform, quadrature")
+    yield _deviation("modulation transfer function", transfer, 1e-12, "1", "its Fourier transform, quadrature")
+
+
+def _weights(cells, cell, pixels, origin):
+    """Weights of cells in pixels, shape (pixels, cells)."""
+    left = np.arange(cells) * cell - (origin + (np.arange(pixels) + 0.5) * _PIXEL)[:, None]
+    return _integral(left, left + cell)
+
+
+def _constant():
+    scene = np.full((90, 120), 204.3)
+    rows, columns = (_axis(30 / 9, size, 20, 1.1) for size in scene.shape)
+    scene[::7, ::5] = np.nan
+    image = regularize(scene, rows, columns, min_valid=0.3)
+    seen = image[np.isfinite(image)]
+    worst = largest(seen, 204.3, relative=True) if seen.size else np.nan
+    yield _deviation("constant scene with holes stays constant", worst, 1e-13, "1", "theory")
 
 
 def _holes():
@@ -136,8 +204,24 @@ def _blocks():
     yield _deviation("means over blocks of cells", worst, 1e-12, "1", "numpy")
 
 
+def _counts():
+    """Check quantization with 8 and 12 bits, within half a count."""
+    worst = 0.0
+    for band, bits in product(instrument("TM").bands, (8, 12)):
+        gain, offset = calibration.gain_offset(band.full_scale_radiance, band.min_radiance, bits)
+        radiance = np.linspace(band.min_radiance + gain, band.full_scale_radiance, 1001)
+        counts = calibration.radiance_to_dn(radiance, gain, offset, bits=bits).astype(float)
+        step = (band.full_scale_radiance - band.min_radiance) / (2**bits - 1)
+        worst = np.maximum(worst, largest(counts * step + band.min_radiance, radiance) / step)
+    yield _deviation("counts of TM's radiances", worst, 0.5 + 1e-9, "count", "Friedl et al. (1995), Table 1")
+
+
 def _radiances():
-    """Check that a Lambertian surface reflects as much as it radiates."""
+    """Check the radiance of counts by hand, and that a Lambertian surface reflects as much as it radiates."""
+    gain, offset = calibration.gain_offset(204.3, -1.2, 8)
+    found = calibration.dn_to_radiance([1, 100, 255], gain, offset)
+    worst = largest((found + 1.2) * 255 / 205.5, [1, 100, 255])
+    yield _deviation("radiance of TM3's counts", worst, 1e-12, "count", "Friedl et al. (1995), Table 1")
     reflectance, irradiance, mu_s, distance = 0.3, 1536.0, 0.7, 1.0148
     radiance = calibration.reflectance_to_radiance(reflectance, irradiance, mu_s, distance)
     sent = quad(lambda theta: 2 * np.pi * float(radiance) * np.cos(theta) * np.sin(theta), 0, np.pi / 2)[0]
@@ -171,16 +255,31 @@ def _bands():
     yield _deviation("and of its steps", worst, 1e-9, "1", "ASTM G173, integrated")
 
 
+def _ndvi_bands():
+    """Check that red and near infrared are the bands with these names at the agencies."""
+    expected = {"TM": ("TM3", "TM4"), "OLI": ("OLI4", "OLI5"), "MSI": ("MSI4", "MSI8"), "MODIS": ("MODIS1", "MODIS2")}
+    wrong = nearest_band([0.5, 0.72], RED) is not None
+    for name, pair in expected.items():
+        bands = instrument(name).bands
+        found = [nearest_band([band.wavelength for band in bands], window) for window in (RED, NEAR_INFRARED)]
+        wrong += tuple(bands[number].name for number in found) != pair
+    yield _deviation("red and near infrared of four instruments", wrong, 0, "1", "their makers")
+
+
 def _grey(level, shape, model, kinds, **place):
     """Noisy image of a uniform scene."""
     return add_noise(np.full(shape, level), model, kinds, **({"seed": 5, "band": 2, "row": -7, "column": 3000} | place))
 
 
 def _noise():
-    """Check ratios of a model, and the independence of noise on 120 000 pixels within 4.5 standard errors."""
+    """Check noise on 120 000 pixels within four standard errors; its variance is linear between two ratios."""
     model = NoiseModel.from_snr([50.0, 200.0], [100.0, 250.0])
     kinds, shape = ("shot", "thermal"), (300, 400)
-    noise, one = _grey(80.0, shape, model, kinds) - 80.0, NoiseModel.from_snr(50.0, 100.0, 0.3)
+    noise, thermal = _grey(80.0, shape, model, kinds) - 80.0, _grey(80.0, shape, model, ("thermal",)) - 80.0
+    slope = (0.64 - 0.25) / 150
+    worst = largest([noise.var() / (0.25 + 30 * slope), thermal.var() / (0.25 - 50 * slope)], 1)
+    yield _deviation("noise at a radiance between two", worst, 4 * np.sqrt(2 / noise.size), "1", "variances on a line")
+    one = NoiseModel.from_snr(50.0, 100.0, 0.3)
     found = [*model.snr([50.0, 200.0]), *one.noise_equivalent_radiance([50.0, 12.5]) ** 2]
     worst = largest(found, [100.0, 250.0, 0.25, 0.25 * (0.7 + 0.3 / 4)])
     yield _deviation("noise by published ratios", worst, 1e-12, "1", "shot noise in proportion to light")
@@ -208,142 +307,4 @@ def _detectors():
     yield _deviation("spread of gains and offsets", worst, 4 / np.sqrt(2 * 20_000), "1", "what was asked for")
 
 
-_SPHERE = pyproj.Geod(a=scan.EARTH_RADIUS, b=scan.EARTH_RADIUS)
-_ALTITUDE = 833e3
-_TRACK = scan.Track(39.0, -97.0, 193.0)
-
-
-def _triangle(aside, altitude=_ALTITUDE):
-    """Slant range [m], scan angle and view zenith [degree] by the triangle of ground, sensor and earth centre."""
-    orbit = scan.EARTH_RADIUS + altitude
-    slant = np.sqrt(scan.EARTH_RADIUS**2 + orbit**2 - 2 * scan.EARTH_RADIUS * orbit * np.cos(np.radians(aside)))
-    scan_angle = np.degrees(np.arccos((slant**2 + orbit**2 - scan.EARTH_RADIUS**2) / (2 * slant * orbit)))
-    vza = 180 - np.degrees(np.arccos((slant**2 + scan.EARTH_RADIUS**2 - orbit**2) / (2 * slant * scan.EARTH_RADIUS)))
-    return slant, scan_angle, vza
-
-
-def _places():
-    """Check places on both sides and along the track against geodesics on the sphere."""
-    distance, aside = np.array([-3e5, 4e5, 1e5, -2e5]), np.array([3.0, -8.0, 0.4, 12.0])
-    lon, lat, back = _SPHERE.fwd([_TRACK.longitude] * 4, [_TRACK.latitude] * 4, [_TRACK.heading] * 4, distance)
-    abeam = np.array(back) + 180 + 90 * np.sign(aside)
-    lon, lat, back = _SPHERE.fwd(lon, lat, abeam, scan.EARTH_RADIUS * np.radians(np.abs(aside)))
-    latitude, longitude = scan.place_of(_TRACK, distance, aside)
-    yield _deviation("places beside a track", largest([latitude, longitude], [lat, lon]), 1e-9, "degree", "geodesics")
-    there, angle = scan.place_beside(_TRACK, lat, lon)
-    worst = largest([there / 1e5, angle], [distance / 1e5, aside])
-    yield _deviation("and their way back", worst, 1e-9, "100 km", "geodesics")
-    sine, azimuth = np.sin(np.radians(_triangle(np.abs(aside))[2])), np.radians(back)
-    worst = largest(scan.view_components(_TRACK, lat, lon, _ALTITUDE), [sine * np.sin(azimuth), sine * np.cos(azimuth)])
-    yield _deviation("direction to the sensor", worst, 1e-9, "1", "geodesics and a triangle")
-
-
-def _detector(track_angle, scan_angle, altitude):
-    """Angles at the earth's centre along and across the track by a right spherical triangle. [degree]"""
-    beta, theta = np.radians(track_angle), np.radians(scan_angle)
-    away = np.arccos(np.cos(beta) * np.cos(theta))
-    arc = np.arcsin((1 + altitude / scan.EARTH_RADIUS) * np.sin(away)) - away
-    right, forward = np.cos(beta) * np.sin(theta), np.sin(beta)
-    along = np.arctan(np.tan(arc) * forward / np.sin(away))
-    return np.degrees(along), np.degrees(np.arcsin(np.sin(arc) * right / np.sin(away)))
-
-
-def _sweeps():
-    """Check places of detectors out of the plane of the scan, and sums of samples."""
-    track_angle, scan_angle = np.array([0.4, -0.4, 2.0, -0.1]), np.array([56.0, -44.0, 10.0, 31.0])
-    distance, aside = scan.ground_of_detector(track_angle, scan_angle, _ALTITUDE)
-    found = np.degrees(distance / scan.EARTH_RADIUS), aside
-    worst = largest(found, _detector(track_angle, scan_angle, _ALTITUDE))
-    yield _deviation("places of detectors in a sweep", worst, 1e-9, "degree", "right spherical triangles")
-    x, frequency = np.linspace(-600, 600, 241), np.array([0.0, 1e-3, 2.5e-3])
-    spread, one = AggregatedSpread(Boxcar(128.0), 3, 128.0), Boxcar(384.0)
-    worst = largest([*spread.cumulative(x), *spread.mtf(frequency)], [*one.cumulative(x), *one.mtf(frequency)])
-    yield _deviation("sum of three samples", worst, 1e-12, "1", "one detector of three times the width")
-
-
-def _grid():
-    """Check directions on cells of 10 km on both sides of a track, which are splines."""
-    cells, track = grids.grid_at("EPSG:26914", 680e3, 4.35e6, 40e3, 30e3, 10e3), scan.Track(39.0, -96.7, 193.0)
-    view = scan_geometry("TM", cells, track)
-    lon, lat = pyproj.Transformer.from_crs(26914, 4269, always_xy=True).transform(*np.meshgrid(view["x"], view["y"]))
-    abeam = scan.place_of(track, scan.place_beside(track, lat, lon)[0], 0.0)
-    azimuth, _, distance = _SPHERE.inv(lon, lat, abeam[1], abeam[0])
-    vza = _triangle(np.degrees(distance / scan.EARTH_RADIUS), 705e3)[2]
-    worst = largest([view["vza"], (view["vaa"] - azimuth + 180) % 360 - 180], [vza, 0 * vza])
-    yield _deviation("view angles of a grid", worst, 1e-6, "degree", "geodesics and a triangle")
-
-
-def _footprint(frame, along, across, row=30.3, column=28.7):
-    return Footprints(np.array([row]), np.array([column]), frame[None], along, across)
-
-
-def _turned():
-    """Check the moments of turned and grown Gaussians on cells of 3.33 m, which add a twelfth of their squared size."""
-    place = np.arange(60) + 0.5
-    down, right = np.meshgrid(place - 30.3, place - 28.7, indexing="ij")
-    centre, shape = 0.0, 0.0
-    for turn in np.radians([20.0, 77.0, -35.0]):
-        frame = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]) * 10 / 3 / [[1.25], [1.6]]
-        footprint = _footprint(frame, GaussianSpread(12.0), GaussianSpread(18.0))
-        rows, columns = footprint.window((60, 60))
-        operator = footprint_operator(footprint, rows, columns).toarray()
-        weights = np.zeros((60, 60))
-        weights[rows, columns] = operator.reshape(weights[rows, columns].shape)
-        back = np.linalg.inv(frame)
-        expected = back @ np.diag(np.square([12.0, 18.0]) / (8 * np.log(2))) @ back.T + np.eye(2) / 12
-        moments = np.array([[np.sum(weights * a * b) for b in (down, right)] for a in (down, right)])
-        centre = np.maximum(centre, largest([np.sum(weights * down), np.sum(weights * right)], 0))
-        shape = np.maximum(shape, largest(moments, expected) / expected.max())
-    yield _deviation("centre of a turned footprint", centre, 1e-6, "cell", "symmetry")
-    yield _deviation("second moments of a turned footprint", shape, 1e-5, "1", "those of the response, turned")
-
-
-def _straight():
-    """Check that a quarter turn exchanges rows and columns; response tables have steps of 1/4096."""
-    along, across = CosineSpread(30.32), Boxcar(24.0)
-    operators = [
-        axis_operator(
-            spread,
-            cell_origin=0,
-            cell_size=10 / 3,
-            n_cells=60,
-            pixel_origin=middle * 10 / 3 - 15,
-            pixel_size=30,
-            n_pixels=1,
-        )
-        for spread, middle in ((across, 30.3), (along, 28.7))
-    ]
-    scenes = np.random.default_rng(2).uniform(1, 2, (2, 60, 60))
-    scenes[1, 31, 27] = np.nan
-    expected = [regularize(scene, *operators, min_valid=0.5).item() for scene in scenes]
-    footprint = _footprint(10 / 3 * np.array([[0.0, 1.0], [-1.0, 0.0]]), along, across)
-    operator = footprint_operator(footprint, slice(0, 60), slice(0, 60))
-    found, whole = (apply_operator(operator, scenes.reshape(2, -1), valid)[:, 0] for valid in (0.5, 1.0))
-    worst = largest(found, expected)
-    worst = worst if np.array_equal(whole, [found[0], np.nan], equal_nan=True) else np.inf
-    yield _deviation("pixel of a scan along the grid", worst, 1e-5, "1", "sums by rows and columns")
-
-
-def _plane():
-    """Check a linear ramp of light over cells of 3.33 m, for samples at equal scan angles."""
-    cells = grids.grid_at("EPSG:26914", 705600.0, 4334000.0, 600.0, 500.0, 10 / 3)
-    place = grids.coordinates(cells)
-    light = 40 + 0.02 * (place["x"] - 705900) - 0.03 * (place["y"] - 4333750)
-    toa = grids.place(xr.DataArray(light.transpose("y", "x").data, dims=("y", "x")), cells).assign_coords(band="TM3")
-    toa.attrs["units"] = "W m-2 sr-1 um-1"
-    seen = {"nadir_offset": -36e3, "heading": 193.6, "quantise": False, "min_valid": 1.0, "geometry": fife_geometry()}
-    image = sense_swath(toa, "TM", view_tolerance=180, **seen)
-    expected = 40 + 0.02 * (image["x"] - 705900) - 0.03 * (image["y"] - 4333750)
-    worst = np.abs(image - expected).max() / np.hypot(0.02, 0.03) / (10 / 3)
-    yield _deviation("plane in a scan", float(worst), 0.01, "cell", "the plane at its pixels")
-    # 16 detectors, half of them on either side of the plane of the scan.
-    detector, theta = image["line"].values % 16 - 7.5, np.degrees((image["sample"].values + 0.5) * 43e-6)
-    aside = _detector(np.degrees(detector * 43e-6)[:, None], theta, 705e3)[1]
-    worst = largest(image["vza"].values, _triangle(np.abs(aside), 705e3)[2])
-    yield _deviation("view of its samples", worst, 1e-9, "degree", "Friedl et al. (1995), Table 1")
-
-
-CHECKS = (
-    _shapes, _parts, _holes, _blocks, _radiances, _bands, _noise, _detectors,
-    _places, _sweeps, _grid, _turned, _straight, _plane,
-)  # fmt: skip
+CHECKS = (_impulse, _wave, _constant, _holes, _blocks, _counts, _radiances, _bands, _ndvi_bands, _noise, _detectors)

@@ -11,7 +11,7 @@ from fifesim.base.geometry import Geometry
 from fifesim.ground.terrain import flint_hills, horizon, spline
 from fifesim.ground.terrain import lit_slopes as lights
 from fifesim.ground.terrain import slope as terrain
-from verification.tables import Deviation, largest
+from verification.deviations import Deviation, largest
 
 _deviation = partial(Deviation, "terrain")
 
@@ -107,7 +107,7 @@ def _ways():
 
 
 def _erosion():
-    """Check erosion of a small upland step by step."""
+    """Check erosion of a small upland step by step, and that everything above base level is cut in the long run."""
     rng, size, node = np.random.default_rng(2), 21, 30.0
     start = 300 + 20 * rng.uniform(0.5, 3.0, (size, size))
     rock, liked = rng.uniform(0.02, 0.1, start.shape), rng.uniform(0.8, 1.2, (8, start.size))
@@ -115,6 +115,13 @@ def _erosion():
     found = flint_hills.erode(start, rock, liked, law)
     worst = largest(found, _eroded(start, rock, liked, law))
     yield _deviation("hills step by step", worst, 1e-9, "m", "sparse systems")
+    start, rock = 300 + flint_hills.least_ways(np.ones(start.shape)), 1e4 * rock
+    steady = flint_hills.erode(start, rock, np.ones_like(liked), law._replace(steps=20, creep=0.0))
+    steady[1:-1, 1:-1] -= 40.0 / 20
+    drained = here, there, way = _drainage(steady, np.ones_like(liked), node)
+    fall = (steady.ravel()[here] - steady.ravel()[there]) / way
+    cut = rock.ravel()[here] * _areas(steady, drained, node)[here] ** 0.519 * fall
+    yield _deviation("steady valleys cut what rises", largest(cut / 40, 1), 1e-9, "1", "law of stream power")
 
 
 def _hills():
@@ -127,6 +134,9 @@ def _hills():
     at = np.arange(900) * 2.5
     noise = spline.smooth_noise(1, 5, 5.0, at, at)
     yield _deviation("variance of smooth noise", abs(np.mean(noise**2) - 1), 0.015, "1", "B-spline of degree 11")
+
+
+ELEVATION_CHECKS = (_upsampling, _unknown_cells, _ways, _erosion, _hills)
 
 
 _PLANES = tuple((slope, aspect) for slope in (0.5, 12.0, 45.0, 75.0) for aspect in (0.0, 37.0, 135.0, 201.5, 359.0))
@@ -167,6 +177,41 @@ def _slopes():
     ridge[3, [3, 5]] = np.nan
     between = terrain.gradient(ridge, 20.0, 30.0)[0][2, 3]
     yield _deviation("slope between two unknown cells", abs(between), 0.0, "1", "none is known")
+
+
+def _skies():
+    """Check sky views."""
+    # A horizon is known in 32 directions and is a great circle between them: half a percent in a valley.
+    slopes = np.array([0.0, 5.0, 30.0, 60.0])
+    wide = [_sky_view(slope, 100.0, np.full(32, 90.0)) for slope in slopes]
+    analytic = (1 + np.cos(np.radians(slopes))) / 2
+    yield _deviation("sky seen from a wide plane", largest(wide, analytic), 1e-12, "1", "(1 + cos slope) / 2")
+    walls = np.array([5.0, 20.0, 45.0])
+    across = np.abs(np.sin(np.radians(horizon.azimuths(32))))
+    valleys = [horizon.zenith(np.tan(np.radians(wall)) * across) for wall in walls]
+    floor = [_sky_view(0.0, 0.0, valley) for valley in valleys]
+    worst = 100 * largest(floor, np.cos(np.radians(walls)), relative=True)
+    yield _deviation("sky seen from the floor of a V valley", worst, 0.5, "%", "cos(wall)")
+    foot = [_sky_view(wall, 90.0, valley) for wall, valley in zip(walls, valleys, strict=True)]
+    worst = 100 * largest(foot, (1 + np.cos(np.radians(2 * walls))) / 2, relative=True)
+    yield _deviation("sky seen from the foot of its wall", worst, 0.5, "%", "(1 + cos 2 wall) / 2")
+
+
+def _valley_of_cells():
+    """Check a valley with walls of 20 degrees and 300 m below a level upland, on the floor and half way up."""
+    wall, half, cell, reach = np.radians(20.0), 30, 10.0, 1000.0
+    x = (np.arange(6 * half + 1) - 3 * half) * cell
+    ground = np.broadcast_to(np.minimum(np.abs(x), half * cell) * np.tan(wall), (5, x.size))
+    m, n = horizon.horizon_margin(cell, cell, reach)
+    padded = np.pad(np.pad(ground, ((m, m), (0, 0)), mode="edge"), ((0, 0), (n, n)), constant_values=np.nan)
+    directions = horizon.azimuths(32)
+    slope, aspect = terrain.slope_aspect(np.pad(ground, 1, mode="edge"), cell, cell)
+    zenith = horizon.horizon_zenith(padded, cell, cell, directions, reach)
+    sky = _sky_view(slope, aspect, zenith)[2]
+    rim = np.arctan(np.tan(wall) / 3)  # the far one, half a depth up and three quarters of a width away
+    found, analytic = sky[[3 * half, 3 * half + half // 2]], [np.cos(wall), (1 + np.cos(rim + wall)) / 2]
+    worst = 100 * largest(found, analytic, relative=True)
+    yield _deviation("sky of a valley of cells, floor and wall", worst, 0.5, "%", "sines of its two limits")
 
 
 def _any_sky():
@@ -247,13 +292,17 @@ def _light():
 
 
 def _shadow():
-    """Check that a cliff is seen up to the reach."""
+    """Check the edge of a shadow to one cell, and that a cliff is seen up to the reach."""
     cliff = np.where(np.arange(120) < 60, 0.0, 20.0) * np.ones((3, 1))
     m, n = horizon.horizon_margin(2.0, 2.0, 120.0)
     padded = np.pad(cliff, ((m, m), (n, n)), mode="edge")
     tangents = horizon.horizon_tangent(padded, 2.0, 2.0, np.array([90.0]), 120.0)[0, 1, :60]
     worst = largest(tangents, 20.0 / (120.0 - 2.0 * np.arange(60)))
     yield _deviation("horizon of a cliff of 20 m", worst, 1e-12, "1", "20 m / distance")
+    sun = np.radians([12.0, 20.0, 45.0])
+    lengths = 2.0 * np.sum(tangents > np.tan(sun)[:, None], axis=1)
+    worst = largest(lengths, 20.0 / np.tan(sun))
+    yield _deviation("length of its shadow", worst, 2.0, "m", "20 m / tan(elevation)")
 
 
-CHECKS = (_slopes, _any_sky, _horizons, _light, _shadow, _upsampling, _unknown_cells, _ways, _erosion, _hills)
+CHECKS = (_slopes, _skies, _any_sky, _valley_of_cells, _horizons, _light, _shadow, *ELEVATION_CHECKS)
