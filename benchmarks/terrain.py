@@ -35,7 +35,8 @@ def waves(grid):
         across, down = kx * x + phase, ky * y
         # sin(a + b), from one-dimensional factors.
         z += length / 150 * (np.cos(down)[:, None] * np.sin(across) + np.sin(down)[:, None] * np.cos(across))
-    return grids.place(xr.DataArray(z, dims=("y", "x"), name="dem", attrs={"units": "m", "source_resolution": 30.0}), grid)
+    attrs = {"units": "m", "source_resolution": 30.0}
+    return grids.place(xr.DataArray(z, dims=("y", "x"), name="dem", attrs=attrs), grid)
 
 
 def chain(lai, dem=None):
