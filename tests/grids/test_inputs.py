@@ -404,7 +404,7 @@ def test_numbers_beyond_the_valid_range_are_no_data(site):
     whole = own(site, 25, "uint8")
     whole[2, 3], whole[4, 5] = 253, 255
     expected = whole.where(whole == 25) * 0.1
-    for attrs in ({"valid_range": (0, 100)}, {"valid_min": 0, "valid_max": np.uint8(100)}):
+    for attrs in ({"valid_range": (0, 100)}, {"valid_min": 0, "valid_max": np.uint8(100)}, {"valid_max": 100}):
         lai = opened(whole.assign_attrs(scale_factor=0.1, _FillValue=255, **attrs))
         np.testing.assert_allclose(lai, expected, rtol=1e-15)
         assert not {"valid_range", "valid_min", "valid_max", "scale_factor"} & set(lai.attrs)
