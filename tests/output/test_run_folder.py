@@ -113,9 +113,10 @@ def test_input_that_changes_during_or_after_a_run_is_an_error(tmp_path, monkeypa
         patch.setattr(run_folder, "_write_files", while_another_writes)
         run_without_pictures(scenario, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+    write_lai_map(tmp_path / "lai.tif", 2.0)
     run_without_pictures(scenario, tmp_path / "out")
     assert re.search("R² of .*none, all", page_of(tmp_path / "out"), re.DOTALL), "NDVI is uniform"
-    write_lai_map(tmp_path / "lai.tif", 2.0)
+    write_lai_map(tmp_path / "lai.tif", 3.0)
     with pytest.raises(ValueError, match=r"older than its input .*lai\.tif.*--overwrite"):
         run_without_pictures(scenario, tmp_path / "out", resume=True)
 
