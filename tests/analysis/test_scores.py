@@ -87,7 +87,6 @@ def test_scores_agree_with_plain_numpy(estimate, truth):
         assert float(found.interval_score[number]) == pytest.approx(expected, rel=1e-12)
     histogram = np.histogram(norm.cdf(-error / 0.25), np.linspace(0, 1, 11), density=True)[0]
     np.testing.assert_allclose(found.pit, histogram, rtol=1e-12)
-    assert found.pit[0] > 1.2 and found.pit[9] > 1.05, "too confident: both ends are too full"
 
 
 def test_scores_are_identical_in_any_chunks(estimate, truth):
