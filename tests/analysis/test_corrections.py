@@ -108,7 +108,6 @@ def test_corrections_end_where_the_divisor_is_below_a_tenth(level, method):
     divisor = cos_i + given.get("c", 0.0)
     kept = (cos_i > 0) & (divisor >= 0.1)
     np.testing.assert_array_equal(np.isfinite(found), np.broadcast_to(kept, found.shape))
-    assert float(found.max()) <= 10 * float(rho.max())
     assert found.attrs["masked_cells"] == ((cos_i > 0) & ~kept).sum() > 10
 
 

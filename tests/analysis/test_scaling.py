@@ -262,5 +262,4 @@ def test_predicted_variance_agrees_with_the_simulation(gaussian, lsf):
     """The covariance comes from the same scene, so that only the borders differ: 46 pixels along an edge, 2 %."""
     found = fifesim.scaling.regularized_variance(gaussian, 30.0, lsf)
     assert float(found["predicted"]) == pytest.approx(float(found["simulated"]), rel=0.05)
-    assert float(found["predicted"]) < 0.5 * float(found["cells"])
     assert float(found["cells"]) == pytest.approx(float(gaussian.var()), rel=1e-10)

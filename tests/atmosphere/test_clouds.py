@@ -110,7 +110,7 @@ def level(reflectance):
 
 @pytest.mark.filterwarnings("ignore:the clouds end")
 def test_clouds_brighten_and_shadows_darken_only_their_cells(site, reflectance, level):
-    """A cloud of n cells has a shadow of n cells on level ground; unknown clouds and shadows are missing cells."""
+    """A cloud of n cells has a shadow of n cells on level ground; unknown clouds and their shadows are missing."""
     thickness = np.zeros(site.shape)
     clear = level.fifesim.to_toa(geometry=SLANT)
     none = level.fifesim.to_toa(clouds=clouds_of(thickness, site), geometry=SLANT)

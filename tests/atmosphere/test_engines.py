@@ -101,7 +101,6 @@ def test_power_laws_in_wavelength_are_interpolated_exactly():
 def test_spectral_interval_has_two_nodes_on_each_side():
     for low, high in ((0.6, 0.65), (0.4, 0.41), (2.1, 2.5), (0.55, 0.59)):
         nodes = spectral_nodes(low, high)
-        assert np.isin(nodes, WAVELENGTHS).all()
         assert (nodes <= low).sum() == min(2, (low >= WAVELENGTHS).sum())
         assert (nodes >= high).sum() == min(2, (high <= WAVELENGTHS).sum())
 
