@@ -31,7 +31,9 @@ def place(number, side):
 
 def same(number, side=CHIP):
     """Another seed, under the same air and sun."""
-    return Scenario(grid=place(number, side), ground={"seed": number // SHARED[side]}, terrain={"dem": "flat"})
+    return Scenario(
+        base="paper", grid=place(number, side), ground={"seed": number // SHARED[side]}, terrain={"dem": "flat"}
+    )
 
 
 def anew(number, dem="flat"):

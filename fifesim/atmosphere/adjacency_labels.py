@@ -155,7 +155,7 @@ def _surroundings(surroundings, array, along):
         margin, outer = _outer(surroundings, array, along)
         return margin, [None] * bands, outer
     if isinstance(surroundings, xr.DataArray) and "band" in surroundings.dims:
-        surroundings = _same_bands(surroundings, array)
+        surroundings = same_bands(surroundings, array)
     numbers = _per_band(surroundings, array, "surroundings")
     if not np.all((numbers >= 0) & (numbers <= 1)):
         raise ValueError(f"surroundings must be reflectances from 0 to 1, got {numbers.tolist()}")
@@ -181,7 +181,7 @@ def _outer(surroundings, array, along):
         )
     shape = along_y.count + 2 * down.margin, along_x.count + 2 * across.margin
     grid = GeoBox(shape, Affine(across.block, 0.0, across.edge, 0.0, down.block, down.edge), here.crs)
-    means = regularized(_same_bands(surroundings, array), areas(grid), grid, min_valid=0.0)
+    means = regularized(same_bands(surroundings, array), areas(grid), grid, min_valid=0.0)
     return (down.margin, across.margin), means
 
 
@@ -205,7 +205,7 @@ def _outer_axis(along, origin, cell, outer_origin, outer_cell, outer_cells):
     return _OuterAxis(first, direction * size, margin)
 
 
-def _same_bands(surroundings, array):
+def same_bands(surroundings, array):
     """Surroundings with the bands of the scene; a single layer is repeated."""
     if "band" not in surroundings.dims:
         surroundings = surroundings.drop_vars("band", errors="ignore")

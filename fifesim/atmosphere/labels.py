@@ -126,6 +126,8 @@ def _carry(name, verb, reflectance, atmosphere, bands, geometry, elevation, adja
     if surroundings is not None and not adjacency:
         raise ValueError("surroundings have an effect only with adjacency=True: give both, or leave surroundings out")
     _check_cells(reflectance, geometry, elevation, adjacency)
+    if isinstance(surroundings, xr.DataArray) and "band" in surroundings.dims:
+        surroundings = adjacency_labels.same_bands(surroundings, reflectance)
     plain = grids.without(reflectance, ("band", *ANGLES))
     to_toa, by_cell = verb == "to_toa", directions.varying(geometry)
     if adjacency and (elevation is not None or by_cell):

@@ -176,7 +176,10 @@ def histogram_figures(image, truth, detail):
     leaves.set(xlabel=axis_label("lai"), ylabel="density", title=capital(cf.QUANTITIES["lai"].long_name))
     leaves.set_ylim(top=1.22 * leaves.get_ylim()[1])
     leaves.legend(frameon=False, fontsize=7.5, ncols=2, loc="upper center", columnspacing=1.0)
-    fpar.hist(finite(truth["fpar"]), bins=60, density=True, histtype="stepfilled", color="#1a9850")
+    absorbed = finite(truth["fpar"])
+    # Rounding of equal values leaves a range that is too narrow for bins.
+    bins = 60 if absorbed.size and np.ptp(absorbed) > 1e-6 else np.linspace(0, 1, 61)
+    fpar.hist(absorbed, bins=bins, density=True, histtype="stepfilled", color="#1a9850")
     fpar.set(xlabel=axis_label("fpar"), ylabel="density", title=f"True {cf.QUANTITIES['fpar'].label} of the pixels")
     for number, band in enumerate(image["dn"]["band"].values):
         values = image["dn"].sel(band=band).values
