@@ -169,5 +169,9 @@ def test_figures_show_the_regression_and_each_pixel(plain_run):
     lai, fpar, axis, *_ = [figure.axes[0] for figure in report.histogram_figures(image, truth, detail)]
     assert (lai.get_title(), lai.get_xlabel()) == ("Leaf area index", "LAI [m² m⁻²]")
     assert (fpar.get_title(), fpar.get_xlabel()) == ("True FPAR of the pixels", "FPAR")
+    even = truth["fpar"] * 0 + 0.7
+    even[0, 0] = np.nextafter(0.7, 1)
+    narrow = report.histogram_figures(image, truth.assign(fpar=even), detail)[1].axes[0]
+    assert narrow.patches[0].get_extents().height > 0
     shares = {line.get_label(): line.get_ydata().sum() for line in axis.lines}
     assert shares == pytest.approx(dict.fromkeys(map(str, image["band"].values), 1.0))
