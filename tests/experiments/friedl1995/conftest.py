@@ -1,5 +1,6 @@
 """The default experiment with few realisations, and small scenes."""
 
+import paper_effects as effects
 import pytest
 
 import fifesim
@@ -17,6 +18,19 @@ def found():
 def small():
     """One realisation of scenes of 10 x 10 pixels."""
     return fifesim.reproduce(cells=90, realisations=1)
+
+
+@pytest.fixture(scope="session")
+def effect_tables():
+    """Effects of four readings, one size and an unchanged case, for one realisation of scenes of 10 x 10 pixels."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(effects, "SIZES", (90,))
+        few = ("native", "aligned", "offset", "blur-48.6")
+        patch.setattr(effects, "READINGS", {name: effects.READINGS[name] for name in few})
+        patch.setattr(effects, "changes", lambda case: [effects.Change("itself", "1", "1", case)])
+        case = effects.Case(cells=90)
+        made = {"readings": effects.readings, "sizes": effects.sizes, "sensitivity": effects.effects_of_numbers}
+        return {name: function(case, [1]) for name, function in made.items()}
 
 
 @pytest.fixture(scope="session")
