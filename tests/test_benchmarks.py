@@ -65,6 +65,7 @@ def test_fields_have_the_covariance_of_their_models(load):
     assert own[0] < 0.005 and other[0] < 0.005
 
 
+@pytest.mark.slow
 def test_6s_with_the_same_atmosphere_agrees(load):
     try:
         own, other = errors(load("peers"), "atmosphere: 6S once a band through Py6S, then its formula", 18)

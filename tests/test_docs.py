@@ -49,7 +49,12 @@ FILES = {"docs/howto/my_map.md": ("lai_500m.tif", write_modis_lai)}
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md")), *sorted((DOCS / "howto").glob("*.md"))]
 
 
-@pytest.mark.parametrize("page", [str(page.relative_to(ROOT)) for page in PAGES if python_blocks(page)])
+# Pages whose code takes more than 6 s of processor time.
+LONG = ("docs/howto/gpp.md", "docs/howto/landscape.md", "docs/howto/train.md")
+CODE = [str(page.relative_to(ROOT)) for page in PAGES if python_blocks(page)]
+
+
+@pytest.mark.parametrize("page", [pytest.param(each, marks=[pytest.mark.slow] * (each in LONG)) for each in CODE])
 def test_code_of_a_page_runs(page, tmp_path, monkeypatch):
     """Blocks run in order in one namespace."""
     monkeypatch.chdir(tmp_path)

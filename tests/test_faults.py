@@ -111,6 +111,7 @@ def resumed(scenario, folder):
     return contents(folder), [json.loads(line) for line in done.stdout.splitlines()]
 
 
+@pytest.mark.slow
 def test_killed_run_resumes_to_the_same_files(scenario, whole, tmp_path):
     out = tmp_path / "out"
     assert signalled(signal.SIGKILL, scenario, "-o", out, "--threads", 1).returncode == -signal.SIGKILL
@@ -208,7 +209,8 @@ def test_killed_worker_does_not_change_the_files(scenario, whole, tmp_path):
     assert contents(out) == whole
 
 
-@pytest.mark.parametrize("options", [["--threads", 2], pytest.param(["--workers", 1], marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("options", [["--threads", 2], ["--workers", 1]])
 def test_run_ended_by_ctrl_c_can_be_resumed(scenario, whole, tmp_path, options):
     out = tmp_path / "out"
     process = signalled(signal.SIGINT, scenario, "-o", out, *options)
@@ -234,9 +236,8 @@ visibility = { uniform = ["10 km", 60] }
 """
 
 
-@pytest.mark.parametrize(
-    "delay", [0.0, 0.5, *(pytest.param(0.3 * number, marks=pytest.mark.slow) for number in range(1, 9))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("delay", [0.0, 0.3, 0.5, 0.9, 1.5, 2.4])
 def test_ctrl_c_ends_all_processes_of_a_dataset_with_one_line(tmp_path, delay):
     """The signal reaches every process of the group, at any time after the first child has started."""
     (tmp_path / "study.toml").write_text(STUDY)
@@ -274,9 +275,8 @@ def small_disk(tmp_path):
     subprocess.run(["umount", place], capture_output=True)
 
 
-@pytest.mark.parametrize(
-    "size", ["2000k", *(pytest.param(size, marks=pytest.mark.slow) for size in ("4k", "100k", "3000k"))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("size", ["4k", "100k", "2000k", "3000k"])
 def test_full_disk_leaves_only_finished_files(scenario, whole, small_disk, size):
     """The disk is full at the start, at the first blocks, at the last blocks, or when the final files are written."""
     out = small_disk(f"size={size}") / "out"

@@ -174,6 +174,7 @@ def test_errors_in_the_hot_spot_match_the_physics_page():
     assert max(around) == pytest.approx(beside, abs=0.06)
 
 
+@pytest.mark.slow
 def test_integration_agrees_with_eradiate_and_the_equation_is_biased():
     """Mean over every sixth view of an RPV surface."""
     views, expected, noise, equation = over_rpv(6)

@@ -73,6 +73,7 @@ def interrupt_after(monkeypatch, after, error=KeyboardInterrupt):
     return made
 
 
+@pytest.mark.slow
 def test_function_returns_the_dataset_written_by_two_processes(small_shards, study, whole, tmp_path):
     path = tmp_path / "study.toml"
     path.write_text(study.to_toml())
@@ -223,6 +224,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_processes_end_with_their_parent(tmp_path):
     (tmp_path / "main.py").write_text(ORPHANS)
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}

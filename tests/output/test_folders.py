@@ -163,6 +163,7 @@ def hold_folder(folder, ready):
         time.sleep(60)
 
 
+@pytest.mark.slow
 def test_second_run_in_a_folder_is_rejected_until_the_first_ends_or_is_killed(tmp_path):
     out, spawn = tmp_path / "out", multiprocessing.get_context("spawn")
     ready = spawn.Event()

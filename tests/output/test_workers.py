@@ -49,11 +49,13 @@ def make_image(path, chunks):
     return rho.fifesim.to_toa().fifesim.sense("TM")
 
 
+@pytest.mark.slow
 def test_workers_write_one_file_together_with_the_bits_of_one_process(client, lai_file, tmp_path):
     fifesim.to_geotiff(make_image(lai_file, {"y": 100, "x": 80}), tmp_path / "image.tif")
     xr.testing.assert_identical(fifesim.open_image(tmp_path / "image.tif"), make_image(lai_file, None))
 
 
+@pytest.mark.slow
 def test_run_on_workers_gives_the_same_files(client, tmp_path, run_without_pictures):
     scenario = parse_scenario({"grid": {"width": 900, "height": 600}, "ground": {"seed": 3}})
     run_without_pictures(scenario, tmp_path / "workers")

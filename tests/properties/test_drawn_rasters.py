@@ -11,6 +11,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+import pytest
 import rasterio
 import rasterio.shutil
 from affine import Affine
@@ -182,6 +183,7 @@ def outcome(door, path):
 SEEN = {}
 
 
+@pytest.mark.slow
 def test_drawn_rasters_open_or_are_rejected_in_one_line():
     try_a_drawn_raster()
     assert {"raster", "ValueError"} <= set(SEEN)

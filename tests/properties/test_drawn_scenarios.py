@@ -268,6 +268,7 @@ def few(scenario):
     return cheap and near and math.prod(scenario.geobox().shape) <= 3000
 
 
+@pytest.mark.slow
 @settings(max_examples=int(os.environ.get("FIFESIM_DRAWS", 50)))
 @given(scenarios())
 def test_drawn_scenario_runs_or_is_rejected_in_a_few_lines(folder, drawn):

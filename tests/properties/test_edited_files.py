@@ -206,6 +206,7 @@ def outcome(kind, edits):
     return check_values(found, edited, "FIFESIM" in edited.copy.tags)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_edited_files_open_correctly_or_are_rejected():
     outcomes, kept = Counter(), Counter()

@@ -68,7 +68,7 @@ def sensitivity(
     Examples
     --------
     >>> import fifesim
-    >>> chip = fifesim.Scenario(grid={"width": 90, "height": 90}, terrain={"dem": "flat"})
+    >>> chip = fifesim.Scenario(base="paper", grid={"width": 90, "height": 90}, terrain={"dem": "flat"})
     >>> study = fifesim.Study(chip, {"brown": {"uniform": [0, 0.5]}, "soil": {"uniform": [-0.05, 0.05]}})
     >>> fifesim.experiments.sensitivity(study, n=32).total.round(1).values.tolist()
     [1.0, 0.0]

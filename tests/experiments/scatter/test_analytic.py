@@ -145,6 +145,7 @@ def test_scenarios_beyond_the_analytic_budget_are_refused(stage, sections, reaso
             fifesim.budget(scenario, method="analytic", cells=240, **options)
 
 
+@pytest.mark.slow
 def test_scores_of_a_learned_landscape_have_their_distribution_and_correlation():
     """Brute force: 2000 fields of 80 x 80 cells, far apart; broad gusts change correlations by less than 0.03."""
     land, cell = learned_landscape("konza"), 5.0
@@ -187,6 +188,7 @@ def test_budget_of_a_learned_landscape_agrees_with_simulation(name):
         assert (abs(found[key] - drawn[key].mean("realisation")) <= allowed).all(), key
 
 
+@pytest.mark.slow
 def test_small_windows_of_a_learned_landscape_hold_less_of_its_variation():
     """Windows of 1.1 km, over which fields of 640 m hardly vary; 20 realisations have a standard error of 0.005."""
     scenario = _landscape(offset=[0.1, 0.1])
