@@ -1,7 +1,7 @@
 """
 Any file opens as a raster or is rejected with a message of one line.
 
-To draw a thousand files: ``FIFESIM_DRAWS=1000 pytest tests/properties/test_drawn_rasters.py``
+To draw a thousand files: ``FIFESIM_DRAWS=1000 pytest -m slow tests/properties/test_drawn_rasters.py``
 """
 
 import json

@@ -4,7 +4,7 @@ Statements about drawn canopies, chunks and scenario files.
 Any scenario file runs or is rejected with a short message. Its keys are drawn from the schema, so that new keys need no
 change here. The suite draws 50 scenarios. To draw more:
 
-    FIFESIM_DRAWS=10000 pytest tests/properties/test_drawn_scenarios.py
+    FIFESIM_DRAWS=10000 pytest -m slow tests/properties/test_drawn_scenarios.py
 """
 
 import math

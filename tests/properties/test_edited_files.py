@@ -1,7 +1,7 @@
 """
 Files edited by other programs open with the right bands and values, or are rejected.
 
-To draw a thousand edits: ``FIFESIM_DRAWS=1000 pytest tests/properties/test_edited_files.py``
+To draw a thousand edits: ``FIFESIM_DRAWS=1000 pytest -m slow tests/properties/test_edited_files.py``
 """
 
 import os
