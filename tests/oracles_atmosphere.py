@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
-from scipy.integrate import quad, solve_bvp
 
 from fifesim.atmosphere import aerosols, engines
 from fifesim.atmosphere.successive_orders import stokes_reflectance
@@ -32,39 +31,6 @@ SIEWERT = np.array(
 def henyey_greenstein(asymmetry, scattering_cosine):
     """Phase function of a given asymmetry, whose mean is 1. [1]"""
     return (1 - asymmetry**2) / (1 + asymmetry**2 - 2 * asymmetry * scattering_cosine) ** 1.5
-
-
-def eddington_intensities(tau, albedo, asymmetry, mu_s):
-    """Mean (J) and net upward (H) diffuse intensity as functions of depth, for solar flux pi and black surface. [1]"""
-
-    def slopes(depth, state):
-        mean, net = state
-        beam = albedo / 4 * np.exp(-depth / mu_s)
-        return np.stack([3 * (1 - albedo * asymmetry) * net + 3 * asymmetry * mu_s * beam, (1 - albedo) * mean - beam])
-
-    def edges(top, bottom):
-        return np.array([top[0] - 2 * top[1], bottom[0] + 2 * bottom[1]])
-
-    depths = np.linspace(0, tau, 41)
-    return solve_bvp(slopes, edges, depths, np.zeros((2, 41)), tol=1e-9).sol
-
-
-def sobolev_reflectance(tau, albedo, asymmetry, phase, mu_s, mu_v):
-    """Integral along the view of the Eddington source function, with exact single scattering. [1]"""
-    field = eddington_intensities(tau, albedo, asymmetry, mu_s)
-
-    def emitted(depth):
-        mean, net = field(depth)
-        once = albedo / 4 * phase * np.exp(-depth / mu_s)
-        return (albedo * mean + 3 * albedo * asymmetry * mu_v * net + once) * np.exp(-depth / mu_v) / mu_v
-
-    return quad(emitted, 0, tau, epsabs=1e-12, epsrel=1e-10)[0] / mu_s
-
-
-def eddington_flux(tau, albedo, asymmetry, mu_s):
-    """Plane albedo and total transmittance from the Eddington fluxes. [1]"""
-    field = eddington_intensities(tau, albedo, asymmetry, mu_s)
-    return 4 * field(0)[1] / mu_s, np.exp(-tau / mu_s) - 4 * field(tau)[1] / mu_s
 
 
 class Ground(NamedTuple):

@@ -124,15 +124,6 @@ def test_limits_are_expressed_in_standard_deviations_of_a_sample(table):
     assert told["R² of FPAR, root mean square difference"] == pytest.approx(0.06 / np.sqrt((6 * 0.01 + 3 * 0.0004) / 9))
 
 
-def test_readings_share_their_ground():
-    """A reading gives the same numbers alone and together with other readings."""
-    options = {"distributions": ["burned-grazed"], "arps": [0.15]}
-    several = friedl1995_table.realise_scenes(Case(cells=90), [5], [READINGS["aligned"], READINGS["narrow"]], **options)
-    alone = friedl1995_table.realise_scenes(Case(cells=90, reading=READINGS["narrow"]), [5], **options)
-    np.testing.assert_array_equal(several["r2"].sel(reading="narrow"), alone["r2"].sel(reading="narrow"))
-    assert (several["r2"].sel(reading="aligned") != several["r2"].sel(reading="narrow")).all()
-
-
 def test_agreement_is_in_standard_deviations_and_includes_a_common_factor(found):
     """Published numbers with slopes 1.5 times as high, and R2 two standard deviations of a sample off."""
     table = friedl1995_table.table2(found.sel(reading="native"))

@@ -5,12 +5,8 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
 import fifesim
-from fifesim.cli import app
-from fifesim.experiments.scatter.report import bar_chart
-from fifesim.experiments.scatter.shares import budget_table, instrument_scenario, total_range
 from fifesim.sensor.description.spatial_response import knows_blur
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -20,14 +16,6 @@ DOCS = Path(__file__).parents[3] / "docs"
 def make_instruments(monkeypatch):
     monkeypatch.syspath_prepend(str(DOCS))
     return importlib.import_module("make_instruments")
-
-
-def test_instrument_scenario_has_all_known_errors_of_the_instrument():
-    msi = instrument_scenario("Sentinel-2", arp=0.24)
-    assert msi.sensor.bands == ["MSI4", "MSI8"] and msi.sensor.size == 10.0 and msi.ground.arp == 0.24
-    assert msi.sensor.offset == pytest.approx([0.33, 0.33]) and msi.sensor.noise == ["all"]
-    mss = instrument_scenario("MSS")
-    assert mss.sensor.offset == [0.0, 0.0] and mss.sensor.noise == [] and mss.terrain.dem == "flat"
 
 
 def test_terms_without_a_source_are_unknown_and_so_is_the_total(make_instruments):
@@ -61,37 +49,3 @@ def test_gallery_table_has_no_numbers_for_unknown_terms(make_instruments):
         bands = own.red_and_near_infrared()
         stated = all(knows_blur(own, band) for band in bands), own.geolocation is not None, all(b.noise for b in bands)
         assert tuple(known) == stated, name
-
-
-def test_budget_states_origins_and_shows_unknown_terms_as_unknown():
-    """Blur, geolocation and noise of MSS are unknown; the detector alone blurs by more than a pixel of 60 m."""
-    found = fifesim.budget(instrument_scenario("MSS"), realisations=1, cells=333, each=iter)
-    unknown = ["point spread", "registration", "noise"]
-    assert found["origin"].sel(stage=unknown).values.tolist() == ["–"] * 3
-    known = fifesim.budget(instrument_scenario("TM"), realisations=1, cells=90, each=iter)
-    assert known["origin"].sel(stage="point spread") == "in-flight ± 0.12" and known["share"].notnull().all()
-    chart = bar_chart(budget_table(found))
-    assert sum(text.get_text() == "unknown" for text in chart.axes[0].texts) == 4
-
-
-def test_range_of_the_total_contains_the_total():
-    """The two ends of the uncertainty of the blur enclose the total."""
-    options = {"realisations": 2, "cells": 120, "each": iter}
-    for name in ("OLI", "TM"):
-        scenario = instrument_scenario(name)
-        total = fifesim.budget(scenario, **options)["total"].sel(variable="lai").mean()
-        low, high = total_range(scenario, **options)["lai"]
-        assert low < float(total) < high and high - low > 0.002
-    assert total_range(instrument_scenario("MSS"), **options) is None
-
-
-def test_command_makes_the_budget_of_an_instrument(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    made = CliRunner().invoke(app, ["budget", "--sensor", "MSS", "-o", "out", "--realisations", "1"])
-    assert made.exit_code == 0, made.output
-    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "only the detector of MSS5, MSS7 is known" in page
-    assert "<td>blur –; noise –; geolocation –</td>" in page
-    assert "excludes unknown properties of the instrument: registration, noise" in page
-    both = CliRunner().invoke(app, ["budget", "x.toml", "--sensor", "HRV"])
-    assert both.exit_code == 2
