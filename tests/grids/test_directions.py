@@ -40,6 +40,11 @@ def test_azimuths_count_from_grid_north():
     assert 1 < SUN.saa - turned[0].saa < 2 and 1 < turned[1].saa - SUN.saa < 2
     assert SUN.vaa - turned[0].vaa == pytest.approx(SUN.saa - turned[0].saa, abs=1e-12)
     assert (turned[0].sza, turned[0].vza, turned[0].earth_sun_distance) == (28.5, 3.0, 1.0147)
+    # Beyond a whole turn, azimuths begin again.
+    whole = directions.from_grid_north(Geometry(28.5, 359.9, 3.0, -359.9), west), directions.from_grid_north(SUN, west)
+    assert whole[0].saa == pytest.approx(359.9 + whole[1].saa - SUN.saa - 360, abs=1e-9)
+    east_of = directions.from_grid_north(Geometry(28.5, 359.9, 3.0, -359.9), east).vaa
+    assert east_of == pytest.approx(-359.9 + turned[0].saa - SUN.saa + 360, abs=1e-9)
 
 
 def test_angles_by_cell_are_a_dataset_and_are_carried():

@@ -276,6 +276,7 @@ def test_map_in_another_crs_shows_the_same_ground():
     assert out.rio.crs.to_epsg() == 32614
     # Tolerance: half a pixel, plus the difference between NAD83 and WGS 84.
     assert float(abs(out - out["y"]).max()) < 27
-    far = fifesim.grid_at("EPSG:26914", 725000.0, 4334000.0, 1500.0, 1200.0, 30.0)
-    with pytest.raises(ValueError, match="no pixel of the scan lies on the grid, which spans 725000 to 726500 E"):
-        grid_swath(image, far)
+    for west, north in ((725000.0, 4334000.0), (685000.0, 4334000.0), (705000.0, 4354000.0), (705000.0, 4314000.0)):
+        far = fifesim.grid_at("EPSG:26914", west, north, 1500.0, 1200.0, 30.0)
+        with pytest.raises(ValueError, match=f"no pixel of the scan lies on the grid, which spans {west:.0f} to "):
+            grid_swath(image, far)

@@ -115,6 +115,9 @@ def test_colours_of_a_factor_are_centred_on_one_unless_given(whole):
     assert picture.get_cmap().name == "RdBu_r" and picture.get_clim() == pytest.approx((0.7, 1.3))
     picture = drawn_artist(factor.fifesim.plot(cmap="magma", limits=(0, 2)))
     assert picture.get_cmap().name == "magma" and picture.get_clim() == (0, 2)
+    # The colour bar has an arrow where values lie beyond its ends.
+    for limits, arrows in (((0, 2), "neither"), ((0.95, 2), "min"), ((0.9, 1.3), "neither"), ((0, 1), "max")):
+        assert drawn_artist(factor.fifesim.plot(limits=limits)).colorbar.extend == arrows
 
 
 def test_given_axes_and_kilometres(whole):

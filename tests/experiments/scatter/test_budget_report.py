@@ -55,7 +55,7 @@ def test_command_writes_table_chart_and_page(command, tmp_path):
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == 1
     total = table[(table["stage"] == "total") & (table["variable"] == "lai")].iloc[0]
-    assert f"{100 * total['share']:.1f}" in page
+    assert f"{100 * total['share']:.1f}" in page and "<td>Ground</td><td>level</td>" in page
     first = {name: (tmp_path / "out" / name).read_bytes() for name in report.BUDGET_FILES}
     assert command("mine.toml", "-o", "out", "--realisations", 2).exit_code == 2
     again = command("out/scenario.toml", "-o", "again", "--realisations", 2)

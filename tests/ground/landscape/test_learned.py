@@ -99,6 +99,11 @@ def test_a_hollow_is_convergent_and_low():
     forms = land_forms(400.0 + 1e-4 * across**2 + 0.02 * -down, 10.0)
     assert forms["convergence_20"][100, 100] > 0 > forms["position_80"][100, 100]
     assert forms["above_400"][100, 60] > forms["above_150"][100, 60] > 0
+    # On the wall of a bowl, the divergence of the unit gradient is 1 / r; `_CLEAR` lowers it where slopes are gentle.
+    bowl = land_forms(400.0 + 1e-3 * (across**2 + down**2), 10.0)["convergence_20"]
+    slope = 2e-3 * 500.0
+    expected = slope / (slope + 0.02) / 500.0 * (1 + 0.02 / (slope + 0.02))
+    np.testing.assert_allclose([bowl[150, 100], bowl[100, 50]], expected, rtol=0.01)
 
 
 def test_forms_depend_on_elevation_within_reach_only():
