@@ -153,7 +153,8 @@ def _sky_view(slope, aspect, zenith):
     """Sky view of a slope below a horizon given from north on. [1]"""
     steep, azimuth = np.tan(np.radians(slope)), np.radians(aspect)
     tangents, directions = horizon.tangent(zenith), horizon.azimuths(len(zenith))
-    return horizon.horizon_sky_view(tangents, directions, -steep * np.sin(azimuth), -steep * np.cos(azimuth))
+    east, north = -steep * np.sin(azimuth), -steep * np.cos(azimuth)
+    return horizon.sky_factor(terrain.Vector(*horizon.sky_vector(tangents, directions, east, north)), east, north)
 
 
 def _vector(zenith, azimuth):

@@ -215,14 +215,6 @@ def sky_factor(vector, east, north):
     return np.maximum(np.minimum(along_normal(vector, east, north), (1 + slope_cosine(east, north)) / 2), 0.0)
 
 
-def horizon_sky_view(tangents, directions, east, north):
-    """
-    Sky view factor of slopes under a known horizon, 1 on an open plain, [DozierFrew1990]_, Eq. 7b. [1] Arguments as in
-    `sky_vector`: the integral is exact for a horizon of great circles between the directions.
-    """
-    return sky_factor(Vector(*sky_vector(tangents, directions, east, north)), east, north)
-
-
 @jitable
 def horizon_terrain_view(sky_view, cosine):
     r"""
