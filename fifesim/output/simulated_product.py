@@ -187,13 +187,17 @@ def acquisition_of(images, mission, first, last):
     if geometry is None or "saa" not in image.coords:
         raise ValueError("the image has no sza and saa: give time= or geometry= to to_toa")
     longitude, latitude = projection.middle(grids.geobox(image))
-    means = []
-    for kind in "sv":
-        zenith, azimuth = (np.ravel(getattr(geometry, f"{kind}{angle}a")) for angle in "za")
-        means += map(float, direction_angles(mean_direction(*map(np.ravel, np.broadcast_arrays(zenith, azimuth)))))
+    means = [_mean_angles(*(np.asarray(getattr(geometry, f"{kind}{angle}a")) for angle in "za")) for kind in "sv"]
     distance = float(geometry.earth_sun_distance)
-    _check_sun(time, latitude, longitude, *means[:2], distance)
-    return Acquisition(time, latitude, longitude, geometry, *means, distance)
+    _check_sun(time, latitude, longitude, *means[0], distance)
+    return Acquisition(time, latitude, longitude, geometry, *means[0], *means[1], distance)
+
+
+def _mean_angles(zenith, azimuth):
+    """Mean zenith and azimuth of directions. [degree]"""
+    if zenith.ndim == azimuth.ndim == 0:
+        return float(zenith), float(azimuth) % 360
+    return tuple(map(float, direction_angles(mean_direction(*map(np.ravel, np.broadcast_arrays(zenith, azimuth))))))
 
 
 def _check_sun(time, latitude, longitude, sza, saa, distance):

@@ -120,7 +120,7 @@ _READERS = {".txt": _text_pairs, ".json": _json_pairs, ".xml": _xml_pairs}
 
 # By spacecraft and sensor: instrument, first letters of its bands' names, numbers of its thermal bands, and the launch
 # (USGS, Landsat satellite missions). SENSOR_ID is OLI_TIRS, or OLI where the thermal instrument was off.
-_INSTRUMENTS = {
+LANDSAT_INSTRUMENTS = {
     ("LANDSAT_1", "MSS"): ("MSS", "MSS", (), "1972-07-23"),
     ("LANDSAT_2", "MSS"): ("MSS2", "MSS", (), "1975-01-22"),
     ("LANDSAT_3", "MSS"): ("MSS3", "MSS", ("8",), "1978-03-05"),
@@ -182,11 +182,11 @@ def landsat_scene(groups):
     """Scene from groups of metadata."""
     contents, image = (_value(groups, name, "group ") for name in ("PRODUCT_CONTENTS", "IMAGE_ATTRIBUTES"))
     spacecraft, sensor = _value(image, "SPACECRAFT_ID"), _value(image, "SENSOR_ID")
-    known = _INSTRUMENTS.get((spacecraft, sensor.removesuffix("_TIRS")))
+    known = LANDSAT_INSTRUMENTS.get((spacecraft, sensor.removesuffix("_TIRS")))
     if known is None:
         raise ValueError(
             f"the product is of {in_a_line(spacecraft, 40)} {in_a_line(sensor, 40)}: those of "
-            f"{', '.join(f'{name} {instrument}' for name, instrument in _INSTRUMENTS)} are read"
+            f"{', '.join(f'{name} {instrument}' for name, instrument in LANDSAT_INSTRUMENTS)} are read"
         )
     instrument, letters, thermal, launch = known
     processing = _value(contents, "PROCESSING_LEVEL")
