@@ -21,7 +21,9 @@ from fifesim.base.messages import nearest, spelled
 
 # One line of the table: where a name lives, and whether it is a method of a DataArray, of a Dataset or a DataTree too,
 # or of a DataTree instead.
-_LINE = re.compile(r"from (\.+)([\w.]+) import (\w+) as \3(?:  # method(, of a (?:Dataset|DataTree) too| of a DataTree)?)?")
+_LINE = re.compile(
+    r"from (\.+)([\w.]+) import (\w+) as \3(?:  # method(, of a (?:Dataset|DataTree) too| of a DataTree)?)?"
+)
 _KINDS = {
     None: ("DataArray",),
     ", of a Dataset too": ("DataArray", "Dataset"),

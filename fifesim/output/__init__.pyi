@@ -10,3 +10,4 @@ from .pictures import plot_trade as plot_trade
 
 # Products for processors
 from .landsat_product import to_landsat_l1 as to_landsat_l1  # method, of a DataTree too
+from .sentinel2_product import to_sentinel2_l1c as to_sentinel2_l1c  # method, of a DataTree too

@@ -42,9 +42,7 @@ _NADIR = 0.005
 _ANGLE_KEYS = {"vaa": "SENSOR_AZIMUTH", "vza": "SENSOR_ZENITH", "saa": "SOLAR_AZIMUTH", "sza": "SOLAR_ZENITH"}
 
 
-def to_landsat_l1(
-    image: Images, folder: FilePath, *, truth: Truth | None = None, overwrite: bool = False
-) -> Path:
+def to_landsat_l1(image: Images, folder: FilePath, *, truth: Truth | None = None, overwrite: bool = False) -> Path:
     """
     Write a simulated scene as a Landsat Collection-2 Level-1 product, with its truth.
 
@@ -281,7 +279,10 @@ def _projection(layers, numbers):
         column, row = (0.5, grid.shape.x - 0.5)[corner[1] == "R"], (0.5, grid.shape.y - 0.5)[corner[0] == "L"]
         x, y = grid.affine * (column, row)
         longitude, latitude = to_degrees.transform(x, y)
-        degrees |= {f"CORNER_{corner}_LAT_PRODUCT": f"{latitude:.5f}", f"CORNER_{corner}_LON_PRODUCT": f"{longitude:.5f}"}
+        degrees |= {
+            f"CORNER_{corner}_LAT_PRODUCT": f"{latitude:.5f}",
+            f"CORNER_{corner}_LON_PRODUCT": f"{longitude:.5f}",
+        }
         metres |= {f"CORNER_{corner}_PROJECTION_{axis}_PRODUCT": f"{at:.3f}" for axis, at in (("X", x), ("Y", y))}
     return group | degrees | metres
 
@@ -289,13 +290,17 @@ def _projection(layers, numbers):
 def _record(contents, product, seen):
     """Group of the processing."""
     day = np.datetime_as_string(seen.time, "s")
-    year_day = f"{day[:4]}{(seen.time - seen.time.astype('datetime64[Y]')).astype('timedelta64[D]').astype(int) + 1:03d}"
+    year_day = (
+        f"{day[:4]}{(seen.time - seen.time.astype('datetime64[Y]')).astype('timedelta64[D]').astype(int) + 1:03d}"
+    )
     kept = {key: value for key, value in contents.items() if not key.startswith(("COLLECTION_NUMBER", "DATA_TYPE"))}
     return kept | {
         "REQUEST_ID": "SIMULATED",
         "LANDSAT_SCENE_ID": f"{product[:2]}{product[3]}000000{year_day}SIM00",
         "DATE_PRODUCT_GENERATED": f"{day}Z",
-        "PROCESSING_SOFTWARE_VERSION": simulated_product.statement().split(",")[0].removeprefix("Simulated scene made by "),
+        "PROCESSING_SOFTWARE_VERSION": simulated_product.statement()
+        .split(",")[0]
+        .removeprefix("Simulated scene made by "),
         "DATA_SOURCE_ELEVATION": "SIMULATED",
     }
 

@@ -281,7 +281,8 @@ def write_truth(folder, images, truth=None):
         "coordinates": {str(key): _plain(each.values) for key, each in image.coords.items() if not each.ndim},
         "bands": [name for each in images for name in map(str, np.atleast_1d(each["band"].values))],
         "truth": {
-            str(name): {str(key): _plain(value) for key, value in each.attrs.items()} for name, each in variables.items()
+            str(name): {str(key): _plain(value) for key, value in each.attrs.items()}
+            for name, each in variables.items()
         },
     }
     (folder / "truth" / "scene.json").write_text(json.dumps(described, indent=2) + "\n", encoding="utf-8")

@@ -91,7 +91,7 @@ def number_of(element, path):
     return stated_number(found.text, found.tag)
 
 
-_INSTRUMENTS = {"Sentinel-2A": "MSI", "Sentinel-2B": "MSI-B"}
+SENTINEL2_INSTRUMENTS = {"Sentinel-2A": "MSI", "Sentinel-2B": "MSI-B"}
 
 # By level: quantification value, list of offsets, and its key for the number of a band.
 _SCALES = {1: ("QUANTIFICATION_VALUE", "RADIO_ADD_OFFSET"), 2: ("BOA_QUANTIFICATION_VALUE", "BOA_ADD_OFFSET")}
@@ -162,7 +162,7 @@ def _product(root):
         spacecraft=spacecraft,
         baseline=text_of(root, ".//PROCESSING_BASELINE"),
         level=level,
-        instrument=_INSTRUMENTS.get(spacecraft),
+        instrument=SENTINEL2_INSTRUMENTS.get(spacecraft),
         bands=_bands(root, level, files, numbers, sizes),
         numbers=numbers,
         classes={int(match[1]): f"{match.string}.jp2" for match in classifications if match},
@@ -240,7 +240,7 @@ def _distance(root):
 
 
 # Dates of launch. ESA, Sentinel-2 mission. No Sentinel-2 image is older than the first.
-_LAUNCHED = {"Sentinel-2A": "2015-06-23", "Sentinel-2B": "2017-03-07"}
+SENTINEL2_LAUNCHES = {"Sentinel-2A": "2015-06-23", "Sentinel-2B": "2017-03-07"}
 
 # Edge of a tile [m].
 _TILE = 109_800.0
@@ -267,7 +267,7 @@ def sentinel2_tile(path, spacecraft="Sentinel-2A"):
     """Tile from its metadata."""
     root = metadata.read_xml(path)
     with naming(path):
-        return _tile(root, _LAUNCHED.get(spacecraft, min(_LAUNCHED.values())))
+        return _tile(root, SENTINEL2_LAUNCHES.get(spacecraft, min(SENTINEL2_LAUNCHES.values())))
 
 
 def _tile(root, launch):
