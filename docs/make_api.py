@@ -45,7 +45,10 @@ def functions():
 def _group(group, names):
     listed = "\n".join(f"   {PUBLIC[name].path.removeprefix('fifesim.')}" for name in names)
     parts = [f"\n{group}\n{'-' * len(group)}\n", _SUMMARY.format(names=listed)]
-    for kind, called in (("DataArray", "a raster"), ("DataTree", "the result of ``compare``")):
+    for kind, called in (
+        ("DataArray", "a raster"),
+        ("DataTree", "a DataTree, as from ``compare`` or ``sense``"),
+    ):
         if methods := [f"``{name}``" for name in names if kind in PUBLIC[name].methods_of]:
             parts.append(f"\nMethods of {called}: {', '.join(methods)}.\n")
     return "".join(parts)

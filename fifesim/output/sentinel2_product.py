@@ -252,24 +252,22 @@ def _fitted(zenith, azimuth, rows, columns, grid):
         (np.arange(size)[step] + 0.5) * cell / _STEP
         for size, step, cell in zip(grid.shape, steps, grids.cell_size(grid), strict=True)
     ]
+    # Relative to their vertical component, directions to one point are linear over level ground.
     vectors = direction_vectors(zenith, azimuth)
+    vectors = vectors / vectors[2]
     known = np.isfinite(vectors).all(axis=0)
     factors, *_ = np.linalg.lstsq(_terms(*at)[known.ravel()], vectors[:, known].T, rcond=None)
-    nodes = (_terms(rows, columns, at) @ factors).T.reshape(3, rows.size, columns.size)
-    back = between_nodes(nodes, *at)
-    error = np.nanmax(np.where(known, angle_between(zenith, azimuth, *back), np.nan))
-    if error > _ANGLE:
+    found = direction_angles((_terms(rows, columns) @ factors).T.reshape(3, rows.size, columns.size))
+    back = between_nodes(direction_vectors(*found), *at)
+    if (error := np.nanmax(angle_between(zenith, azimuth, *back))) > _ANGLE:
         raise ValueError(
-            f"angles by pixel must be smooth over {_STEP} m, because the product keeps them on a grid of this step, "
-            f"got a rest of {error:.3g} degrees: simulate the scene with one sun and view, geometry=fifesim.Geometry(...)"
+            f"angles by pixel must be smooth over {_STEP} m, the step of the grids of angles of the product, got a rest "
+            f"of {error:.3g} degrees: simulate the scene with one sun and view, geometry=fifesim.Geometry(...)"
         )
-    return direction_angles(nodes)
+    return found
 
 
-def _terms(rows, columns, extent=None):
-    """Terms of a plane, or of a quadratic surface where the image is larger than four steps, shape (place, term)."""
+def _terms(rows, columns):
+    """Terms of a bilinear surface, shape (place, 4)."""
     row, column = (each.ravel() for each in np.meshgrid(rows, columns, indexing="ij"))
-    planar = [np.ones(row.size), row, column]
-    if min(each[-1] for each in extent or (rows, columns)) > 4:
-        planar += [row**2, row * column, column**2]
-    return np.stack(planar, axis=1).astype(float)
+    return np.stack([np.ones(row.size), row, column, row * column], axis=1)

@@ -71,11 +71,9 @@ class Layer:
 
 @dataclass(frozen=True)
 class Acquisition:
-    """Time, place and directions of a simulated scene."""
+    """Time and directions of a simulated scene."""
 
     time: np.datetime64  # UTC
-    latitude: float  # of the middle [degree]
-    longitude: float
     geometry: Geometry | xr.Dataset  # directions as numbers, or by pixel of the first image [degree]
     sza: float  # mean directions [degree]
     saa: float
@@ -190,7 +188,7 @@ def acquisition_of(images, mission, first, last):
     means = [_mean_angles(*(np.asarray(getattr(geometry, f"{kind}{angle}a")) for angle in "za")) for kind in "sv"]
     distance = float(geometry.earth_sun_distance)
     _check_sun(time, latitude, longitude, *means[0], distance)
-    return Acquisition(time, latitude, longitude, geometry, *means[0], *means[1], distance)
+    return Acquisition(time, geometry, *means[0], *means[1], distance)
 
 
 def _mean_angles(zenith, azimuth):
