@@ -28,6 +28,9 @@ _SAMPLES, _ANGLE = 60, 0.01
 # The detector that sees the whole tile, one of 12.
 _DETECTOR = 7
 
+# Reflectance of the largest number, 255, of the true-colour image. ESA, SentiWiki, Sentinel-2 products.
+_BRIGHT = 0.3558
+
 # Coarsest pixel, of which the sides of a tile are multiples. [m]
 _COARSEST = 60
 
@@ -129,8 +132,12 @@ def to_sentinel2_l1c(image: Images, folder: FilePath, *, truth: Truth | None = N
                 _write_band(new, layer, band, names, simulated_product.digital_numbers(layer, *scale, largest), largest)
             else:
                 band["file"] = None
+        colours = [layers[f"MSI{number}"] for number in (4, 3, 2) if "MSI2" in layers]
+        if colours:
+            write_raster(new / f"{names['image']}_TCI.jp2", _true_colours(colours), grid, "JP2OpenJPEG")
         values = names | _text_of_scene(seen, grid, description) | {"bands": bands, "largest": largest}
         values |= {"sun": angles["s"], "view": angles["v"], "cloud_cover": f"{100 * cloud.mean():.6f}"}
+        values["colours"] = bool(colours)
         granule = Path(names["masks"]).parent
         for path, name in (("MTD_MSIL1C.xml", "product"), (granule / "MTD_TL.xml", "tile")):
             template = Path(__file__).with_name(f"sentinel2_{name}.xml.j2")
@@ -202,6 +209,14 @@ def _write_band(new, layer, band, names, counts, largest):
         write_raster(new / names["masks"] / f"MSK_{name}_{band['code']}.jp2", values, layer.grid, "JP2OpenJPEG")
 
 
+def _true_colours(layers):
+    """True-colour image, 0 for no data."""
+    values = np.stack([layer.reflectance.values for layer in layers]) * (255 / _BRIGHT)
+    bright = np.stack([np.zeros(layer.grid.shape, bool) if layer.saturated is None else layer.saturated for layer in layers])
+    values = np.where(bright, 255, np.clip(np.rint(values), 1, 255))
+    return np.nan_to_num(values).astype(np.uint8)
+
+
 def _text_of_scene(seen, grid, description):
     """Fields of time, place and directions in the metadata."""
     sensing = np.datetime_as_string(seen.time, "us")
@@ -261,7 +276,7 @@ def _fitted(zenith, azimuth, rows, columns, grid):
     back = between_nodes(direction_vectors(*found), *at)
     if (error := np.nanmax(angle_between(zenith, azimuth, *back))) > _ANGLE:
         raise ValueError(
-            f"angles by pixel must be smooth over {_STEP} m, the step of the grids of angles of the product, got a rest "
+            f"angles by pixel must be smooth over {_STEP} m, the step of the product's grids of angles, got a rest "
             f"of {error:.3g} degrees: simulate the scene with one sun and view, geometry=fifesim.Geometry(...)"
         )
     return found
