@@ -25,6 +25,9 @@ _STEP = 5000
 # Pixels along an axis at which angles by pixel are read, and the largest error of the grids there. [1, degree]
 _SAMPLES, _ANGLE = 60, 0.01
 
+# Side of a large image. [step]
+_LARGE = 4
+
 # The detector that sees the whole tile, one of 12.
 _DETECTOR = 7
 
@@ -212,7 +215,9 @@ def _write_band(new, layer, band, names, counts, largest):
 def _true_colours(layers):
     """True-colour image, 0 for no data."""
     values = np.stack([layer.reflectance.values for layer in layers]) * (255 / _BRIGHT)
-    bright = np.stack([np.zeros(layer.grid.shape, bool) if layer.saturated is None else layer.saturated for layer in layers])
+    bright = np.stack(
+        [np.zeros(layer.grid.shape, bool) if layer.saturated is None else layer.saturated for layer in layers]
+    )
     values = np.where(bright, 255, np.clip(np.rint(values), 1, 255))
     return np.nan_to_num(values).astype(np.uint8)
 
@@ -267,12 +272,14 @@ def _fitted(zenith, azimuth, rows, columns, grid):
         (np.arange(size)[step] + 0.5) * cell / _STEP
         for size, step, cell in zip(grid.shape, steps, grids.cell_size(grid), strict=True)
     ]
-    # Relative to their vertical component, directions to one point are linear over level ground.
+    # Relative to their vertical component, directions to one point are linear over level ground. Squares, which follow
+    # the sun over a whole tile, would be arbitrary outside of a small image.
+    squares = min(each[-1] for each in at) > _LARGE
     vectors = direction_vectors(zenith, azimuth)
     vectors = vectors / vectors[2]
     known = np.isfinite(vectors).all(axis=0)
-    factors, *_ = np.linalg.lstsq(_terms(*at)[known.ravel()], vectors[:, known].T, rcond=None)
-    found = direction_angles((_terms(rows, columns) @ factors).T.reshape(3, rows.size, columns.size))
+    factors, *_ = np.linalg.lstsq(_terms(*at, squares)[known.ravel()], vectors[:, known].T, rcond=None)
+    found = direction_angles((_terms(rows, columns, squares) @ factors).T.reshape(3, rows.size, columns.size))
     back = between_nodes(direction_vectors(*found), *at)
     if (error := np.nanmax(angle_between(zenith, azimuth, *back))) > _ANGLE:
         raise ValueError(
@@ -282,7 +289,8 @@ def _fitted(zenith, azimuth, rows, columns, grid):
     return found
 
 
-def _terms(rows, columns):
-    """Terms of a bilinear surface, shape (place, 4)."""
+def _terms(rows, columns, squares):
+    """Terms of a bilinear surface, with squares if needed, shape (place, term)."""
     row, column = (each.ravel() for each in np.meshgrid(rows, columns, indexing="ij"))
-    return np.stack([np.ones(row.size), row, column, row * column], axis=1)
+    terms = [np.ones(row.size), row, column, row * column]
+    return np.stack([*terms, row**2, column**2] if squares else terms, axis=1)
