@@ -90,6 +90,10 @@ def scene(tmp_path_factory):
         retrieval = fifesim.train(chips, "line", path=folder / "line.nc")
     designs, weather = {"pixel": [30.0], "registration": [0.0]}, fifesim.models.fife_weather()
     (folder / "responses.csv").write_text("wavelength,red\n0.6,0\n0.65,1\n0.7,0\n", encoding="utf-8")
+    products = {"TM": (30, "1987-06-06T16:35Z", None), "MSI": (10, "2021-06-06T17:10Z", ["MSI2", "MSI3", "MSI4", "MSI8"])}
+    for name, (cell, time, bands) in products.items():
+        ground = fifesim.lai_scene(fifesim.grid_at("EPSG:32614", 704940, 4334220, 120, 120, cell), seed=1)
+        products[name] = ground.fifesim.surface_reflectance(name, bands=bands, time=time).fifesim.to_toa()
     of_classes = make_raster(np.ones(grid.shape, np.uint8), grid, "cover")
     return {
         "folder": folder, "file": file, "grid": grid, "wide": wide, "part": grid[4:6, 4:6], "lai": lai, "dem": dem,
@@ -107,6 +111,7 @@ def scene(tmp_path_factory):
         "weather": {each.name: getattr(weather, each.name) for each in fields(weather)},
         "geometry": fifesim.fife_geometry(), "atmosphere": fifesim.Atmosphere(), "noise": fifesim.NoiseModel(1.0, 0.1),
         "designs": designs, "trade": fifesim.trade("TM", designs), "cost": xr.DataArray([1.0], dims="pixel"),
+        "landsat": products["TM"], "sentinel2": products["MSI"],
         "ross_li": fifesim.ground.RossLi(0.3, 0.15, 0.03),
         "aerosol_tables": fifesim.atmosphere.aerosol_tables("continental"),
     }  # fmt: skip
