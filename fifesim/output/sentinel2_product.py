@@ -128,19 +128,24 @@ def to_sentinel2_l1c(image: Images, folder: FilePath, *, truth: Truth | None = N
         masks = np.stack([cloud, np.zeros_like(cloud), np.zeros_like(cloud)]).astype(np.uint8)
         write_raster(new / names["masks"] / "MSK_CLASSI_B00.jp2", masks, coarse, "JP2OpenJPEG")
         bands = [_described(description, number, band, names) for number, band in enumerate(description.bands)]
-        largest = 2**description.product.bits - 1
+        scale, largest, counts = description.product, 2**description.product.bits - 1, {}
         for band in bands:
             if layer := layers.get(band["name"]):
-                scale = description.product.gain, description.product.offset
-                _write_band(new, layer, band, names, simulated_product.digital_numbers(layer, *scale, largest), largest)
+                values = simulated_product.digital_numbers(layer, scale.gain, scale.offset, largest)
+                _write_band(new, layer, band, names, values, largest)
+                counts[band["code"]] = values
             else:
                 band["file"] = None
-        colours = [layers[f"MSI{number}"] for number in (4, 3, 2) if "MSI2" in layers]
-        if colours:
-            write_raster(new / f"{names['image']}_TCI.jp2", _true_colours(colours), grid, "JP2OpenJPEG")
+        if "B04" in counts:
+            colours = _true_colours(np.stack([counts[code] for code in ("B04", "B03", "B02")]), scale)
+            write_raster(new / f"{names['image']}_TCI.jp2", colours, layers["MSI4"].grid, "JP2OpenJPEG")
         values = names | _text_of_scene(seen, grid, description) | {"bands": bands, "largest": largest}
-        values |= {"sun": angles["s"], "view": angles["v"], "cloud_cover": f"{100 * cloud.mean():.6f}"}
-        values["colours"] = bool(colours)
+        values |= {
+            "colours": "B04" in counts,
+            "sun": angles["s"],
+            "view": angles["v"],
+            "cloud_cover": f"{100 * cloud.mean():.6f}",
+        }
         granule = Path(names["masks"]).parent
         for path, name in (("MTD_MSIL1C.xml", "product"), (granule / "MTD_TL.xml", "tile")):
             template = Path(__file__).with_name(f"sentinel2_{name}.xml.j2")
@@ -212,14 +217,10 @@ def _write_band(new, layer, band, names, counts, largest):
         write_raster(new / names["masks"] / f"MSK_{name}_{band['code']}.jp2", values, layer.grid, "JP2OpenJPEG")
 
 
-def _true_colours(layers):
-    """True-colour image, 0 for no data."""
-    values = np.stack([layer.reflectance.values for layer in layers]) * (255 / _BRIGHT)
-    bright = np.stack(
-        [np.zeros(layer.grid.shape, bool) if layer.saturated is None else layer.saturated for layer in layers]
-    )
-    values = np.where(bright, 255, np.clip(np.rint(values), 1, 255))
-    return np.nan_to_num(values).astype(np.uint8)
+def _true_colours(counts, product):
+    """True-colour image of digital numbers, 0 for no data."""
+    values = np.rint((counts * product.gain + product.offset) * (255 / _BRIGHT))
+    return np.where(counts == 0, 0, np.clip(values, 1, 255)).astype(np.uint8)
 
 
 def _text_of_scene(seen, grid, description):
