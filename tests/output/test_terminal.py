@@ -1,13 +1,17 @@
 """Terminal output of commands: results, errors, progress, and no output without a terminal."""
 
+import io
 import json
 import logging
 import os
 import re
 import signal
 import time
+from types import SimpleNamespace
 
 import pytest
+from numba.core import event
+from rich.console import Console
 
 from fifesim.base.messages import quiet
 from fifesim.output import progress
@@ -78,8 +82,64 @@ def test_progress_is_one_line_per_minute_without_a_terminal(capsys, monkeypatch)
             progress.advance(1_000_000)
     out, err = capsys.readouterr()
     assert out == "" and 2 <= len(err.splitlines()) <= 5
-    line = r"simulating: \d,000,000 of 8,000,000 cells, \d\d,\d{3}\.\d/s, \d+\.\d+ GB, .* left$"
+    line = r"simulating: \d M of 8 M cells, 40 k/s, \d+\.\d+ GB, 0\d:\d\d left$"
     assert re.match(line, err.splitlines()[0]), err
+
+
+@pytest.fixture
+def terminal(monkeypatch):
+    """Text of a terminal of 80 columns on which progress is shown, and a clock that the test sets."""
+    shown, clock = io.StringIO(), SimpleNamespace(now=0.0)
+    console = Console(file=shown, force_terminal=True, color_system="standard", width=80, height=24, legacy_windows=False)
+    monkeypatch.setattr(progress, "Console", lambda **how: console)
+    monkeypatch.setattr(progress, "_shows_bars", lambda: True)
+    monkeypatch.setattr(time, "monotonic", lambda: clock.now)
+    return shown, clock
+
+
+def last_line(shown, bar):
+    """Line of the bar as it is now."""
+    shown.seek(0)
+    shown.truncate()
+    bar.refresh()
+    return re.sub(r"\x1b\[[\d;?]*[A-Za-z]|[\r\n]", "", shown.getvalue())
+
+
+def test_bar_fits_into_80_columns(terminal):
+    """The rate is that of the last seconds, so that neither imports nor compilation count, and no text is cut."""
+    shown, clock = terminal
+    with Progress("simulating", "cells", 20_250_000) as work:
+        clock.now = 30.0
+        event.start_event("numba:compile")
+        event.start_event("numba:compile")
+        event.end_event("numba:compile")
+        line = last_line(shown, work._bar)
+        assert line.startswith("compiling (once) ━") and "20.3 M cells" in line
+        clock.now = 40.0
+        event.end_event("numba:compile")
+        for _ in range(8):
+            clock.now += 1.0
+            work.advance(1_250_000)
+        line = last_line(shown, work._bar)
+        assert re.fullmatch(r"simulating [━╸╺]{20,}  49% 20\.3 M cells 1\.3 M/s 00:08 left *", line), line
+        assert "…" not in line and len(line) <= 80
+        # Ten seconds later, the rate before is forgotten.
+        for _ in range(12):
+            clock.now += 1.0
+            work.advance(100_000)
+        assert " 100 k/s 01:30 left" in last_line(shown, work._bar)
+
+
+def test_longest_texts_of_a_bar_fit_into_80_columns(terminal):
+    shown, clock = terminal
+    event.start_event("numba:compile")
+    with Progress("simulating", "cells", 999_900_000) as work:
+        clock.now = 1.0
+        work.advance(999_900)
+        line = last_line(shown, work._bar)
+    event.end_event("numba:compile")
+    assert re.fullmatch(r"compiling \(once\) [━╸╺]{20,}   0% 999\.9 M cells 999\.9 k/s 16:39 left *", line), line
+    assert len(line) <= 80
 
 
 def test_short_run_without_a_terminal_prints_nothing_but_a_log(capsys, caplog):
