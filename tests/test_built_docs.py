@@ -59,6 +59,16 @@ def test_reference_has_only_public_names():
     assert names == {*(public.path.removeprefix("fifesim.") for public in PUBLIC.values()), "api/functions"}
 
 
+def test_see_also_leads_somewhere():
+    entries = []
+    for page in (HTML / "api" / "names").glob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        for section in re.findall(r'<div class="admonition seealso">.*?</div>', text, re.DOTALL):
+            found = re.findall(r'(<a [^>]*>)?<code class="xref[^>]*>(.*?)</code>', section, re.DOTALL)
+            entries += [(page.name, re.sub("<[^>]+>", "", name), bool(link)) for link, name in found]
+    assert len(entries) > 100 and [(page, name) for page, name, linked in entries if not linked] == []
+
+
 def test_sidebar_has_at_most_40_links():
     numbers = {}
     for page in HTML.rglob("*.html"):

@@ -381,6 +381,22 @@ def documented(function):
                 yield name, match[2]
 
 
+def see_also(text):
+    """Names in the section See Also of a docstring."""
+    section = re.search(r"^See Also\n-+\n(.*?)(?=\n\n|\Z)", inspect.cleandoc(text), re.DOTALL | re.MULTILINE)
+    return re.split(r",\s*|\n", section[1]) if section else []
+
+
+def test_see_also_has_only_names_with_a_place_in_the_reference():
+    """Other names have no link in the documentation."""
+    documented = {f"{PUBLIC[name.partition('.')[0]].path}{''.join(name.partition('.')[1:])}" for name in FUNCTIONS}
+    documented |= {PUBLIC[name].path for name in CLASSES}
+    found = {name: see_also(each.__doc__) for name, each in (FUNCTIONS | CLASSES).items()}
+    assert sum(map(len, found.values())) > 100
+    assert [f"{name}: {each}" for name, several in found.items() for each in several if each not in documented] == []
+    assert [name for name, several in found.items() if PUBLIC[name.partition(".")[0]].path in several] == []
+
+
 # Types by their names in docstrings.
 MEANT = {"bool": bool, "int": int, "float": float, "str": str, "odc.geo.geobox.GeoBox": "GeoBox"}
 

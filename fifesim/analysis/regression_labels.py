@@ -169,7 +169,7 @@ def regress(y: xr.DataArray, x: xr.DataArray, *, pair: Pairing = "coordinates") 
 
     See Also
     --------
-    fifesim.analysis.regression.fit
+    fifesim.Regression, fifesim.aggregate, fifesim.output.plot_fit
 
     Examples
     --------
@@ -236,7 +236,7 @@ def relative_equivalent_noise(
 
     See Also
     --------
-    fifesim.analysis.regression.equivalent_noise
+    fifesim.regress
 
     Examples
     --------

@@ -116,7 +116,7 @@ def ndvi_bias(reflectance: xr.DataArray, pixel: Metres = 30.0) -> xr.DataArray:
 
     See Also
     --------
-    fifesim.analysis.scaling.ndvi_hessian
+    fifesim.scaling.scale_bias, fifesim.scaling.ndvi_linearity
 
     Examples
     --------
@@ -169,7 +169,7 @@ def fpar_bias(
 
     See Also
     --------
-    fifesim.analysis.scaling.beer_bias
+    fifesim.scaling.scale_bias, fifesim.fpar
 
     Examples
     --------
@@ -210,7 +210,7 @@ def ndvi_linearity(reflectance: xr.DataArray) -> float:
 
     See Also
     --------
-    fifesim.analysis.scaling.linearity_correlation
+    fifesim.scaling.ndvi_bias
 
     Examples
     --------
@@ -308,7 +308,7 @@ def density(
 
     See Also
     --------
-    fifesim.analysis.scaling.gaussian_density
+    fifesim.regress
 
     Examples
     --------
@@ -385,7 +385,7 @@ def autocovariance(array: xr.DataArray, reach: float) -> xr.Dataset:
 
     See Also
     --------
-    fifesim.analysis.scaling.lag_sums
+    fifesim.scaling.variogram, fifesim.scaling.regularized_variance
 
     Examples
     --------
@@ -502,7 +502,7 @@ def regularized_variance(array: xr.DataArray, pixel: Metres = 30.0, lsf: Spread 
 
     See Also
     --------
-    fifesim.analysis.scaling.footprint_variance
+    fifesim.scaling.autocovariance, fifesim.aggregate
 
     Examples
     --------

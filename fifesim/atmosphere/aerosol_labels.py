@@ -75,7 +75,7 @@ def read_aerosol(
 
     See Also
     --------
-    aerosol_tables : built-in aerosols in this form.
+    fifesim.atmosphere.aerosol_tables
 
     Examples
     --------

@@ -52,7 +52,7 @@ def spectrum(atmosphere: Atmosphere | None = None, geometry: Geometry | None = N
 
     See Also
     --------
-    fifesim.atmosphere.engines.band_terms
+    fifesim.atmosphere.compare_engines, fifesim.to_toa
 
     Examples
     --------

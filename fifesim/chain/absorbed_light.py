@@ -102,8 +102,7 @@ def fpar(
 
     See Also
     --------
-    fifesim.light, fifesim.ground.canopy.layers.beer_fpar, fifesim.ground.canopy.layers.green_fpar,
-    fifesim.ground.canopy.layers.light_budget
+    fifesim.light, fifesim.surface_reflectance, fifesim.gpp
 
     Examples
     --------
@@ -198,7 +197,7 @@ def light(
 
     See Also
     --------
-    fifesim.ground.canopy.layers.light_budget, fifesim.fpar
+    fifesim.fpar, fifesim.models.albedo, fifesim.gpp
 
     Examples
     --------

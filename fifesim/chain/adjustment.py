@@ -93,7 +93,7 @@ def adjust_bands(
 
     See Also
     --------
-    fifesim.sensor.response.spectral.best_linear, fifesim.ground.canopy.spectra.library_spectra
+    fifesim.sensor.spectral_adjustment, fifesim.sensor.as_seen_by
 
     Examples
     --------
@@ -184,7 +184,7 @@ def as_seen_by(
 
     See Also
     --------
-    adjust_bands, to_toa, sense, fifesim.sensor.response.spatial.Difference
+    fifesim.sensor.adjust_bands, fifesim.to_toa, fifesim.sense
 
     Examples
     --------
@@ -343,7 +343,7 @@ def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands
 
     See Also
     --------
-    fifesim.sensor.response.spectral.line_between
+    fifesim.sensor.adjust_bands
 
     Examples
     --------

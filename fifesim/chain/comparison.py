@@ -76,7 +76,7 @@ def compare(
 
     See Also
     --------
-    comparison_table, plot_comparison, Setup
+    fifesim.sensor.comparison_table, fifesim.output.plot_comparison, fifesim.Setup
 
     Examples
     --------
@@ -136,7 +136,7 @@ def comparison_table(images: xr.DataTree, truth: xr.DataArray | None = None) -> 
 
     See Also
     --------
-    regress
+    fifesim.compare, fifesim.regress
 
     Examples
     --------
@@ -228,7 +228,7 @@ def compare_engines(
 
     See Also
     --------
-    fifesim.atmosphere.engines.band_terms, fifesim.atmosphere.coupling.apparent_reflectance
+    fifesim.Atmosphere, fifesim.to_toa
 
     Examples
     --------

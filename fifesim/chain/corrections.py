@@ -99,7 +99,7 @@ def topographic_correction(
 
     See Also
     --------
-    fifesim.analysis.corrections
+    fifesim.kt, fifesim.terrain.illumination, fifesim.scaling.brdf_normalise
 
     Examples
     --------
@@ -275,7 +275,7 @@ def brdf_normalise(
 
     See Also
     --------
-    fifesim.base.surface_kernels.ross_li, fifesim.analysis.corrections.c_factor
+    fifesim.scaling.topographic_correction, fifesim.ground.RossLi
 
     Examples
     --------

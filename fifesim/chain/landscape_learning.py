@@ -101,7 +101,7 @@ def learn_landscape(
 
     See Also
     --------
-    fifesim.ground.compare_landscapes, fifesim.landscape
+    fifesim.ground.Landscape, fifesim.ground.compare_landscapes, fifesim.landscape
 
     Examples
     --------

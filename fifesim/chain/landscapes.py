@@ -280,7 +280,7 @@ def aggregate(
 
     See Also
     --------
-    fifesim.base.footprints.regularize
+    fifesim.sense, fifesim.regress
 
     Examples
     --------

@@ -88,7 +88,7 @@ def noise_std(
 
     See Also
     --------
-    sense, fifesim.sensor.response.noise.radiance_std, fifesim.analysis.indices.normalized_difference_std
+    fifesim.sense, fifesim.sensor.noise_equivalent_radiance, fifesim.ndvi
 
     Examples
     --------

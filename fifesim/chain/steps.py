@@ -174,7 +174,7 @@ def ndvi(image: RasterOrDataset) -> xr.DataArray:
 
     See Also
     --------
-    fifesim.analysis.indices.normalized_difference
+    fifesim.index, fifesim.sensor.noise_std
 
     Examples
     --------
@@ -226,7 +226,7 @@ def index(
 
     See Also
     --------
-    fifesim.analysis.indices
+    fifesim.ndvi, fifesim.regress
 
     Examples
     --------
@@ -305,7 +305,7 @@ def kt(
 
     See Also
     --------
-    fifesim.ground.terrain.slope.topographic_factor
+    fifesim.terrain.slope, fifesim.terrain.illumination, fifesim.scaling.topographic_correction
 
     Examples
     --------
@@ -419,10 +419,7 @@ def surface_reflectance(
 
     See Also
     --------
-    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.layers.two_layers,
-    fifesim.ground.canopy.crowns.clumped,
-    fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil.moistened,
-    fifesim.ground.terrain.lit_slopes.slope_reflectance
+    fifesim.Canopy, fifesim.fpar, fifesim.to_toa, fifesim.ground.canopy_spectra
 
     Examples
     --------
@@ -547,7 +544,7 @@ def to_toa(
 
     See Also
     --------
-    fifesim.atmosphere.coupling.apparent_reflectance, fifesim.atmosphere.clouds.layer.clouded_reflectance, cast_clouds
+    fifesim.to_surface, fifesim.cloud_field, fifesim.atmosphere.cast_clouds
 
     Examples
     --------
@@ -671,7 +668,7 @@ def to_surface(
 
     See Also
     --------
-    fifesim.atmosphere.coupling.corrected_reflectance
+    fifesim.to_toa, fifesim.Atmosphere
 
     Examples
     --------

@@ -89,7 +89,7 @@ def trade(
 
     See Also
     --------
-    budget, Instrument.replace, output.plot_trade
+    fifesim.budget, fifesim.Instrument.replace, fifesim.output.plot_trade
 
     Examples
     --------

@@ -148,7 +148,7 @@ def sun_position(
 
     See Also
     --------
-    fifesim.base.geometry.sun_geometry, fifesim.base.geometry.sun_positions
+    fifesim.Geometry, fifesim.sensor.overpasses
 
     Examples
     --------

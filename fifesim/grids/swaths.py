@@ -69,7 +69,7 @@ def grid_swath(
 
     See Also
     --------
-    fifesim.base.scan_pixels.nearest_pixels, fifesim.base.scan_pixels.covered_means
+    fifesim.sense_swath
 
     Examples
     --------

@@ -285,8 +285,7 @@ def gpp(
 
     See Also
     --------
-    fifesim.models.production.light_use_gpp, fifesim.models.production.canopy_photosynthesis,
-    fifesim.models.production.farquhar_canopy, fifesim.models.production.c4_canopy
+    fifesim.evapotranspiration, fifesim.light, fifesim.models.Weather
 
     Examples
     --------
@@ -348,8 +347,7 @@ def evapotranspiration(
 
     See Also
     --------
-    fifesim.models.evaporation.penman_monteith, fifesim.models.evaporation.pt_jpl,
-    fifesim.models.evaporation.reference_evapotranspiration
+    fifesim.gpp, fifesim.models.albedo, fifesim.models.Weather
 
     Examples
     --------
@@ -528,7 +526,7 @@ def albedo(
 
     See Also
     --------
-    fifesim.models.radiation.two_stream
+    fifesim.light, fifesim.evapotranspiration
 
     Examples
     --------

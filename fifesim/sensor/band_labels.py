@@ -111,7 +111,7 @@ def to_bands(
 
     See Also
     --------
-    fifesim.sensor.response.spectral.band_weights
+    fifesim.instrument, fifesim.sensor.read_responses
 
     Examples
     --------

@@ -218,7 +218,7 @@ def psf(instrument: InstrumentLike = "TM", band: str | None = None, *, spacing: 
 
     See Also
     --------
-    fifesim.sensor.response.spatial, fifesim.sensor.response.spatial
+    fifesim.sensor.mtf, fifesim.sense
 
     Examples
     --------
@@ -279,7 +279,7 @@ def mtf(
 
     See Also
     --------
-    fifesim.sensor.response.spatial, fifesim.sensor.response.spatial
+    fifesim.sensor.psf, fifesim.Instrument
 
     Examples
     --------

@@ -277,8 +277,7 @@ def sense(
 
     See Also
     --------
-    fifesim.base.footprints.regularize, fifesim.sensor.response.noise.add_noise,
-    fifesim.sensor.response.calibration.radiance_to_dn, fifesim.sensor.response.calibration
+    fifesim.sense_swath, fifesim.sensor.noise_std, fifesim.sensor.psf
 
     Examples
     --------
@@ -432,7 +431,7 @@ def to_radiance(image: xr.DataArray) -> xr.DataArray:
 
     See Also
     --------
-    fifesim.sensor.response.calibration.dn_to_radiance
+    fifesim.to_reflectance, fifesim.calibrate
 
     Examples
     --------
@@ -484,7 +483,7 @@ def to_reflectance(image: xr.DataArray) -> xr.DataArray:
 
     See Also
     --------
-    fifesim.sensor.response.calibration.radiance_to_reflectance
+    fifesim.sensor.to_radiance, fifesim.calibrate
 
     Examples
     --------

@@ -78,7 +78,7 @@ def scan_geometry(
 
     See Also
     --------
-    fifesim.sensor.response.scan.view_components
+    fifesim.sense_swath, fifesim.sensor.overpasses
 
     Examples
     --------
@@ -311,7 +311,7 @@ def sense_swath(
 
     See Also
     --------
-    fifesim.sensor.response.scan.footprint_operator, fifesim.sensor.response.scan.ground_of_detector
+    fifesim.sense, fifesim.sensor.grid_swath, fifesim.sensor.scan_geometry
 
     Examples
     --------

@@ -114,7 +114,7 @@ def cloud_field(
 
     See Also
     --------
-    cast_clouds, to_toa, fifesim.atmosphere.clouds.field.cloud_thickness
+    fifesim.atmosphere.cast_clouds, fifesim.to_toa
 
     Examples
     --------
@@ -252,7 +252,7 @@ def cast_clouds(
 
     See Also
     --------
-    cloud_field, to_toa, fifesim.atmosphere.clouds.field.cloud_displacement
+    fifesim.cloud_field, fifesim.to_toa
 
     Examples
     --------

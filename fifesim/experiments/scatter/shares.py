@@ -143,7 +143,7 @@ def budget(
 
     See Also
     --------
-    fifesim.analysis.scaling.shapley
+    fifesim.trade, fifesim.experiments.sensitivity
 
     Examples
     --------

@@ -63,7 +63,7 @@ def sensitivity(
 
     See Also
     --------
-    fifesim.analysis.scaling.sobol_indices
+    fifesim.budget, fifesim.Study
 
     Examples
     --------

@@ -247,8 +247,7 @@ def downscale(
 
     See Also
     --------
-    fifesim.ground.landscape.downscaling.downscaled, fifesim.ground.landscape.downscaling.kriging_filter,
-    fifesim.ground.landscape.downscaling.residual_shift, fifesim.ground.landscape.downscaling.map_trend
+    fifesim.learn_landscape, fifesim.ground.Landscape.condition
 
     Examples
     --------

@@ -181,7 +181,7 @@ def landscape(
 
     See Also
     --------
-    fifesim.ground.landscape.cover.patch_classes, fifesim.ground.landscape.autoregression.streaming_field
+    fifesim.lai_scene, fifesim.learn_landscape, fifesim.CoverClass
 
     Examples
     --------

@@ -73,7 +73,7 @@ def lai_scene(
 
     See Also
     --------
-    fifesim.ground.landscape.autoregression.streaming_field, fifesim.ground.landscape.distribution.lai_distribution
+    fifesim.landscape, fifesim.open_lai, fifesim.ground.treatments
 
     Examples
     --------
@@ -228,7 +228,7 @@ def phenology(
 
     See Also
     --------
-    fifesim.ground.landscape.lai_labels.double_logistic
+    fifesim.lai_scene, fifesim.ground.treatments
 
     Examples
     --------

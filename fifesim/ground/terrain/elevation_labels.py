@@ -143,7 +143,7 @@ def fine_dem(
 
     See Also
     --------
-    fifesim.ground.terrain.spline.spline_coefficients, fifesim.ground.terrain.spline.spline_grid
+    fifesim.terrain.source_dem, fifesim.flint_hills, fifesim.kt
 
     Examples
     --------
@@ -313,7 +313,7 @@ def flint_hills(grid: GeoBox, seed: WholeNumber = 0, *, chunks: Chunks | None = 
 
     See Also
     --------
-    fifesim.ground.terrain.flint_hills.hills_elevation
+    fifesim.fine_dem, fifesim.terrain.slope, fifesim.kt
 
     Examples
     --------

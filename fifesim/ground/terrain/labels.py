@@ -54,7 +54,7 @@ def slope(dem: xr.DataArray) -> xr.DataArray:
 
     See Also
     --------
-    fifesim.ground.terrain.slope.slope_aspect
+    fifesim.terrain.aspect, fifesim.kt
 
     Examples
     --------
@@ -97,7 +97,7 @@ def aspect(dem: xr.DataArray) -> xr.DataArray:
 
     See Also
     --------
-    fifesim.ground.terrain.slope.slope_aspect
+    fifesim.terrain.slope, fifesim.terrain.illumination
 
     Examples
     --------
@@ -172,7 +172,7 @@ def wetness(dem: xr.DataArray, *, resolution: float | None = None) -> xr.DataArr
 
     See Also
     --------
-    fifesim.ground.terrain.wetness.wetness_index
+    fifesim.terrain.slope, fifesim.landscape
 
     Examples
     --------
@@ -348,7 +348,7 @@ def sky_view(dem: xr.DataArray, horizon: Horizon | None = None) -> xr.DataArray:
 
     See Also
     --------
-    fifesim.ground.terrain.horizon.sky_factor, fifesim.ground.terrain.horizon.sky_vector
+    fifesim.terrain.terrain_view, fifesim.horizon
 
     Examples
     --------
@@ -381,7 +381,7 @@ def terrain_view(dem: xr.DataArray, horizon: Horizon | None = None) -> xr.DataAr
 
     See Also
     --------
-    sky_view, kt
+    fifesim.terrain.sky_view, fifesim.kt
 
     Examples
     --------
@@ -426,7 +426,7 @@ def illumination(
 
     See Also
     --------
-    fifesim.ground.terrain.slope.along_normal, fifesim.ground.terrain.horizon.horizon_toward
+    fifesim.kt, fifesim.terrain.shadow
 
     Examples
     --------

@@ -203,7 +203,7 @@ def horizon(
 
     See Also
     --------
-    fifesim.ground.terrain.horizon.horizon_zenith
+    fifesim.terrain.sky_view, fifesim.terrain.terrain_view, fifesim.terrain.shadow
 
     Examples
     --------

@@ -570,7 +570,7 @@ class Instrument:
 
         See Also
         --------
-        fifesim.trade
+        fifesim.trade, fifesim.compare
 
         Examples
         --------

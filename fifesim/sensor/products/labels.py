@@ -160,7 +160,7 @@ def calibrate(
 
     See Also
     --------
-    fifesim.base.bands.counts
+    fifesim.open_image, fifesim.to_reflectance, fifesim.sensor.to_radiance
 
     Examples
     --------

@@ -406,7 +406,7 @@ def open_landsat(
 
     See Also
     --------
-    fifesim.sensor.response.calibration.product_reflectance
+    fifesim.open_sentinel2, fifesim.calibrate, fifesim.sensor.as_seen_by
 
     Examples
     --------

@@ -418,7 +418,7 @@ def open_sentinel2(
 
     See Also
     --------
-    fifesim.sensor.response.calibration.product_reflectance
+    fifesim.open_landsat, fifesim.calibrate, fifesim.sensor.as_seen_by
 
     Examples
     --------
