@@ -167,7 +167,9 @@ def command_line():
     for name, command in group.commands.items():
         context = command.context_class(command, info_name=f"fifesim {name}")
         usage = command.get_usage(context).removeprefix("Usage: ")
-        parts.append(f"## {name}\n\n{command.help}\n\n```sh\n{usage}\n```\n")
+        examples = "\n".join(line.strip() for line in command.epilog.splitlines()[2:])
+        blocks = f"```sh\n{usage}\n```\n\nFor example:\n\n```sh\n{examples}\n```\n"
+        parts.append(f"## {name}\n\n{command.help}\n\n{blocks}")
         records = [each.get_help_record(context) for each in command.get_params(context)]
         rows = [
             [f"`{option.replace(' range>', '>')}`", _in_parentheses(meaning)]
@@ -180,8 +182,8 @@ def command_line():
 
 
 def _in_parentheses(meaning):
-    """Help of an option with its default and range in parentheses, without the default of a counted flag."""
-    meaning = meaning.removesuffix("  [default: 0]").replace("[x>=", "[at least ")
+    """Help of an option with its default and range in parentheses."""
+    meaning = meaning.replace("[x>=", "[at least ")
     return re.sub(r"\s{2,}\[(.*)\]$", r" (\1)", meaning)
 
 

@@ -29,6 +29,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+
+def _command(name, *examples):
+    """Decorator of a command, with examples at the end of its help."""
+    lines = [f"  fifesim {name} {each}".rstrip() for each in examples]
+    return app.command(name, epilog="\n".join(["\b", "Example:" if len(lines) == 1 else "Examples:", *lines]))
+
+
 # One BLAS thread, also in scipy and in worker processes: dask has a thread for each core, and on small matrices BLAS
 # threads spend more time waiting than working. A number set by the user stays.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -75,7 +82,7 @@ def _main(
     pass
 
 
-@app.command("simulate")
+@_command("simulate", "", "mine.toml -o run --threads 4")
 def simulate_command(
     scenario: Annotated[
         Path | None, typer.Argument(help="Scenario file (TOML); by default a synthetic landscape at the FIFE site.")
@@ -122,7 +129,7 @@ def simulate_command(
     report(files, time.monotonic() - start, look, as_json, finished)
 
 
-@app.command("rerun")
+@_command("rerun", "fife/image.tif")
 def rerun_command(
     file: Annotated[Path, typer.Argument(help="File image.tif or truth.tif of a run.")],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Save the new file under this name.")] = None,
@@ -141,7 +148,7 @@ def rerun_command(
         raise typer.Exit(Exit.FAILURE)
 
 
-@app.command("dataset")
+@_command("dataset", "study.toml -o chips.zarr -n 200")
 def dataset_command(
     study: Annotated[
         Path | None, typer.Argument(help="Study file (TOML): a scenario with a table [draw] of distributions.")
@@ -187,7 +194,7 @@ def dataset_command(
     report(files, time.monotonic() - start, f"{output} with xarray.open_zarr", as_json, finished)
 
 
-@app.command("reproduce")
+@_command("reproduce", "--reading aligned --realisations 5 -o table2")
 def reproduce_command(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("friedl1995"),
     reading: Annotated[str, typer.Option(help="Interpretation of Table 1: native or aligned.")] = "native",
@@ -219,7 +226,7 @@ def reproduce_command(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Reproduce Friedl et al. (1995). Writes table2.csv, data of Figures 3 to 9, nine scenarios, report.html."""
+    """Reproduce Friedl and others (1995). Writes table2.csv, data of Figures 3 to 9, nine scenarios, report.html."""
     start = time.monotonic()
 
     with importing():
@@ -233,7 +240,7 @@ def reproduce_command(
     report(files, time.monotonic() - start, f"{output / 'report.html'} in a browser")
 
 
-@app.command("budget")
+@_command("budget", "mine.toml --realisations 40", "--sensor MSI -o msi")
 def budget_command(
     scenario: Annotated[Path | None, typer.Argument(help="Scenario file (TOML); by default as simulate.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("budget"),
@@ -281,7 +288,7 @@ def budget_command(
     report(files, time.monotonic() - start, f"{output / 'report.html'} in a browser")
 
 
-@app.command("endtoend")
+@_command("endtoend", "--quantity evapotranspiration -o et")
 def endtoend_command(
     scenario: Annotated[Path | None, typer.Argument(help="Scenario file (TOML); by default as simulate.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("endtoend"),
@@ -300,7 +307,7 @@ def endtoend_command(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Attribute bias and variance of GPP or evapotranspiration from retrieved LAI. Writes a report with maps."""
+    """Attribute errors of GPP or evapotranspiration to stages. Writes a report with bias, variance and maps."""
     start = time.monotonic()
     _check_spelling(scenario)
 
@@ -316,7 +323,7 @@ def endtoend_command(
     report(files, time.monotonic() - start, f"{output / 'report.html'} in a browser")
 
 
-@app.command("explore")
+@_command("explore", "mine.toml -o mine.html")
 def explore_command(
     scenario: Annotated[Path | None, typer.Argument(help="Scenario file (TOML); by default as simulate.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="HTML file to write.")] = Path("explore.html"),
@@ -337,7 +344,7 @@ def explore_command(
     report([page], time.monotonic() - start, f"{page} in a browser")
 
 
-@app.command("scenario")
+@_command("scenario", "> mine.toml")
 def scenario_command(paper: _Paper = False):
     """Print the default scenario as TOML. Every key has its unit and meaning; save it to a file and edit."""
     # From a file, because the scenario takes 2 s to compute; the tests compare both.
@@ -345,7 +352,7 @@ def scenario_command(paper: _Paper = False):
     print_lines(path.read_text(encoding="utf-8").rstrip())
 
 
-@app.command("sensors")
+@_command("sensors", "OLI", "--check mine.toml")
 def sensors_command(
     name: Annotated[str | None, typer.Argument(help="Name, alias or file of an instrument; by default all.")] = None,
     check: Annotated[Path | None, typer.Option("--check", help="Check an instrument file and print it.")] = None,
@@ -363,7 +370,7 @@ def sensors_command(
         print_lines(list_instruments([instrument(known) for known in instrument_names()]))
 
 
-@app.command("verify")
+@_command("verify", "")
 def verify_command():
     """Compare this installation with independent results. The exit code is 1 if a deviation exceeds its bound."""
     with importing():

@@ -107,6 +107,28 @@ def test_commands_with_output_have_quiet_and_verbose():
         assert "--output" not in options or {"--quiet", "--verbose"} <= options, command.name
 
 
+def test_list_of_commands_has_whole_sentences():
+    """Click shortens a description to one line, which ends at a full stop or with three dots."""
+    lines = CliRunner(env={"COLUMNS": "80"}).invoke(app, ["--help"]).stdout.partition("Commands:\n")[2].splitlines()
+    commands = typer.main.get_command(app).commands
+    assert [line.split()[0] for line in lines] == list(commands)
+    for line, command in zip(lines, commands.values(), strict=True):
+        assert command.help.startswith(line.split(maxsplit=1)[1]) and re.search(r"\w{3,}\)?\.$", line), line
+        assert "et al." not in line
+
+
+def test_help_of_each_command_ends_with_valid_examples():
+    for name, command in typer.main.get_command(app).commands.items():
+        shown = CliRunner(env={"COLUMNS": "80"}).invoke(app, [name, "--help"]).stdout
+        examples = re.findall(r"^    fifesim (\w+) ?(.*)$", shown.partition("Example")[2], re.MULTILINE)
+        assert examples and {each for each, _ in examples} == {name}
+        for _, arguments in examples:
+            command.make_context(name, arguments.partition(">")[0].split())
+        assert "[default: 0]" not in shown
+    with pytest.raises(Exception, match="No such option"):
+        command.make_context(name, ["--nonsense"])
+
+
 def test_written_scenario_reproduces_the_files(first, invoke, tmp_path):
     assert invoke("simulate", first[0] / "scenario.toml", "-o", "again").exit_code == 0
     for name in FILES:

@@ -96,7 +96,7 @@ def test_page_has_every_command_option_and_help_text():
             assert all(option in found[name] for option in names)
     threads = "`--threads <int>` | Number of threads; by default one per core. (at least 1)"
     assert "(default: fife)" in found["simulate"] and threads in found["simulate"]
-    assert "default: 0" not in found["simulate"]
+    assert "default: 0" not in found["simulate"] and "\nfifesim simulate mine.toml -o run" in found["simulate"]
     assert "fifesim rerun [OPTIONS] {file}" in found["rerun"]
 
 

@@ -108,8 +108,12 @@ def _be_verbose(context: typer.Context, times: int):
 
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_be_quiet, help="Only print errors.")]
 Verbose = Annotated[
-    int, typer.Option("--verbose", "-v", count=True, callback=_be_verbose, help="Print each step; -vv for more detail.")
-]
+    int,
+    typer.Option(
+        "--verbose", "-v", count=True, callback=_be_verbose, show_default=False,
+        help="Print each step; -vv for more detail.",
+    ),
+]  # fmt: skip
 """Options of long commands; their callbacks take effect before the command begins."""
 
 

@@ -90,7 +90,9 @@ def test_progress_is_one_line_per_minute_without_a_terminal(capsys, monkeypatch)
 def terminal(monkeypatch):
     """Text of a terminal of 80 columns on which progress is shown, and a clock that the test sets."""
     shown, clock = io.StringIO(), SimpleNamespace(now=0.0)
-    console = Console(file=shown, force_terminal=True, color_system="standard", width=80, height=24, legacy_windows=False)
+    console = Console(
+        file=shown, force_terminal=True, color_system="standard", width=80, height=24, legacy_windows=False
+    )
     monkeypatch.setattr(progress, "Console", lambda **how: console)
     monkeypatch.setattr(progress, "_shows_bars", lambda: True)
     monkeypatch.setattr(time, "monotonic", lambda: clock.now)
