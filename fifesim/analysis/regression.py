@@ -11,6 +11,7 @@ from scipy import stats
 
 from fifesim.base.arguments import Level, Method, Numbers, check, kind_of
 from fifesim.base.arrays import compiled
+from fifesim.base.messages import html_table
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,16 @@ class Regression:
             f"  standard errors: slope {self.slope_error:.3g}, intercept {self.intercept_error:.3g}; "
             f"y about the line {self.residual_deviation:.4g}"
         )
+
+    def _repr_html_(self):
+        rows = [
+            ("slope", f"{self.slope:.6g} ± {self.slope_error:.3g}", f"of {self.y_name or 'y'} on {self.x_name or 'x'}"),
+            ("intercept", f"{self.intercept:.6g} ± {self.intercept_error:.3g}", "with standard error, as the slope"),
+            ("r2", f"{self.r2:.4f}", "fraction of the variance explained by the line"),
+            ("n", self.n, "number of pairs"),
+            ("residual_deviation", f"{self.residual_deviation:.4g}", "standard deviation about the line"),
+        ]
+        return html_table("Regression", rows)
 
     @property
     def slope_error(self) -> float:

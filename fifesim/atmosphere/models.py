@@ -5,14 +5,15 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args, get_type_hints
 
 import numpy as np
 
 from fifesim.atmosphere import aerosols, gases, mixtures, two_stream
 from fifesim.atmosphere.aerosols import Aerosol, known_aerosol
 from fifesim.atmosphere.gases import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, Levels, Profile, column, profile_above
-from fifesim.base.arguments import PLAIN, AerosolMixture, Numbers, Range, check_fields
+from fifesim.base.arguments import PLAIN, AerosolMixture, Numbers, Range, check_fields, kind_of
+from fifesim.base.messages import html_table, value_in_words
 
 # Band limits of the Thematic Mapper, as its designers state them. [um]
 _BANDS = ((0.45, 0.52), (0.52, 0.60), (0.63, 0.69), (0.76, 0.90), (1.55, 1.75), (2.08, 2.35))
@@ -112,7 +113,7 @@ class Atmosphere:
     """
 
     profile: Annotated[Profile, "profile of pressure, temperature, water vapour and ozone"] = "midlatitude-summer"
-    aerosol: Annotated[AerosolMixture | Aerosol, PLAIN] = "continental"
+    aerosol: Annotated[AerosolMixture | Aerosol, PLAIN, "optical properties of the aerosol"] = "continental"
     visibility: Annotated[
         float | None,
         Range("km", 5, 100, others={"m": 1e-3}, note="an optical thickness is aot="),
@@ -181,6 +182,14 @@ class Atmosphere:
 
     def __str__(self):
         return atmosphere_in_words(self)
+
+    def _repr_html_(self):
+        rows = []
+        for name, hint in get_type_hints(type(self), include_extras=True).items():
+            value, known = getattr(self, name), kind_of(hint).known
+            unit = f" {known.unit}" if known and known.unit != "1" and value is not None else ""
+            rows.append((name, f"{value_in_words(value)}{unit}", get_args(hint)[-1]))
+        return html_table("Atmosphere", rows)
 
     @cached_property
     def text(self) -> str:

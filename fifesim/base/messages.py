@@ -1,4 +1,4 @@
-"""Text of messages: nearest names, validation errors, warnings at the user's line and log lines."""
+"""Text of messages and descriptions: nearest names, validation errors, warnings, log lines and tables in notebooks."""
 
 import inspect
 import logging
@@ -9,7 +9,10 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from difflib import get_close_matches
 from functools import wraps
+from html import escape
 from pathlib import Path
+
+from fifesim.base.files import in_a_line
 
 PARTS: dict = {}
 """Names of a description and of its fields by the argument that takes it, for messages."""
@@ -52,6 +55,30 @@ def nearest(value, allowed):
     """Beginning of a message that suggests the nearest allowed name; empty if none is near."""
     near = closest(value, allowed)
     return f"did you mean {near!r}? " if near else _REMOVED.get(str(value), "")
+
+
+def value_in_words(value):
+    """Short text of a value in a table."""
+    if isinstance(value, list | tuple):
+        return ", ".join(map(value_in_words, value)) or "none"
+    if isinstance(value, dict):
+        return ", ".join(f"{name}: {value_in_words(each)}" for name, each in value.items()) or "none"
+    return "not given" if value is None else f"{value:.7g}" if isinstance(value, float) else str(value)
+
+
+def html_table(title, rows, text="", defaults=()):
+    """HTML table of a description for notebooks: rows of name, value and meaning; rows of defaults are folded."""
+    # Without colours, so that those of a dark notebook stay.
+    more = f"<details><summary>defaults</summary>{_html_rows(defaults)}</details>" if defaults else ""
+    return f"<div><strong>{escape(title)}</strong><div>{escape(text)}</div>{_html_rows(rows)}{more}</div>"
+
+
+def _html_rows(rows):
+    lines = []
+    for row in rows:
+        cells = (escape(in_a_line(value_in_words(each), 400)) for each in row)
+        lines.append("".join(f'<td style="text-align: left; vertical-align: top">{cell}</td>' for cell in cells))
+    return f"<table><tbody>{''.join(f'<tr>{line}</tr>' for line in lines)}</tbody></table>"
 
 
 def unknown_argument(name, signature, options):

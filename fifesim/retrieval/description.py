@@ -14,6 +14,7 @@ from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from fifesim.base.arguments import FilePath
 from fifesim.base.files import check_suffix, in_a_line, read_bounded, reading, whole_file
+from fifesim.base.messages import html_table, value_in_words
 from fifesim.retrieval import methods
 from fifesim.sensor.description.fields import Name, Positive, Share, errors_in_words
 
@@ -75,7 +76,7 @@ class _Description(BaseModel, extra="forbid", strict=True):
         return self
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Retrieval:
     """
     A trained retrieval, from `fifesim.train` or `fifesim.retrieval.read_retrieval`.
@@ -129,6 +130,18 @@ class Retrieval:
     version: int = FORMAT
     score: xr.Dataset | None = field(default=None, repr=False)
     _in_words: ClassVar[str] = "a fifesim.Retrieval, as fifesim.train gives it"
+
+    def __repr__(self):
+        return (
+            f"Retrieval of {value_in_words(self.quantities)} by {self.method} from {self.level} reflectance of "
+            f"{self.instrument}, bands {value_in_words(self.bands)}\n"
+            f"  intervals {value_in_words(self.levels)}; prior {self.prior}"
+        )
+
+    def _repr_html_(self):
+        rows = [(name, getattr(self, name), "") for name in _Description.model_fields]
+        rows += [] if self.score is None else [("rmse", self.score.rmse.values.tolist(), "on test landscapes")]
+        return html_table("Retrieval", rows)
 
     @property
     def diagnostics(self) -> tuple[str, ...]:

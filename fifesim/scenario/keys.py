@@ -127,6 +127,10 @@ class Section(BaseModel):
                 raise ValueError(f"the file cannot be opened: {error.strerror}") from None
         return value
 
+    def __dir__(self):
+        """Names without those of pydantic."""
+        return sorted(set(super().__dir__()) - {name for name in dir(BaseModel) if not name.startswith("__")})
+
     @property
     def written(self):
         """Keys of the table in order."""
@@ -185,9 +189,8 @@ class _LeafArea(Section):
 
 def _key(known):
     """Type and field of the key for a canopy property."""
-    if not known.unit:
-        return str, text(known.default, known.meaning)
-    return float, ranged(known.default, known, known.meaning)
+    number = float, ranged(known.default, known, known.meaning)
+    return number if known.unit else (str, text(known.default, known.meaning))
 
 
 _Structure = create_model("_Structure", __base__=_LeafArea, **{name: _key(known) for name, known in KEYS.items()})

@@ -25,7 +25,7 @@ from fifesim.ground.landscape.distribution import treatments
 from fifesim.scenario.ground import check_leaf_area, drawn_properties, learned_landscape
 from fifesim.scenario.keys import EXTENT, OFFSET_PARTS, STAND, ByName, GridKeys, Keys
 from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
-from fifesim.scenario.toml import full_path, load_values, mistakes
+from fifesim.scenario.toml import full_path, in_html, in_lines, load_values, mistakes
 from fifesim.sensor.description.fields import false_colour_bands
 from fifesim.sensor.description.instruments import instrument
 
@@ -229,6 +229,14 @@ class Scenario(Keys):
             super().__init__(**sections)
         except ValidationError as error:
             raise ValueError(mistakes(error, sections, type(self))) from None
+
+    def __repr__(self):
+        return in_lines(self)
+
+    __str__ = __repr__
+
+    def _repr_html_(self):
+        return in_html(self)
 
     @model_validator(mode="after")
     def _classes_of_a_cover(self):

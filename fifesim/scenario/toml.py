@@ -1,18 +1,19 @@
-"""Scenarios as TOML text: spelling checks with one line per mistake, and writing with units."""
+"""Scenarios as text: TOML with units, spelling checks with one line per mistake, and descriptions for prompts."""
 
 import inspect
 import os
 from copy import deepcopy
 from functools import reduce
 from pathlib import Path
+from textwrap import TextWrapper
 
 import tomlkit
 from pydantic import ValidationError
 
 from fifesim.base.arguments import likely_units
 from fifesim.base.files import in_a_line, read_toml, shown
-from fifesim.base.messages import closest, in_own_words, nearest
-from fifesim.scenario.keys import Keys
+from fifesim.base.messages import closest, html_table, in_own_words, nearest, value_in_words
+from fifesim.scenario.keys import STAND, Keys
 
 # Maximum length of the message on all mistakes of a scenario. [character]
 _LONGEST = 500
@@ -107,6 +108,39 @@ def write_scenario(scenario):
     heading = [scenario.provenance(), "Scenario of a fifesim run. Run it with: fifesim simulate THIS_FILE -o FOLDER"]
     unused, sections = scenario.unused, scenario.sections()
     return _document(heading, {place: _described(own, unused.get(place, ())) for place, own in sections.items()})
+
+
+def in_lines(scenario):
+    """Changed keys of a scenario, its landscape and its bands, in a few lines."""
+    changed, own = {}, scenario.sensor
+    for place, table in scenario.sections().items():
+        values = {key: getattr(table, key) for key in table.written if _is_changed(place, table, key)}
+        if place[0] == "classes":
+            changed.setdefault("classes", {})[place[1]] = values
+        elif values:
+            changed[place[0]] = values
+    given = ", ".join(f"{name}={value!r}" for name, value in changed.items())
+    texts = f"Scenario({given})", scenario.provenance(), f"{own.instrument}, bands {', '.join(own.bands)}"
+    lines = TextWrapper(100, "", "  ", break_long_words=False, break_on_hyphens=False)
+    return "\n  ".join(lines.fill(in_a_line(text, 600)) for text in texts)
+
+
+def in_html(scenario):
+    """Table of the keys of a scenario for notebooks, with the unchanged ones folded."""
+    rows = {True: [], False: []}
+    for place, table in scenario.sections().items():
+        for key, known in table.written.items():
+            value = getattr(table, key)
+            unit = table.unit(key).removesuffix("1") if isinstance(value, float) else ""
+            row = ".".join((*place, key)), f"{value_in_words(value)} {unit}".rstrip(), known.description
+            rows[_is_changed(place, table, key)].append(row)
+    return html_table("Scenario", rows[True], scenario.provenance(), rows[False])
+
+
+def _is_changed(place, table, key):
+    """Whether a key differs from its default, or is given where a missing key means something else."""
+    given = place[0] == "classes" or (key in table.model_fields_set and key in (*STAND, "altitude", "dem"))
+    return given or getattr(table, key) != table.written[key].default
 
 
 def write_tables(heading, tables):

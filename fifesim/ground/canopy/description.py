@@ -9,7 +9,7 @@ import numpy as np
 
 from fifesim.base import arguments
 from fifesim.base.arguments import Array, FilePath, NumberOrArray, check_number
-from fifesim.base.messages import PARTS
+from fifesim.base.messages import PARTS, html_table
 from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
 from fifesim.ground.canopy.optics import check_background
@@ -51,6 +51,11 @@ NumberByCell: TypeAlias = Annotated[
     ),
 ]
 
+
+# Defaults of fields that are optics, in words.
+_TALLGRASS = {
+    "leaf_optics": "green tallgrass", "brown_leaf": "dead tallgrass", "background": "soil and litter of tallgrass",
+}  # fmt: skip
 
 # A smaller hot spot is narrower than the solar disc. [1]
 LEAST_HOTSPOT = 1e-6
@@ -183,7 +188,17 @@ class Canopy(ByValue):
 
     def __repr__(self):
         given = (f"{name}={_brief(getattr(self, name))}" for name in PROPERTIES if name in self.given)
-        return f"Canopy({', '.join(given)})"
+        return f"Canopy({', '.join(given) or '<all defaults: green tallgrass above its soil and litter>'})"
+
+    def _repr_html_(self):
+        given = [
+            (name, _brief(getattr(self, name)), PROPERTIES[name].meaning) for name in PROPERTIES if name in self.given
+        ]
+        defaults = {name: each for name, each in PROPERTIES.items() if name not in self.given}
+        rows = [
+            (name, _TALLGRASS.get(name, each.default), f"{each.meaning} (default)") for name, each in defaults.items()
+        ]
+        return html_table("Canopy", given + rows)
 
     @cached_property
     def leaf_angle_distribution(self) -> LeafAngles:

@@ -112,7 +112,7 @@ def _beta(mean, sd):
 LARGEST_CODE = 2**15 - 1  # largest code of a class in a map. Codes are 16-bit integers, with -1 for no data.
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CoverClass:
     """
     A land cover class. Missing fields are taken from the landscape, or from the arguments of `surface_reflectance`.
@@ -159,6 +159,11 @@ class CoverClass:
             if type(error) not in (ValueError, TypeError):
                 raise
             raise type(error)(f"class {self.name!r}: {error}" if self.name else f"CoverClass: {error}") from None
+
+    def __repr__(self):
+        given = {each.name: getattr(self, each.name) for each in fields(self)}
+        shown = [f"{name}={value!r}" for name, value in given.items() if value not in ("", None, TALLGRASS)]
+        return f"CoverClass({', '.join(shown)})"
 
     def _check(self):
         if self.arp is not None:

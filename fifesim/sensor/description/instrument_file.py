@@ -12,6 +12,7 @@ from pydantic.dataclasses import dataclass
 from fifesim.base.arguments import NAMES, FilePath, Kind, Names, Range, checked
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band, solar_irradiance
 from fifesim.base.footprints import LineSpread
+from fifesim.base.messages import html_table
 from fifesim.sensor.description.fields import (
     CONFIG,
     AlongAcross,
@@ -26,6 +27,7 @@ from fifesim.sensor.description.fields import (
     lookup,
     worded,
 )
+from fifesim.sensor.description.listing import instrument_rows, names_of_bands
 from fifesim.sensor.description.provenance import (
     NUMBER_OF,
     DescribedQuantity,
@@ -357,8 +359,11 @@ class Instrument:
     def __repr__(self):
         return (
             f"Instrument {self.name}: {self.title}, {self.gsd:g} m pixels from {self.altitude / 1000:g} km, "
-            f"{self.bits} bits\n  bands {', '.join(band.name for band in self.bands)}"
+            f"{self.bits} bits\n  bands {names_of_bands(self)}"
         )
+
+    def _repr_html_(self):
+        return html_table(f"{self.name}: {self.title}", instrument_rows(self))
 
     @property
     def max_angle(self) -> float:

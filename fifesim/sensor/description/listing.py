@@ -1,5 +1,6 @@
 """Instruments as text."""
 
+from fifesim.base.messages import value_in_words
 from fifesim.sensor.description.fields import TwoAxes, by_axes
 from fifesim.sensor.description.provenance import UNKNOWN, uncertainty_in_words
 from fifesim.sensor.description.spatial_response import knows_blur, with_response
@@ -27,6 +28,27 @@ def instrument_in_words(instrument):
     lines += [f"  not known: {name}, {text}" for name, text in instrument.not_found.items()]
     lines += ["  sources", *(f"    {text}" for text in instrument.references.values())]
     return "\n".join(lines)
+
+
+def names_of_bands(instrument):
+    """Names of the bands; of many, the first and the last."""
+    names = [band.name for band in instrument.bands]
+    return ", ".join(names) if len(names) <= 24 else f"{names[0]} to {names[-1]} ({len(names)})"
+
+
+def instrument_rows(instrument):
+    """Name, value and meaning of the main properties of an instrument."""
+    sizes = sorted({instrument.pixel(band) for band in instrument.bands})
+    waves = sorted(band.wavelength for band in instrument.bands)
+    rows = [
+        ("altitude", f"{instrument.altitude / 1000:g} km", "above the ground"),
+        ("pixel", f"{value_in_words(sizes)} m", "of the gridded product"),
+        ("bits", instrument.bits, "radiometric resolution"),
+        ("bands", names_of_bands(instrument), f"from {waves[0]:.3f} to {waves[-1]:.3f} µm"),
+        *(("scan", text.strip(), "") for text in _scan(instrument)),
+    ]
+    origins = (line.strip().partition(" ") for line in _origins(instrument))
+    return rows + [(name, text, "origin and source") for name, _, text in origins]
 
 
 def _origins(instrument):
