@@ -130,10 +130,10 @@ def _common_index(y, x):
 def _common_place(y, x):
     """Cut both rasters to their common area."""
     y, x = with_crs_of(y, x), with_crs_of(x, y)
-    one, two = grids.geobox(y), grids.geobox(x)
-    if one == two:
-        return y, x
     try:
+        one, two = grids.geobox(y), grids.geobox(x)
+        if one == two:
+            return y, x
         rows, columns = grids.lattice_offset(one, two)
     except ValueError as error:
         raise ValueError(f'{error}, or use pair="index"') from None

@@ -285,10 +285,12 @@ def check(name, value, kind):
     if value.ndim < kind.dimensions:
         dims = ", ".join(map(str, value.dims))
         kept = ", ".join(f"{axis}=[0]" for axis in ("y", "x") if axis not in value.dims)
-        raise ValueError(
-            f"{name} must have dimensions y and x, got ({dims}): if you selected a cell, keep them with .isel({kept}); "
-            "multiply one spectrum by a raster of ones, odc.geo.xr.wrap_xr(numpy.ones((1, 1)), grid)"
-        )
+        cure = f"if you selected a cell, keep them with .isel({kept}); "
+        if "band" in value.dims:
+            cure += "multiply one spectrum by a raster of ones, odc.geo.xr.wrap_xr(numpy.ones((1, 1)), grid)"
+        else:
+            cure += "a list of values becomes a raster by xarray.DataArray([values], dims=('y', 'x'))"
+        raise ValueError(f"{name} must have dimensions y and x, got ({dims}): {cure}")
     if not value.size:
         sizes = ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items())
         raise ValueError(f"{name} has no cells, its sizes are {sizes}: does the window that was cut out overlap it?")

@@ -27,6 +27,7 @@ _ELSEWHERE = {
     "visibility": "vis", "aot": "aod aod550 aot550 taer550 tau", "h2o": "wv cwv tcwv pwv watervapour watervapor",
     "o3": "ozone", "altitude": "elevation height", "mtf_at_nyquist": "mtf", "temperature": "tair", "humidity": "rh",
     "net_radiation": "rn", "shortwave": "rg", "successive-orders": "6s 6sv",
+    "continental": "rural", "maximum-value": "mvc max maximum",
 }  # fmt: skip
 
 

@@ -61,7 +61,7 @@ def check_lai(lai):
         raise ValueError(
             f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {cells[wrong].flat[0]:g} in "
             f"{wrong.sum()} of {cells.size} cells: {scale}set cells without data to NaN, such as "
-            "lai.where(lai >= 0)"
+            f"lai.where((lai >= 0) & (lai <= {LARGEST_LAI:g}))"
         )
     return lai
 

@@ -76,7 +76,8 @@ def _check_sampling(instrument, interval, gsd, key):
     for angle in by_axes(interval):
         if angle > _WIDEST:
             raise ValueError(
-                f"{key}interval = {angle:g}: angles are in radians (43 urad is 43e-6); degrees times pi / 180"
+                f"{key}interval = {angle:g}: angles are in radians (43 urad is 43e-6); degrees times pi / 180. Without "
+                f"interval it is gsd = {gsd:g} over altitude = {instrument.altitude:g}, both in metres"
             )
         if angle < _FINEST:
             raise ValueError(
