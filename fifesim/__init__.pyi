@@ -66,6 +66,7 @@ from .analysis.index_labels import composite as composite  # method
 from .analysis.regression_labels import regress as regress  # method
 from .analysis.regression import Regression as Regression
 from .analysis.score_labels import score as score  # method, of a Dataset too
+from .output.examination import exam as exam
 from .chain.steps import index as index  # method
 
 # Retrieval
@@ -89,6 +90,7 @@ from .sensor.products.labels import calibrate as calibrate  # method
 # Files and runs
 from .grids.files import to_geotiff as to_geotiff  # method, of a Dataset too
 from .grids.files import open_image as open_image
+from .output.envi import to_envi as to_envi  # method
 from .scenario.simulation import simulate as simulate
 from .output.chips.folder import dataset as dataset
 from .experiments.scatter.shares import budget as budget
