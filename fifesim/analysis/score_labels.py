@@ -144,7 +144,7 @@ def score(
     if "width" in found and bool((found["width"].fillna(0) == 0).all("group").any()):
         raise ValueError("low and high of a level are equal in every pixel: give both ends of the intervals")
     if by is not None:
-        return found.assign_coords(group=labels).rename(group=_group_name(by, truth))
+        return found.assign_coords(group=labels).rename(group=_group_name(by, truth, found))
     found = found.isel(group=0).merge(_decile_scores(by_decile, levels, unit))
     _warn_of_deciles(found, truth.name or "truth", np.count_nonzero(by_decile[0][..., 0], axis=0))
     return found
@@ -164,11 +164,13 @@ def _mask_scores(mask, truth, by, pair):
     words = {"omission": "share of the true area that the mask lacks", "commission": "share of the mask that is wrong"}
     columns = [("n", n, "number of pixels"), *zip(words, found.T, words.values(), strict=True)]
     out = xr.Dataset({name: ("group", each, {"long_name": text, "units": "1"}) for name, each, text in columns})
-    return out.isel(group=0) if by is None else out.assign_coords(group=labels).rename(group=_group_name(by, truth))
+    return out.isel(group=0) if by is None else out.assign_coords(group=labels).rename(group=_group_name(by, truth, out))
 
 
-def _group_name(by, truth):
-    return str(by.name or "group") if isinstance(by, xr.DataArray) else f"{truth.name or 'truth'}_bin"
+def _group_name(by, truth, found):
+    """Name of the dimension of groups, other than those of the scores, such as ``slope``."""
+    name = str(by.name or "group") if isinstance(by, xr.DataArray) else f"{truth.name or 'truth'}_bin"
+    return f"{name}_group" if name in found else name
 
 
 def _parts(estimate, truth):

@@ -148,7 +148,9 @@ def exam(
     ]
     attrs = {"long_name": "share of true pixels without a result", "units": "1"}
     total = _scored(pairs).assign(missing=(("product", "quantity"), lacks, attrs))
-    tree = xr.DataTree.from_dict({"/": total} | {name: _scored(pairs, by) for name, by in _conditions(true).items()})
+    tree = xr.DataTree.from_dict(
+        {"/": total} | {name: _scored(pairs, name, by) for name, by in _conditions(true).items()}
+    )
     if page is not None:
         left = sorted(set().union(*given.values()) - set(names))
         with whole_file(page) as new:
@@ -202,7 +204,7 @@ def _conditions(true):
             values = values.copy(data=edge_distance(values.values, *grids.cell_size(grids.geobox(values))))
         groups = values if condition == "class" else values.copy(data=_tenths(values.values))
         if np.unique(groups.values[np.isfinite(groups.values)]).size > 1:
-            found[condition] = groups.rename(condition)
+            found[condition] = groups.rename(None)
     return found
 
 
@@ -250,11 +252,12 @@ def _common(estimates):
     return {name: each.where(known).assign_attrs(each.attrs) for name, each in estimates.items()}
 
 
-def _scored(pairs, by=None):
+def _scored(pairs, condition=None, by=None):
     """Scores by product and quantity, and by the groups of a condition."""
     rows = []
     for estimates, truth in pairs.values():
         each = [score(own, truth, by)[["n", "bias", "rmse"]] for own in _common(estimates).values()]
+        each = each if condition is None else [found.rename(group=condition) for found in each]
         rows.append(xr.concat(each, xr.Variable("product", list(estimates))))
     found = xr.concat(rows, xr.Variable("quantity", list(pairs)), combine_attrs="drop_conflicts")
     return found.transpose("product", "quantity", ...)
