@@ -90,7 +90,6 @@ from .sensor.products.labels import calibrate as calibrate  # method
 # Files and runs
 from .grids.files import to_geotiff as to_geotiff  # method, of a Dataset too
 from .grids.files import open_image as open_image
-from .output.envi import to_envi as to_envi  # method
 from .scenario.simulation import simulate as simulate
 from .output.chips.folder import dataset as dataset
 from .experiments.scatter.shares import budget as budget

@@ -2,6 +2,7 @@
 
 # Pictures
 # Files and runs
+from .envi import to_envi as to_envi  # method
 from .landsat_product import to_landsat_l1 as to_landsat_l1  # method, of a DataTree too
 from .maps import write_style as write_style
 from .pictures import plot_comparison as plot_comparison  # method of a DataTree

@@ -1,4 +1,4 @@
-"""Simulated images of imaging spectrometers as ENVI files of radiance, location and observation, as ISOFIT reads them."""
+"""Simulated images of imaging spectrometers as ENVI files, in the layout that ISOFIT reads."""
 
 from __future__ import annotations
 
@@ -83,8 +83,8 @@ def to_envi(
     Parameters
     ----------
     image : xarray.DataArray, dims (band, y, x)
-        Radiance or digital numbers of EMIT, EnMAP or PRISMA from `sense`, or reflectance from `to_surface`, on a north-up
-        grid, with a time. Any selection of bands. [W m-2 sr-1 um-1 or 1]
+        Radiance or digital numbers of EMIT, EnMAP or PRISMA from `sense`, or reflectance from `to_surface`, on a
+        north-up grid, with a time. Any selection of bands. [W m-2 sr-1 um-1 or 1]
     folder : str or path
         The product becomes a folder in it, whose name states the time and that the scene is simulated.
     dem : xarray.DataArray or float
@@ -99,11 +99,11 @@ def to_envi(
     Returns
     -------
     product : pathlib.Path
-        Folder of the product. ``*_rdn.img`` has radiance [uW cm-2 sr-1 nm-1], or ``*_rfl.img`` reflectance [1]; ``*_loc.img``
-        longitude, latitude [degree] and elevation [m]; ``*_obs.img`` path length [m], azimuth and zenith toward the
-        sensor and the sun, phase angle, slope, aspect [degree], cosine of the incidence angle [1], UTC time [hour] and
-        distance of the sun [astronomical unit]. All are in BIL order with -9999 for no data, the first in single and the others in
-        double precision.
+        Folder of the product. ``*_rdn.img`` has radiance [uW cm-2 sr-1 nm-1], or ``*_rfl.img`` reflectance [1];
+        ``*_loc.img`` longitude, latitude [degree] and elevation [m]; ``*_obs.img`` path length [m], azimuth and zenith
+        toward the sensor and the sun, phase angle, slope, aspect [degree], cosine of the incidence angle [1], UTC time
+        [hour] and distance of the sun [astronomical unit]. All are in BIL order with -9999 for no data, the first in
+        single and the others in double precision.
 
     Raises
     ------

@@ -30,12 +30,14 @@ _DPI = 160
 
 # Conditions by which errors are grouped: names in the truth, and title.
 _CONDITIONS = {
-    "illumination": (("illumination", "cos_i"), "cosine of the incidence angle of the sun (cos i)"),
+    "illumination": (("illumination",), "cosine of the incidence angle of the sun (cos i)"),
     "slope": (("slope",), "slope [degree]"),
-    "edge_distance": (("field", "cover", "class"), "distance to the nearest edge of a class or field [m]"),
-    "haze": (("aot", "aerosol", "visibility"), "haze"),
-    "class": (("cover", "class"), "class"),
+    "edge_distance": (("field", "cover"), "distance to the nearest edge of a class or field [m]"),
+    "aot": (("aot",), "aerosol optical thickness"),
+    "visibility": (("visibility",), "visibility [km]"),
+    "cover": (("cover",), "class"),
 }
+_SHARES = "class_share"
 _GROUPS = 10
 
 # Quantities that are drawn, spread evenly over all.
@@ -75,9 +77,10 @@ def exam(
         Rasters of the processor: a file, a folder of GeoTIFFs or ENVI files, or rasters in memory. Variables and bands
         are matched with the truth by name. With a mapping, several results are compared on the pixels that all have.
     truth : path or xarray.Dataset
-        Folder ``truth`` of a simulated product, or its rasters. Those that the result has too are scored. Others set the
-        groups: ``illumination`` (cos i) and ``slope``, which also follow from ``dem`` and the sun; ``cover`` or
-        ``field``, with the distance to their edges; ``aot`` or ``visibility``.
+        Folder ``truth`` of a simulated product, or its rasters. Those that the result has too are scored. Others set
+        the groups: ``illumination`` (cos i) and ``slope``, which also follow from ``dem`` and the sun; ``cover`` or
+        ``field``, with the distance to their edges; ``aot`` or ``visibility``. The largest ``class_share`` of
+        `aggregate` is the class.
     page : str or path, optional
         HTML page to write.
     title : str, optional
@@ -88,10 +91,10 @@ def exam(
     Returns
     -------
     scores : xarray.DataTree
-        ``n``, number of pixels, ``bias`` and ``rmse`` in the unit of the truth, and ``missing``, the share of true pixels
-        without a result, by ``product`` and ``quantity``. One node for each condition of which the truth has several
-        values has ``n``, ``bias`` and ``rmse`` by its groups: classes, or ten groups of about as many pixels, labelled by
-        their mean.
+        ``n``, number of pixels, ``bias`` and ``rmse`` in the unit of the truth, and ``missing``, the share of true
+        pixels without a result, by ``product`` and ``quantity``. One node for each condition of which the truth has
+        several values has ``n``, ``bias`` and ``rmse`` by its groups: classes, or up to ten groups of about as many
+        pixels, labelled by their mean.
 
     Raises
     ------
@@ -136,8 +139,8 @@ def exam(
     if not names:
         had = "; ".join(f"{name}: {in_a_line(', '.join(each), 150)}" for name, each in given.items())
         raise ValueError(
-            f"no quantity of the truth ({in_a_line(', '.join(true), 150)}) is in each result ({had}): rename variables or "
-            "bands, for instance with xarray.Dataset({'TM4': red})"
+            f"no quantity of the truth ({in_a_line(', '.join(true), 150)}) is in each result ({had}): rename variables "
+            "or bands, for instance with xarray.Dataset({'TM4': red})"
         )
     pairs = {
         key: (_paired({name: each[key] for name, each in given.items()}, true[key].rename(key)), true[key].rename(key))
@@ -171,7 +174,10 @@ def _rasters(given, what):
     found = {}
     for array in arrays:
         layers = {str(array.name): array}
-        if "band" in array.dims:
+        array = array.rename({"class": "band"}) if "class" in array.dims else array
+        if array.name == _SHARES:
+            layers = {"cover": _largest(array)}
+        elif "band" in array.dims:
             # GDAL adds the wavelength to the names of ENVI bands.
             bands = [str(band).partition(" (")[0] for band in array["band"].values]
             layers = {band: array.isel(band=k, drop=True) for k, band in enumerate(bands)}
@@ -179,6 +185,14 @@ def _rasters(given, what):
             raise ValueError(f"{what} has {', '.join(sorted(twice))} twice: select one raster, with dataset[[name]]")
         found |= {name: layer for name, layer in layers.items() if {"y", "x"} <= set(layer.dims)}
     return found
+
+
+def _largest(shares):
+    """Number of the class with the largest share of each pixel, from 1; NaN where unknown."""
+    number = shares.fillna(-1).argmax("band") + 1.0
+    meanings = " ".join(str(each).replace(" ", "_") for each in shares["band"].values)
+    flags = {"flag_values": np.arange(1, shares.sizes["band"] + 1), "flag_meanings": meanings}
+    return number.where(shares.notnull().any("band")).rename("cover").assign_attrs(flags)
 
 
 def _named(array, stem):
@@ -202,7 +216,7 @@ def _conditions(true):
             continue
         if condition == "edge_distance":
             values = values.copy(data=edge_distance(values.values, *grids.cell_size(grids.geobox(values))))
-        groups = values if condition == "class" else values.copy(data=_tenths(values.values))
+        groups = values if condition == "cover" else values.copy(data=_tenths(values.values))
         if np.unique(groups.values[np.isfinite(groups.values)]).size > 1:
             found[condition] = groups.rename(None)
     return found
@@ -257,7 +271,11 @@ def _scored(pairs, condition=None, by=None):
     rows = []
     for estimates, truth in pairs.values():
         each = [score(own, truth, by)[["n", "bias", "rmse"]] for own in _common(estimates).values()]
-        each = each if condition is None else [found.rename(group=condition) for found in each]
+        if by is not None:
+            codes, meanings = np.ravel(by.attrs.get("flag_values", ())), by.attrs.get("flag_meanings", "").split()
+            names = dict(zip(codes.tolist(), meanings, strict=True))
+            labels = [names.get(code, code) for code in each[0]["group"].values.tolist()]
+            each = [found.assign_coords(group=labels).rename(group=condition) for found in each]
         rows.append(xr.concat(each, xr.Variable("product", list(estimates))))
     found = xr.concat(rows, xr.Variable("quantity", list(pairs)), combine_attrs="drop_conflicts")
     return found.transpose("product", "quantity", ...)
@@ -267,20 +285,21 @@ def _page(tree, pairs, title, left):
     """One self-contained HTML page."""
     products, quantities = (list(map(str, tree[name].values)) for name in ("product", "quantity"))
     drawn = [quantities[k] for k in np.unique(np.linspace(0, len(quantities) - 1, _DRAWN).round().astype(int))]
+    shown = drawn[len(drawn) // 2]
     parts = [
         {
             "name": name,
             "title": _CONDITIONS[name][1],
             "picture": report.png(_condition_figure(node.to_dataset(), products, drawn), _DPI),
             "table": node.to_dataset(),
-            "extremes": _extremes(node.to_dataset(), products, drawn[-1]),
+            "extremes": _extremes(node.to_dataset(), products, shown),
         }
         for name, node in tree.children.items()
     ]
     return report.page_html(
         _TEMPLATE, title=title or f"Exam of {', '.join(products)}", scores=tree.to_dataset(), parts=parts, left=left,
-        products=products, quantities=quantities, drawn=drawn, shown=drawn[-1], units=_unit(tree["rmse"]),
-        maps=report.png(_error_figure(*pairs[drawn[-1]], drawn[-1]), _DPI),
+        products=products, quantities=quantities, drawn=drawn, shown=shown, units=_unit(tree["rmse"]),
+        maps=report.png(_error_figure(*pairs[shown], shown), _DPI),
     )  # fmt: skip
 
 
@@ -291,11 +310,10 @@ def _unit(values):
 
 def _extremes(table, products, quantity):
     """Label and bias of the first and the last group with pixels, by product."""
-    rows = []
+    rows, condition = [], table["bias"].dims[-1]
     for product in products:
-        bias = table["bias"].sel(product=product, quantity=quantity).dropna(table["bias"].dims[-1])
-        ends = [] if not bias.size else [(float(bias[bias.dims[-1]][k]), float(bias[k])) for k in (0, -1)]
-        rows.append((product, ends))
+        bias = table["bias"].sel(product=product, quantity=quantity).dropna(condition)
+        rows.append((product, [(bias[condition].values[k], float(bias[k])) for k in (0, -1) if bias.size]))
     return rows
 
 
@@ -305,20 +323,22 @@ def _condition_figure(table, products, drawn):
     figure = Figure(figsize=(1.2 + 2.9 * len(drawn), 4.9), layout="constrained")
     axes = figure.subplots(2, len(drawn), sharex=True, squeeze=False)
     at = table[condition].values
-    places = np.arange(at.size) if condition == "class" else at
+    is_class = condition == "cover"
+    places = np.arange(at.size) if is_class else at
     for column, quantity in zip(axes.T, drawn, strict=True):
         for axis, name in zip(column, ("bias", "rmse"), strict=True):
             for k, product in enumerate(products):
                 values = table[name].sel(product=product, quantity=quantity).values
                 style = {"marker": "osD^v"[k % 5], "color": _COLOURS[k % len(_COLOURS)], "markersize": 4}
-                axis.plot(places, values, "" if condition == "class" else "-", label=product, linewidth=1.4, **style)
+                axis.plot(places, values, "" if is_class else "-", label=product, linewidth=1.4, **style)
             axis.axhline(0, color="#222222", linewidth=0.8)
             axis.tick_params(labelsize=8)
             axis.spines[["top", "right"]].set_visible(False)
         column[0].set_title(quantity, fontsize=9.5)
         column[1].set_xlabel(capital(_CONDITIONS[condition][1].partition(" (")[0]), fontsize=8)
-        if condition == "class":
-            column[1].set_xticks(places, [f"{each:g}" for each in at])
+        if is_class:
+            column[1].set_xticks(places, [str(each).replace("-", "-\n") for each in at])
+            column[1].margins(x=0.2)
     for axis, name in zip(axes[:, 0], ("bias", "rmse"), strict=True):
         axis.set_ylabel(f"{name}{_unit(table[name])}", fontsize=8.5)
     figure.legend(

@@ -270,6 +270,8 @@ def write_truth(folder, images, truth=None):
     variables = {} if truth is None else truth.data_vars
     for name, raster in variables.items():
         raster = raster.astype(np.uint8) if raster.dtype == bool else raster
+        # Shares of classes, as from `aggregate`, are bands of a file.
+        raster = raster.rename({"class": "band"}) if "class" in raster.dims else raster
         kept = [each for each in raster.coords if each in ANGLES and raster.coords[each].ndim]
         to_geotiff(raster.drop_vars(kept), folder / "truth" / f"{name}.tif")
     image = images[0]
