@@ -164,7 +164,9 @@ def _mask_scores(mask, truth, by, pair):
     words = {"omission": "share of the true area that the mask lacks", "commission": "share of the mask that is wrong"}
     columns = [("n", n, "number of pixels"), *zip(words, found.T, words.values(), strict=True)]
     out = xr.Dataset({name: ("group", each, {"long_name": text, "units": "1"}) for name, each, text in columns})
-    return out.isel(group=0) if by is None else out.assign_coords(group=labels).rename(group=_group_name(by, truth, out))
+    if by is None:
+        return out.isel(group=0)
+    return out.assign_coords(group=labels).rename(group=_group_name(by, truth, out))
 
 
 def _group_name(by, truth, found):

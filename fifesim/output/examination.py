@@ -21,22 +21,26 @@ from fifesim.grids import grid as grids
 from fifesim.grids.files import open_image
 from fifesim.ground.terrain import labels as terrain
 from fifesim.output import report
-from fifesim.output.colours import capital, percentile_limits
+from fifesim.output.colours import percentile_limits
 
 _RASTERS = ".tif", ".tiff", ".img", ".jp2"
 
 _TEMPLATE = Path(__file__).with_name("exam.html.j2")
 _DPI = 160
 
-# Conditions by which errors are grouped: names in the truth, and title.
+# Conditions by which errors are grouped: names in the truth, title, and explanation.
 _CONDITIONS = {
-    "illumination": (("illumination",), "cosine of the incidence angle of the sun (cos i)"),
-    "slope": (("slope",), "slope [degree]"),
-    "edge_distance": (("field", "cover"), "distance to the nearest edge of a class or field [m]"),
-    "aot": (("aot",), "aerosol optical thickness"),
-    "visibility": (("visibility",), "visibility [km]"),
-    "cover": (("cover",), "class"),
-}
+    "illumination": (
+        ("illumination",), "cos i", "cos i: cosine of the incidence angle of the sun on the slope, 0 in shadow."
+    ),
+    "slope": (("slope",), "slope [degree]", ""),
+    "edge_distance": (
+        ("field", "cover"), "distance to edges [m]", "Edges of classes or fields, half a pixel from the pixels next to them."
+    ),
+    "aot": (("aot",), "aerosol optical thickness", ""),
+    "visibility": (("visibility",), "visibility [km]", ""),
+    "cover": (("cover",), "class", ""),
+}  # fmt: skip
 _SHARES = "class_share"
 _GROUPS = 10
 
@@ -210,7 +214,7 @@ def _conditions(true):
         sun = next((sun for each in true.values() if (sun := directions.geometry_of(each)) is not None), None)
         if sun is not None:
             true.setdefault("illumination", terrain.illumination(true["dem"], sun))
-    for condition, (names, _) in _CONDITIONS.items():
+    for condition, (names, _, _) in _CONDITIONS.items():
         values = next((true[name] for name in names if name in true), None)
         if values is None:
             continue
@@ -290,6 +294,7 @@ def _page(tree, pairs, title, left):
         {
             "name": name,
             "title": _CONDITIONS[name][1],
+            "words": _CONDITIONS[name][2],
             "picture": report.png(_condition_figure(node.to_dataset(), products, drawn), _DPI),
             "table": node.to_dataset(),
             "extremes": _extremes(node.to_dataset(), products, shown),
@@ -330,12 +335,12 @@ def _condition_figure(table, products, drawn):
             for k, product in enumerate(products):
                 values = table[name].sel(product=product, quantity=quantity).values
                 style = {"marker": "osD^v"[k % 5], "color": _COLOURS[k % len(_COLOURS)], "markersize": 4}
-                axis.plot(places, values, "" if is_class else "-", label=product, linewidth=1.4, **style)
+                axis.plot(places, values, linestyle="none" if is_class else "-", label=product, linewidth=1.4, **style)
             axis.axhline(0, color="#222222", linewidth=0.8)
             axis.tick_params(labelsize=8)
             axis.spines[["top", "right"]].set_visible(False)
         column[0].set_title(quantity, fontsize=9.5)
-        column[1].set_xlabel(capital(_CONDITIONS[condition][1].partition(" (")[0]), fontsize=8)
+        column[1].set_xlabel(_CONDITIONS[condition][1], fontsize=8)
         if is_class:
             column[1].set_xticks(places, [str(each).replace("-", "-\n") for each in at])
             column[1].margins(x=0.2)
