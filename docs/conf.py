@@ -83,6 +83,7 @@ SEARCH_WORDS = {
     "howto/my_sensor": ["noise", "add noise", "sensor noise", "my sensor"],
     "howto/paper": ["reproduce", "table 2", "reproduce table 2", "friedl"],
     "howto/scenario": ["toml"],
+    "howto/processor": ["exam", "isofit", "hytools", "envi", "topographic correction"],
     "howto/score": ["score"],
     "install": ["installation", "pip", "conda", "windows"],
     "large_scenes": ["cluster", "slurm", "memory", "resume"],

@@ -35,7 +35,7 @@ _CONDITIONS = {
     ),
     "slope": (("slope",), "slope [degree]", ""),
     "edge_distance": (
-        ("field", "cover"), "distance to edges [m]", "Edges of classes or fields, half a pixel from the pixels next to them."
+        ("field", "cover"), "distance to edges [m]", "Pixels next to an edge of a class or field have half a pixel."
     ),
     "aot": (("aot",), "aerosol optical thickness", ""),
     "visibility": (("visibility",), "visibility [km]", ""),
