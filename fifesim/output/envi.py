@@ -62,7 +62,7 @@ OBSERVATION = (
 )  # fmt: skip
 """Bands of the observation file, in the order of ISOFIT [m, degree, 1, hour, astronomical unit]."""
 
-Ground = Annotated[
+HeightOfPixels = Annotated[
     xr.DataArray | float,
     Kind("an elevation model as an xarray.DataArray, or one elevation in metres, such as 340.0",
          lambda value: is_a(value, "DataArray") or isinstance(value, int | float)),
@@ -73,7 +73,7 @@ def to_envi(
     image: xr.DataArray,
     folder: FilePath,
     *,
-    dem: Ground,
+    dem: HeightOfPixels,
     truth: Truth | None = None,
     overwrite: bool = False,
 ) -> Path:

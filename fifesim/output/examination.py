@@ -16,7 +16,7 @@ from fifesim.analysis.regression_labels import check_same_quantity, matched
 from fifesim.analysis.score_labels import score
 from fifesim.base.arguments import FilePath, Kind, is_a, is_path
 from fifesim.base.files import check_suffix, check_target, in_a_line, whole_file
-from fifesim.grids import directions
+from fifesim.grids import cf, directions
 from fifesim.grids import grid as grids
 from fifesim.grids.files import open_image
 from fifesim.ground.terrain import labels as terrain
@@ -55,7 +55,7 @@ def _is_product(value):
     return is_path(value) or is_a(value, "DataArray", "Dataset")
 
 
-Results: TypeAlias = Annotated[
+ProcessorResults: TypeAlias = Annotated[
     FilePath | xr.DataArray | xr.Dataset | Mapping[str, FilePath | xr.DataArray | xr.Dataset],
     Kind(
         "a file, a folder, an xarray.DataArray or an xarray.Dataset, or a dict of these by name",
@@ -70,7 +70,7 @@ Truths: TypeAlias = Annotated[
 
 
 def exam(
-    result: Results, truth: Truths, *, page: FilePath | None = None, title: str = "", overwrite: bool = False
+    result: ProcessorResults, truth: Truths, *, page: FilePath | None = None, title: str = "", overwrite: bool = False
 ) -> xr.DataTree:
     """
     Score what a processor returned for a simulated scene, by terrain, distance to edges, haze and class.
@@ -177,6 +177,8 @@ def _rasters(given, what):
         arrays = list(given.data_vars.values()) if isinstance(given, xr.Dataset) else [given]
     found = {}
     for array in arrays:
+        if cf.is_counts(array):
+            raise ValueError(f"{what} has digital numbers: convert them, for instance with .fifesim.to_reflectance()")
         layers = {str(array.name): array}
         array = array.rename({"class": "band"}) if "class" in array.dims else array
         if array.name == _SHARES:
@@ -254,6 +256,7 @@ def _paired(estimates, truth):
     """Estimates of a quantity on the grid of the truth, NaN where one of them has none."""
     found, stated = {}, {key: truth.attrs[key] for key in ("standard_name", "units") if key in truth.attrs}
     for name, each in estimates.items():
+        # A result without metadata is in the unit and range of the truth.
         each = each.assign_attrs(stated | each.attrs)
         try:
             check_same_quantity(each, truth, (name, "the truth"))
