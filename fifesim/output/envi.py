@@ -177,7 +177,7 @@ def _values(image):
         image = to_radiance(image)
     if is_radiance(image):
         return image * _TO_MICROWATT, "rdn", "uW/cm^2/sr/nm"
-    cf.check_quantity(image, "surface_reflectance", "toa_reflectance")
+    cf.check_quantity(image, "surface_reflectance")
     return image, "rfl", "reflectance"
 
 

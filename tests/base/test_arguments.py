@@ -85,6 +85,11 @@ def scene(tmp_path_factory):
     units = {"instrument": "MODIS", "units": "W m-2 sr-1 um-1"}
     radiance = make_raster(np.full((1, *wide.shape), 80.0), wide, "toa_radiance", **units)
     avhrr = make_raster(np.full((1, *coarse.shape), 0.2), coarse, "toa_reflectance").assign_coords(band=["AVHRR1"])
+    utm = fifesim.grid_at("EPSG:32614", 705000, 4330000, width=240, height=180, cell=60)
+    emit = make_raster(np.full((1, *utm.shape), 80.0), utm, "toa_radiance", **units | {"instrument": "EMIT"})
+    sun = fifesim.sun_position(time := "2023-06-03T17:10Z", latitude=39.09, longitude=-96.62)
+    emit = emit.assign_coords(band=["EMIT29"], time=np.datetime64(time[:-1]), sza=sun.sza, saa=sun.saa)
+    emit = emit.assign_coords(earth_sun_distance=sun.earth_sun_distance)
     chips = fifesim.dataset(fifesim.Study(tiny, draws, landscapes=3), folder / "training.zarr", 3)
     with pytest.warns(UserWarning, match=r"few landscapes \(train 1, validation 1, test 1\)"):
         retrieval = fifesim.train(chips, "line", path=folder / "line.nc")
@@ -113,6 +118,7 @@ def scene(tmp_path_factory):
         "designs": designs, "trade": fifesim.trade("TM", designs), "cost": xr.DataArray([1.0], dims="pixel"),
         "landsat": products["TM"], "sentinel2": products["MSI"],
         "ross_li": fifesim.ground.RossLi(0.3, 0.15, 0.03),
+        "emit": emit, "true": lai.to_dataset(name="lai"),
         "aerosol_tables": fifesim.atmosphere.aerosol_tables("continental"),
     }  # fmt: skip
 
