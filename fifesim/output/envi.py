@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ import rasterio
 import xarray as xr
 from rasterio.windows import Window
 
-from fifesim.base.arguments import FilePath, Kind, is_a
+from fifesim.base.arguments import NUMBER, FilePath, Kind, is_a
 from fifesim.base.geometry import angle_between
 from fifesim.grids import cf, projection
 from fifesim.grids import grid as grids
@@ -62,11 +62,14 @@ OBSERVATION = (
 )  # fmt: skip
 """Bands of the observation file, in the order of ISOFIT [m, degree, 1, hour, astronomical unit]."""
 
-HeightOfPixels = Annotated[
+HeightOfPixels: TypeAlias = Annotated[
     xr.DataArray | float,
-    Kind("an elevation model as an xarray.DataArray, or one elevation in metres, such as 340.0",
-         lambda value: is_a(value, "DataArray") or isinstance(value, int | float)),
-]  # fmt: skip
+    Kind(
+        "an elevation model as an xarray.DataArray, or one elevation in metres, such as 340.0",
+        lambda value: is_a(value, "DataArray") or NUMBER.fits(value),
+        dimensions=2,
+    ),
+]
 
 
 def to_envi(

@@ -60,12 +60,17 @@ ProcessorResults: TypeAlias = Annotated[
     Kind(
         "a file, a folder, an xarray.DataArray or an xarray.Dataset, or a dict of these by name",
         lambda value: _is_product(value) or (isinstance(value, Mapping) and all(map(_is_product, value.values()))),
-        numbers="iufb",
+        dimensions=2,
     ),
 ]
 Truths: TypeAlias = Annotated[
     FilePath | xr.Dataset,
-    Kind("the folder truth of a simulated product, or an xarray.Dataset", _is_product, numbers="iufb"),
+    Kind(
+        "the folder truth of a simulated product, or an xarray.Dataset",
+        lambda value: is_path(value) or is_a(value, "Dataset"),
+        dimensions=2,
+        numbers="iufb",
+    ),
 ]
 
 
