@@ -50,7 +50,7 @@ PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md")), *sorted((DOCS / "howto"
 
 
 # Pages whose code takes more than 6 s of processor time.
-LONG = ("docs/howto/gpp.md", "docs/howto/landscape.md", "docs/howto/train.md")
+LONG = ("docs/howto/gpp.md", "docs/howto/landscape.md", "docs/howto/processor.md", "docs/howto/train.md")
 CODE = [str(page.relative_to(ROOT)) for page in PAGES if python_blocks(page)]
 
 
