@@ -118,10 +118,10 @@ def to_landsat_l1(image: Images, folder: FilePath, *, truth: Truth | None = None
     >>> bool(abs(again - image.fifesim.to_reflectance()).max() < 1e-6)
     True
     """
-    images = simulated_product.images_of(image)
+    images = simulated_product.images_of_scene(image)
     others = "write images of other instruments with .fifesim.to_geotiff(...)"
     description = simulated_product.instrument_of(images, _MISSIONS, others)
-    layers = simulated_product.layers_of(images, description, omitted=(_CIRRUS,))
+    layers = simulated_product.layers_of_scene(images, description, omitted=(_CIRRUS,))
     (spacecraft, sensor), (_, letters, _, launch) = next(
         item for item in LANDSAT_INSTRUMENTS.items() if item[1][0] == description.name
     )
@@ -249,7 +249,7 @@ def _moment(seen, prefix):
         "saa": f"{(seen.saa + 180) % 360 - 180:.8f}",
         "elevation": f"{90 - seen.sza:.8f}",
         "distance": f"{seen.earth_sun_distance:.7f}",
-        "statement": simulated_product.statement(),
+        "statement": simulated_product.simulation_statement(),
     }
 
 

@@ -112,11 +112,11 @@ def to_sentinel2_l1c(image: Images, folder: FilePath, *, truth: Truth | None = N
     >>> bool(abs(again - image.fifesim.to_reflectance()).max() < 1e-6)
     True
     """
-    images = simulated_product.images_of(image)
+    images = simulated_product.images_of_scene(image)
     spacecraft_of = {name: spacecraft for spacecraft, name in SENTINEL2_INSTRUMENTS.items()}
     others = "sense the scene with one of them, or write the image with .fifesim.to_geotiff(...)"
     description = simulated_product.instrument_of(images, spacecraft_of, others)
-    layers = simulated_product.layers_of(images, description, omitted=(CIRRUS,))
+    layers = simulated_product.layers_of_scene(images, description, omitted=(CIRRUS,))
     spacecraft = spacecraft_of[description.name]
     seen = simulated_product.acquisition_of(images, spacecraft, SENTINEL2_LAUNCHES[spacecraft], None)
     grid = grids.geobox(images[0])
@@ -231,7 +231,7 @@ def _text_of_scene(seen, grid, description):
     corners = [(box.left, box.top), (box.right, box.top), (box.right, box.bottom), (box.left, box.bottom)]
     places = [to_degrees.transform(*corner) for corner in (*corners, corners[0])]
     return {
-        "statement": simulated_product.statement(),
+        "statement": simulated_product.simulation_statement(),
         "start": f"{sensing[:23]}Z",
         "sensing": f"{sensing}Z",
         "quantification": round(1 / description.product.gain),

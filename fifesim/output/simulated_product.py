@@ -54,7 +54,7 @@ _SUN = 1.0
 _DISTANCE = 5e-4
 
 
-def statement():
+def simulation_statement():
     """Sentence that a product is simulated."""
     return f"Simulated scene made by fifesim {importlib.metadata.version('fifesim')}, not an observation by a satellite"
 
@@ -82,7 +82,7 @@ class Acquisition:
     earth_sun_distance: float  # [astronomical unit]
 
 
-def images_of(images):
+def images_of_scene(images):
     """Images of a scene as a list of arrays with dims (band, y, x)."""
     nodes = [images]
     if isinstance(images, xr.DataTree):
@@ -104,7 +104,7 @@ def instrument_of(images, known, others):
     return found
 
 
-def layers_of(images, description: Instrument, omitted=()):
+def layers_of_scene(images, description: Instrument, omitted=()):
     """Layers of images by band name, on the grids of the product; all bands of a pixel size must be given."""
     found, sizes = {}, set()
     for image in images:
@@ -261,7 +261,7 @@ def write_raster(path, values, grid, driver="GTiff", **options):
     ):
         sink.write(layers)
         if driver == "GTiff":
-            sink.update_tags(TIFFTAG_IMAGEDESCRIPTION=statement())
+            sink.update_tags(TIFFTAG_IMAGEDESCRIPTION=simulation_statement())
 
 
 def write_truth(folder, images, truth=None):
@@ -276,7 +276,7 @@ def write_truth(folder, images, truth=None):
         to_geotiff(raster.drop_vars(kept), folder / "truth" / f"{name}.tif")
     image = images[0]
     described = {
-        "statement": statement(),
+        "statement": simulation_statement(),
         "image": {str(key): _plain(value) for key, value in image.attrs.items()},
         "coordinates": {str(key): _plain(each.values) for key, each in image.coords.items() if not each.ndim},
         "bands": [name for each in images for name in map(str, np.atleast_1d(each["band"].values))],
@@ -308,7 +308,7 @@ def product_folder(folder, name, truth=None, *, overwrite=False):
         new, old = Path(hidden) / name, Path(hidden) / "replaced"
         new.mkdir()
         yield new
-        (new / MARK).write_text(f"{statement()}.\nThe truth is in the folder truth.\n", encoding="utf-8")
+        (new / MARK).write_text(f"{simulation_statement()}.\nThe truth is in the folder truth.\n", encoding="utf-8")
         flush(*(path for path in new.rglob("*") if path.is_file()))
         if os.path.lexists(target):
             os.replace(target, old)

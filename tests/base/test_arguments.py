@@ -95,7 +95,10 @@ def scene(tmp_path_factory):
         retrieval = fifesim.train(chips, "line", path=folder / "line.nc")
     designs, weather = {"pixel": [30.0], "registration": [0.0]}, fifesim.models.fife_weather()
     (folder / "responses.csv").write_text("wavelength,red\n0.6,0\n0.65,1\n0.7,0\n", encoding="utf-8")
-    products = {"TM": (30, "1987-06-06T16:35Z", None), "MSI": (10, "2021-06-06T17:10Z", ["MSI2", "MSI3", "MSI4", "MSI8"])}
+    products = {
+        "TM": (30, "1987-06-06T16:35Z", None),
+        "MSI": (10, "2021-06-06T17:10Z", ["MSI2", "MSI3", "MSI4", "MSI8"]),
+    }
     for name, (cell, time, bands) in products.items():
         ground = fifesim.lai_scene(fifesim.grid_at("EPSG:32614", 704940, 4334220, 120, 120, cell), seed=1)
         products[name] = ground.fifesim.surface_reflectance(name, bands=bands, time=time).fifesim.to_toa()
