@@ -22,10 +22,10 @@ from fifesim.ground.terrain.elevation_labels import fine_dem
 from fifesim.output.simulated_product import (
     Truth,
     acquisition_of,
-    images_of,
+    images_of_scene,
     instrument_of,
     product_folder,
-    statement,
+    simulation_statement,
     write_truth,
 )
 from fifesim.sensor.instrument_labels import is_radiance, matching_bands
@@ -139,7 +139,7 @@ def to_envi(
     >>> product.name, len(list(product.glob("*.img")))
     ('emit20230603t171000_simulated', 3)
     """
-    (image,) = images_of(image)
+    (image,) = images_of_scene(image)
     known = ", ".join(_SPECTROMETERS)
     description = instrument_of([image], _SPECTROMETERS, f"only {known} have files in this layout")
     kind = _SPECTROMETERS[description.name]
@@ -238,6 +238,6 @@ def _write(path, layers, grid, names, tags, dtype="float64"):
         sink.descriptions = names
         sink.update_tags(ns="ENVI", **tags)
     # GDAL describes a file by its path at that time.
-    header = Path(path).with_suffix(".hdr")
-    text = re.sub(r"description = \{[^}]*\}", f"description = {{{statement()}}}", header.read_text(encoding="utf-8"))
+    header, described = Path(path).with_suffix(".hdr"), f"description = {{{simulation_statement()}}}"
+    text = re.sub(r"description = \{[^}]*\}", described, header.read_text(encoding="utf-8"))
     header.write_text(text, encoding="utf-8")
