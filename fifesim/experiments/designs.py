@@ -65,7 +65,7 @@ def trade(
         Ground, light and air: leaf area of one stand or a learned landscape on level ground, without clouds. By default
         the learned landscape of ``fifesim.Scenario()`` with uniform soil and dead leaves.
     weather : Weather, optional
-        Numbers for the production; by default `fife_weather`, which is assumed.
+        Numbers for the production; by default `fife_weather`, which is assumed, with a warning outside the FIFE site.
 
     Returns
     -------
@@ -104,9 +104,10 @@ def trade(
         scenario = Scenario(ground=ground, terrain={"dem": "flat"})
     axes = _axes(own, designs)
     blurs = [own.replace(mtf=float(each)) for each in axes["mtf"]] if "mtf" in designs else [own, *_ends(own)]
+    target = target_of("gpp", scenario, weather)
     # Threads of BLAS take 50 times as long for matrices of this size if a core is busy.
     with threadpool_limits(1, user_api="blas"):
-        parts = [_scatter(own, pair, blurs, axes, scenario, weather) for pair in axes["bands"]]
+        parts = [_scatter(own, pair, blurs, axes, scenario, target) for pair in axes["bands"]]
     slope, rmse, scatter = (np.stack(each) for each in zip(*parts, strict=True))
     # The last two instruments are the ends of an uncertain blur.
     count = len(axes["mtf"])
@@ -166,7 +167,7 @@ def _ends(own):
         return []
 
 
-def _scatter(own, pair, blurs, axes, scenario, weather):
+def _scatter(own, pair, blurs, axes, scenario, target):
     """Slope and rmse, shape (variable, pixel, blur, registration, snr), and scatter by blur, registration and noise."""
     bands = sorted(own.select(pair), key=lambda band: band.wavelength)
     if unknown := [band.name for band in bands if band.noise is None]:
@@ -181,7 +182,7 @@ def _scatter(own, pair, blurs, axes, scenario, weather):
         raise ValueError(f"a trade study does not hold: {'; '.join(reasons)}. Or simulate with fifesim.scenario.sweep")
     seen = [_footprints(scenario, size, blurs, bands, axes["registration"]) for size in axes["pixel"]]
     covariances = Covariances(scenario, max(reach_of([each for pair in rows for each in pair]) for rows in seen))
-    made = of_pixels(covariances.scene, target_of("gpp", weather), mean_canopy(covariances.scene), covariances.areas)
+    made = of_pixels(covariances.scene, target, mean_canopy(covariances.scene), covariances.areas)
     gpp = np.interp(covariances.lai, covariances.areas, made)
     covariances.prepared.properties["gpp"] = coefficients(gpp)
     shape = len(seen), len(blurs) + 1, len(axes["registration"]) + 1

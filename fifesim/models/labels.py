@@ -37,7 +37,7 @@ from fifesim.models import evaporation, production
 from fifesim.models.daylight import declination, sun_at, suns_of_day
 from fifesim.models.production import CARBON
 from fifesim.models.radiation import two_stream
-from fifesim.models.weather import Weather, check_order, check_weather, fife_weather
+from fifesim.models.weather import Weather, check_order, check_weather, weather_over
 
 # Cells at a time, so that intermediate results stay in the cache of the processor: 2 to 5 times as fast as whole
 # rasters.
@@ -364,14 +364,7 @@ def _map(quantity, lai, weather, name, fpar, canopy, atmosphere, geometry, time,
     """Labelled result of a model, dims (y, x)."""
     land, model = land_of(lai), LAND_MODELS[quantity]["light-use" if name == "MOD17" else name]
     area = checked_scene(north_up(land.lai))
-    if weather is None:
-        weather = fife_weather()
-        if not is_fife(area):
-            warn(
-                f"the weather over {area.name or 'the raster'} is unknown: using an assumed June day of the FIFE site, "
-                f"{weather.temperature:g} K, {weather.shortwave:g} W m-2 and {weather.day_length:g} h; give "
-                "weather=fifesim.models.Weather(...)"
-            )
+    weather = weather_over(area.name or "the raster", weather, is_fife(area))
     if model.of_green_leaves and fpar is not None:
         raise ValueError(f"fpar has no effect with model={name!r}, which takes leaf area: leave it out")
     if name != "farquhar" and pathway is not None:

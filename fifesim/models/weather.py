@@ -215,6 +215,19 @@ def check_order(weather):
             )
 
 
+def weather_over(place, weather=None, is_on_site=False):
+    """Given weather, else `fife_weather`, with a warning if the place is not the FIFE site."""
+    if weather is not None:
+        return weather
+    weather = fife_weather()
+    if not is_on_site:
+        warn(
+            f"the weather over {place} is unknown: using an assumed June day of the FIFE site, {weather.temperature:g} "
+            f"K, {weather.shortwave:g} W m-2 and {weather.day_length:g} h; give weather=fifesim.models.Weather(...)"
+        )
+    return weather
+
+
 def fife_weather() -> Weather:
     """
     Weather of a typical clear June day at the FIFE site. The numbers are assumed, not measured.

@@ -112,8 +112,9 @@ def capital(text):
 def unit(array):
     """Unit of a quantity in brackets, with raised exponents."""
     units = str(array.attrs.get("units", ""))
-    known = cf.QUANTITIES.get(array.name)
-    return _printed((known and known.shown_units) or units)
+    known = cf.QUANTITIES.get(array.name, _UNKNOWN)
+    # A flux at one time has other units than the sum of a day.
+    return _printed(known.shown_units if known.shown_units and units in ("", known.units) else units)
 
 
 def _printed(units):

@@ -22,7 +22,7 @@ from fifesim.scenario.ensemble import realise
 from fifesim.scenario.scenario import grid_keys, is_on_site, summary, time_in_words
 from fifesim.scenario.simulation import setup_of
 from fifesim.sensor.description.listing import blur_in_words, noise_in_words, sensor_in_words
-from fifesim.sensor.description.provenance import origins_in_words
+from fifesim.sensor.description.provenance import geolocation_in_words, origins_in_words
 from fifesim.sensor.description.spatial_response import knows_blur
 from fifesim.sensor.labels import to_reflectance
 
@@ -203,7 +203,7 @@ _MOST = 600
 _ENGINE_BOUND = 0.02
 
 
-def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
+def run_page(scenario, image, truth, detail, terrain, level, fits, reasons, files=()):
     """Quicklook PNG and self-contained HTML page of a run."""
     # Pixels and their truth are paired by row and column.
     step = -(-max(rasters.sizes[axis] for rasters in (image, truth) for axis in ("y", "x")) // _MOST)
@@ -225,7 +225,9 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
         published=published(scenario, fits),
         valid=float((dn != 0).all("band").mean()),
         saturated=(dn >= 2**own.description.bits - 1).any("band"),
-        words={"sensor": sensor_in_words, "blur": blur_in_words, "noise": noise_in_words, "origin": origins_in_words},
+        inputs=input_rows(scenario),
+        geolocation=geolocation_in_words(own.description),
+        files=files,
         statistics=_statistics(image, truth),
         seen={"whole": whole, "close": close, "colours": false_colour_names(dn)},
         maps=_maps(shown, means, fits),
@@ -319,10 +321,27 @@ def engine_rows(scenario):
     if scenario.atmosphere.engine != "5S":
         return []
     error = engine_error(setup_of(scenario))
-    text = ", ".join(f"{band} {100 * each:+.1f} %" for band, each in error.items())
+    text = ", ".join(f"{band} {fixed(100 * each, 1, True)} %" for band, each in error.items())
     outside = ", ".join(band for band, each in error.items() if abs(each) > _ENGINE_BOUND)
     advice = f'beyond 2 % in {outside}: engine = "successive-orders" is closer' if outside else "within 2 %"
     return [(f"5S minus successive orders, for a canopy with LAI {TYPICAL_LAI:g}", f"{text}; {advice}")]
+
+
+def input_rows(scenario):
+    """Inputs of a complete scenario in words, by name."""
+    own, air, grid = scenario.sensor, scenario.model_atmosphere(), scenario.grid
+    haze = f"aerosol thickness {air.aot:g}" if air.visibility is None else f"visibility {air.visibility:g} km"
+    return {
+        "Scene": f"{grid.width / 1000:g} km x {grid.height / 1000:g} km in cells of {grid.cell:.3g} m",
+        "Ground": ground_in_words(scenario),
+        "Terrain": "level" if scenario.terrain.dem == "flat" else Path(scenario.terrain.dem).name,
+        "Sensor": sensor_in_words(own.description, own.bands),
+        "Blur": blur_in_words(own.description, own.bands),
+        "Noise": noise_in_words(own.description, own.bands, own.noise),
+        "Registration error": "{:g} and {:g} pixels southward and eastward".format(*own.offset),
+        "Origin of the description": origins_in_words(own.description, own.bands),
+        "Atmosphere": f"{air.profile} atmosphere, {air.aerosol} aerosol, {haze}, {air.engine}",
+    }
 
 
 def ground_in_words(scenario):

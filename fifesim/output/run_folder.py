@@ -161,7 +161,7 @@ def _write_files(scenario, tree, saved, folder, home):
         terrain = xr.Dataset({name: saved[f"terrain-{name}"].compute() for name in tree["terrain"].data_vars})
         terrain.attrs = dict(tree["terrain"].attrs)
     detail = saved["detail"].compute()
-    quicklook, page = report.run_page(scenario, image, truth, detail, terrain, level, *_fits(image, truth))
+    quicklook, page = report.run_page(scenario, image, truth, detail, terrain, level, *_fits(image, truth), FILES)
     (folder / "quicklook.png").write_bytes(quicklook)
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / identity.SCENARIO).write_text(write_scenario(scenario), encoding="utf-8")

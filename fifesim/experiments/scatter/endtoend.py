@@ -19,8 +19,10 @@ from fifesim.grids import grid as grids
 from fifesim.models.weather import WEATHER_LIMITS
 from fifesim.output import report
 from fifesim.output.colours import percentile_limits
+from fifesim.output.colours import unit as unit_of
 from fifesim.output.folders import check_folder, results
-from fifesim.output.maps import image_map, stretch_of
+from fifesim.output.maps import image_map, stretch_of, value_map
+from fifesim.output.report import fixed
 from fifesim.output.workers import check_memory_of_cells
 from fifesim.retrieval.description import Retrieval
 from fifesim.retrieval.labels import retrieve
@@ -30,11 +32,11 @@ from fifesim.scenario.toml import write_scenario
 from fifesim.sensor.labels import to_reflectance
 
 _TEMPLATE = Path(__file__).with_name("endtoend.html.j2")
-ENDTOEND_FILES = ("budget.csv", "budget.png", "maps.png", "report.html", "scenario.toml")
+ENDTOEND_FILES = ("budget.csv", "budget.png", "report.html", "scenario.toml")
 _DPI = 160
 _COLOURS = {"bias": "#0072B2", "variance": "#E69F00"}
 _LAI = (0.0, 20.0)
-LEVEL = 0.8
+LEVEL = 0.95
 """Level of the interval of retrieved leaf area on the page. [1]"""
 
 
@@ -42,23 +44,27 @@ def endtoend_to_folder(
     scenario, folder, *, quantity="gpp", retrieval="line", weather=None, realisations=20, cells=333, seed=None,
     overwrite=False,
 ):  # fmt: skip
-    """Write the end-to-end report of a scenario: report.html, its two pictures, budget.csv and scenario.toml."""
+    """Write the end-to-end report of a scenario: report.html, budget.csv, its chart and scenario.toml."""
     folder = Path(folder)
     check_folder(folder, overwrite)
     complete = (default_scenario() if scenario is None else scenario).complete()
-    target = errors.target_of(quantity, weather)
+    target = errors.target_of(quantity, complete, weather)
     check_memory_of_cells(min(cells, *complete.geobox().shape))
     options = {"realisations": realisations, "cells": cells, "seed": seed}
     with results(folder, ENDTOEND_FILES, overwrite=overwrite) as partial:
-        found = scatter.budget(complete, quantity=quantity, retrieval=retrieval, weather=weather, **options)
+        found = scatter.budget(complete, quantity=quantity, retrieval=retrieval, weather=target.weather, **options)
         table = error_table(found)
         table.to_csv(partial / "budget.csv", index=False, float_format="%.6g")
         case = scatter.budget_cases(complete, **options)[0]
         chart = report.png(error_chart(table, target), _DPI)
-        maps = report.png(map_figure(case, target, retrieval), _DPI)
         (partial / "budget.png").write_bytes(chart)
-        (partial / "maps.png").write_bytes(maps)
-        page = endtoend_page(case, found, table, target, retrieval, maps, chart)
+        command = f"fifesim endtoend scenario.toml -o FOLDER --quantity {quantity} --realisations {realisations}"
+        command += f" --cells {cells} --seed {complete.ground.seed if seed is None else seed}"
+        if isinstance(retrieval, Retrieval):
+            command += " --retrieval FILE"
+        if weather is not None:
+            command += ", which takes the default weather instead of the given one"
+        page = endtoend_page(case, found, table, target, retrieval, chart, command)
         (partial / "report.html").write_text(page, encoding="utf-8")
         (partial / "scenario.toml").write_text(write_scenario(complete), encoding="utf-8")
     return [folder / name for name in ENDTOEND_FILES]
@@ -101,61 +107,61 @@ def _word(target):
     return cf.QUANTITIES[target.quantity].label if target.quantity else target.name
 
 
-def map_figure(case, target, retrieval):
-    """Maps of one realisation: truth, image, retrieved leaf area and its interval, model and difference."""
+def maps_of(case, target, retrieval):
+    """Maps of leaf area and of the quantity of one realisation, and a sentence on the interval of leaf area."""
     run = simulate(case)
     image = run["image"]["dn"].compute()
-    lai, width = estimated(image, run["truth"]["lai"].compute(), retrieval)
     scene = scene_of(case, retrieval if isinstance(retrieval, Retrieval) else None)
-    ground = scene.ground(IDEAL_PROPERTIES)
-    cells = ground.land["lai"].copy(data=errors.of_cells(scene, target, ground))
+    ground, kind = scene.ground(IDEAL_PROPERTIES), target.quantity or target.name
+    cells = ground.land["lai"].copy(data=errors.of_cells(scene, target, ground)).rename(kind)
     blocks = aggregate_blocks(cells, grids.cell_size(scene.blocks)[0], min_valid=scene.setup.min_valid)
-    blocks = blocks.isel(y=slice(lai.sizes["y"]), x=slice(lai.sizes["x"]))
-    rows, columns = blocks.shape
-    lai, width = (each.isel(y=slice(rows), x=slice(columns)) for each in (lai, width))
+    true_lai = run["truth"]["lai"].compute()
+    lai, low, high = estimated(image, true_lai, retrieval)
+    common = {axis: slice(min(blocks.sizes[axis], lai.sizes[axis])) for axis in ("y", "x")}
+    blocks, lai, low, high, true_lai = (each.isel(common) for each in (blocks, lai, low, high, true_lai))
     area = np.clip(lai.values, 0, None)
-    model = lai.copy(data=errors.of_pixels(scene, target, errors.mean_canopy(scene), area))
-    difference = model.copy(data=model.values - blocks.values)
-    word, unit = _word(target), f" [{target.units}]" if target.units not in ("", "1") else ""
-    cell, pixel = (grids.cell_size(grids.geobox(each))[1] for each in (cells, image))
-    limits = percentile_limits(blocks.rename("truth"))
-    spread = float(np.nanpercentile(np.abs(difference.values), 98)) or 1.0
-    panels = [
-        (cells, f"1. Truth: {word} of cells of {cell:.3g} m{unit}", "YlGn", percentile_limits(cells)),
-        (None, f"2. Image in pixels of {pixel:.3g} m", None, None),
-        (lai, "3. Retrieved LAI", "YlGn", (0.0, max(percentile_limits(lai)[1], 0.1))),
-        (width, f"4. Width of the {100 * LEVEL:g} % interval of LAI", "viridis", (0.0, percentile_limits(width)[1])),
-        (model, f"5. {word} from retrieved LAI{unit}", "YlGn", limits),
-        (difference, f"6. Model minus mean truth{unit}", "RdBu_r", (-spread, spread)),
-    ]
-    figure = Figure(figsize=(10.2, 6.9), layout="constrained")
-    for axis, (values, text, colours, ends) in zip(figure.subplots(2, 3).ravel(), panels, strict=True):
-        axis.set_title(text, fontsize=9)
-        axis.set_xticks([])
-        axis.set_yticks([])
-        if values is None:
-            axis.imshow(image_map(image, "", stretch_of(image)).pixels, interpolation="nearest")
-            continue
-        low, high = ends
-        high = high if high > low else low + 1e-6
-        shown = axis.imshow(values.values, cmap=colours, vmin=low, vmax=high, interpolation="nearest")
-        figure.colorbar(shown, ax=axis, orientation="horizontal", shrink=0.8, pad=0.02).ax.tick_params(labelsize=7.5)
-    return figure
+    model = lai.copy(data=errors.of_pixels(scene, target, errors.mean_canopy(scene), area)).rename(kind)
+    word, cell = _word(target), grids.cell_size(grids.geobox(cells))[1]
+    unit = f" {unit_of(cells.assign_attrs(units=target.units))}".rstrip()
+    # One range for the maps of a quantity, that of its most variable map.
+    limits, lai_limits = percentile_limits(cells), percentile_limits(true_lai)
+    known, truth = np.isfinite(lai.values) & np.isfinite(true_lai.values), true_lai.values
+    within = np.mean((low.values <= truth)[known] & (truth <= high.values)[known])
+    width = lai.copy(data=high.values - low.values).rename("width")
+    text = f"The true LAI is within the {100 * LEVEL:g} % interval of the retrieved LAI in {100 * within:.0f} % of the pixels."
+    if isinstance(retrieval, Retrieval):
+        fourth = value_map(width, f"Width of the {100 * LEVEL:g} % interval of LAI")
+    else:
+        fourth = value_map(lai.copy(data=lai.values - truth), "Retrieved minus true LAI", "RdBu_r", middle=0.0)
+        text += f" A line on NDVI has one width of this interval, ± {fixed(float(width.median()) / 2)} in LAI."
+    pixel = grids.cell_size(grids.geobox(image))[1]
+    return [
+        image_map(image, f"Image in pixels of {pixel:.3g} m", stretch_of(image)),
+        value_map(true_lai, "True LAI, mean over pixels", limits=lai_limits),
+        value_map(lai, "Retrieved LAI", limits=lai_limits),
+        fourth,
+        value_map(cells, f"True {word} in cells of {cell:.3g} m{unit}", limits=limits),
+        value_map(blocks, f"True {word}, mean over pixels{unit}", limits=limits),
+        value_map(model, f"{word} from retrieved LAI{unit}", limits=limits),
+        value_map(
+            model.copy(data=model.values - blocks.values), f"Difference of the last two{unit}", "RdBu_r", middle=0.0
+        ),
+    ], text
 
 
 def estimated(image, truth, retrieval):
-    """Retrieved leaf area and the width of its interval, dims (y, x). [m2 m-2]"""
+    """Retrieved leaf area and the ends of its interval, dims (y, x). [m2 m-2]"""
     if isinstance(retrieval, Retrieval):
         level = min(retrieval.levels, key=lambda each: abs(each - LEVEL))
         found = retrieve(to_reflectance(image), retrieval, [level])
-        return found["lai"], (found["lai_high"] - found["lai_low"]).isel(level=0)
+        return found["lai"], *(found[name].isel(level=0) for name in ("lai_low", "lai_high"))
     seen = ndvi_of(image)
     line = regress(truth, seen, pair="index")
-    low, high = np.clip(line.prediction_interval(seen.values, LEVEL), *_LAI)
-    return seen.copy(data=np.clip(line.predict(seen.values), *_LAI)), seen.copy(data=high - low)
+    ends = line.predict(seen.values), *line.prediction_interval(seen.values, LEVEL)
+    return tuple(seen.copy(data=np.clip(each, *_LAI)).rename("lai") for each in ends)
 
 
-def endtoend_page(case, budget, table, target, retrieval, maps, chart):
+def endtoend_page(case, budget, table, target, retrieval, chart, command):
     """One self-contained HTML page."""
     rows = table.set_index("stage").to_dict("index")
     parts = {name: row for name, row in rows.items() if name != scatter.TOTAL}
@@ -169,23 +175,13 @@ def endtoend_page(case, budget, table, target, retrieval, maps, chart):
         method = f"{retrieval.method} trained on images of {retrieval.instrument}; prior: {retrieval.prior}"
     else:
         method = "line of true LAI on NDVI, fitted to each set of stages"
+    maps, interval = maps_of(case, target, retrieval)
     return report.page_html(
-        _TEMPLATE, title=report.title(case), word=_word(target), units=target.units, rows=rows, parts=parts,
+        _TEMPLATE, title=report.title(case), word=_word(target), rows=rows, parts=parts,
+        units=unit_of(budget.truth.assign_attrs(units=target.units).rename(target.quantity)).strip("[]"),
         stages=errors.ERROR_STAGES, total=scatter.TOTAL, largest=largest, mean=mean, deviation=deviation,
         varies=float(np.sqrt(budget.truth_variance.mean())), model=target.name, method=method, weather=weather,
-        scenario=case, inputs=_inputs(case), realisations=budget.sizes["realisation"], maps=maps, chart=chart,
+        ideal={name: state for name, state in errors.ERROR_STAGES.items() if name not in parts},
+        inputs=report.input_rows(case), realisations=budget.sizes["realisation"], maps=maps, interval=interval,
+        chart=chart, command=command, files=ENDTOEND_FILES,
     )  # fmt: skip
-
-
-def _inputs(case):
-    """Main inputs of a realisation, as name and text."""
-    own, air, grid = case.sensor, case.atmosphere, case.grid
-    offset = f"{own.offset[0]:g} and {own.offset[1]:g} pixels southward and eastward"
-    return [
-        ("Scene", f"{grid.width:.0f} m x {grid.height:.0f} m in cells of {grid.cell:.3g} m"),
-        ("Ground", report.ground_in_words(case)),
-        ("Instrument", f"{own.description.name}, pixels of {own.size:g} m"),
-        ("Registration error", offset),
-        ("Noise", ", ".join(own.noise) or "none"),
-        ("Air", f"{air.profile}, {air.aerosol} aerosol, {air.engine}"),
-    ]

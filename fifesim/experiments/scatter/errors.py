@@ -28,9 +28,10 @@ from fifesim.grids import grid as grids
 from fifesim.grids.sites import on_fife_site
 from fifesim.ground.canopy.description import is_raster
 from fifesim.models import labels as models
-from fifesim.models.weather import fife_weather
+from fifesim.models.weather import weather_over
 from fifesim.retrieval.description import Retrieval
 from fifesim.scenario.ground import drawn_properties, spectral_canopy
+from fifesim.scenario.scenario import is_on_site
 
 QuantityOrFunction: TypeAlias = Annotated[
     str | Callable[..., Any],
@@ -61,9 +62,8 @@ class Target(NamedTuple):
         return cf.QUANTITIES[self.quantity].units if self.quantity else ""
 
 
-def target_of(quantity, weather=None):
-    """Target of a name or function."""
-    weather = fife_weather() if weather is None else weather
+def target_of(quantity, scenario, weather=None):
+    """Target of a name or function, with the weather over a scenario."""
     if callable(quantity):
         name = getattr(quantity, "__name__", type(quantity).__name__)
         return Target(name, "", quantity, weather, _arguments(quantity, name) == 2)
@@ -73,6 +73,7 @@ def target_of(quantity, weather=None):
     for kind, each in models.LAND_MODELS.items():
         name = known.get(quantity, quantity)
         if name in each and quantity in (kind, name):
+            weather = weather_over("the scene", weather, is_on_site(scenario))
             varying = [field for field in each[name].weather if is_raster(getattr(weather, field))]
             if varying:
                 raise ValueError(f"the quantity needs weather of numbers, got a raster of {', '.join(varying)}")

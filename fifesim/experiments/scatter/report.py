@@ -18,10 +18,11 @@ from fifesim.output.workers import check_memory_of_cells
 from fifesim.scenario.scenario import default_scenario
 from fifesim.scenario.toml import write_scenario
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.description.listing import blur_in_words, noise_in_words
-from fifesim.sensor.description.provenance import DASH, origins_in_words
+from fifesim.sensor.description.provenance import DASH
 
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
+_LANDSCAPE = "landscape.json"
+BUDGET_FILES = ("budget.csv", "budget.png", "report.html", "scenario.toml")
 
 # Colours of Okabe and Ito, suitable for colour-blind readers; hatches differ in grey too.
 _STYLES = {"lai": ("#0072B2", ""), "fpar": ("#E69F00", "////")}
@@ -65,8 +66,7 @@ def draw_bars(axis, at, share, error, height, missing, **style):
     for y, value, spread in zip(at, share, error, strict=True):
         if np.isnan(value):
             axis.barh(y, longest, height, color="none", edgecolor="#999999", hatch="xxxx", linewidth=0)
-        # A stage without any effect is already ideal.
-        text = missing if np.isnan(value) else "0" if value == 0 else fixed(value, 1)
+        text = missing if np.isnan(value) else fixed(value, 1)
         # Place the text beyond the end of bar and whisker.
         end = longest if np.isnan(value) else max(value + spread, 0)
         axis.annotate(text, (end, y), (5, 0), textcoords="offset points", va="center", fontsize=7)
@@ -85,17 +85,18 @@ def finish_bars(axis, names, label):
 
 
 def _shown(table):
-    """Stages with their ideal states; stages of the ground only if it has them."""
-    shares = table.groupby("stage")["share"].apply(lambda values: values.fillna(0).any())
-    return {
-        stage: ideal for stage, ideal in STAGES.items() if stage not in ("coupling", *IDEAL_PROPERTIES) or shares[stage]
-    }
+    """Stages that have an effect, or an unknown one, with their ideal states."""
+    shares = table.groupby("stage")["share"].apply(lambda values: (values != 0).any())
+    return {stage: ideal for stage, ideal in STAGES.items() if shares[stage]}
 
 
 def mechanisms(budget):
-    """Shares of the mechanisms discussed in the paper. [1]"""
+    """Shares of the mechanisms discussed in the paper, by the stages that have an effect. [1]"""
     rows = []
-    for name, parts in MECHANISMS.items():
+    for name, all_parts in MECHANISMS.items():
+        parts = [part for part in all_parts if part == CURVATURE or (budget["share"].sel(stage=part) != 0).any()]
+        if not parts:
+            continue
         row = {"name": name, "parts": " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))}
         each = [budget["curvature"] if part == CURVATURE else budget["share"].sel(stage=part) for part in parts]
         # An unknown part is left out; a mechanism with unknown parts only is unknown.
@@ -108,19 +109,17 @@ def mechanisms(budget):
     return rows
 
 
-def budget_page(scenario, budget, table, picture, run, ends=None):
+def budget_page(scenario, budget, table, picture, run, files=BUDGET_FILES, ends=None):
     """One self-contained HTML page of a budget."""
     by_variable = {name: table[table["variable"] == name].set_index("stage").to_dict("index") for name in VARIABLES}
-    found, own = mechanisms(budget), scenario.sensor
+    found, shown = mechanisms(budget), _shown(table)
     unknown = [stage for stage, row in by_variable["lai"].items() if row["origin"] == DASH and np.isnan(row["share"])]
     return report.page_html(
-        _TEMPLATE, title=title(scenario), scenario=scenario, stages=_shown(table), variables=VARIABLES,
-        native_interval=instrument(own.instrument).ground_interval, drift=_drift(scenario, run),
-        blur=blur_in_words(own.description, own.bands), noise=noise_in_words(own.description, own.bands, own.noise),
-        ground="level" if scenario.terrain.dem == "flat" else Path(scenario.terrain.dem).name,
+        _TEMPLATE, title=title(scenario), scenario=scenario, stages=shown, variables=VARIABLES,
+        ideal={name: state for name, state in STAGES.items() if name not in shown},
+        native_interval=instrument(scenario.sensor.instrument).ground_interval, drift=_drift(scenario, run),
         rows=by_variable, mechanisms=found, largest=max(found, key=lambda row: np.nan_to_num(row["lai"]["share"])),
-        origins=origins_in_words(own.description, own.bands), ends=ends,
-        unknown=unknown,
+        inputs=report.input_rows(scenario), ends=ends, unknown=unknown, files=files,
         curvature=CURVATURE, total=TOTAL, variation=VARIATION, run=run, chart=picture,
     )  # fmt: skip
 
@@ -134,9 +133,6 @@ def _drift(scenario, run):
     length = run["columns"] * grids.cell_size(scenario.geobox())[1]
     return (min(int(length / interval), int(length / size)) - 0.5) * abs(interval - size)
 
-
-_LANDSCAPE = "landscape.json"
-BUDGET_FILES = ("budget.csv", "budget.png", "report.html", "scenario.toml")
 
 _DPI = 200
 
@@ -159,13 +155,13 @@ def budget_to_folder(scenario, folder, *, realisations=20, cells=333, seed=None,
         found = scatter.budget(complete, **options)
         table = scatter.budget_table(found)
         rows, columns = (min(cells, size) for size in complete.geobox().shape)
-        run = {"realisations": found.sizes["realisation"], "rows": rows, "columns": columns}
+        run = {"realisations": found.sizes["realisation"], "rows": rows, "columns": columns, "cells": cells}
         run["seed"] = complete.ground.seed if seed is None else seed
         table.to_csv(partial / "budget.csv", index=False, float_format="%.6g")
         chart = report.png(bar_chart(table), _DPI)
         (partial / "budget.png").write_bytes(chart)
         ends = scatter.total_range(complete, **options, each=iter)
-        page = budget_page(complete, found, table, chart, run, ends)
+        page = budget_page(complete, found, table, chart, run, names, ends)
         (partial / "report.html").write_text(page, encoding="utf-8")
         (partial / "scenario.toml").write_text(write_scenario(shown), encoding="utf-8")
     return [folder / name for name in names]

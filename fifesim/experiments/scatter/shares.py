@@ -101,7 +101,7 @@ def budget(
         `fifesim.train`, which estimates LAI from reflectance. Stages that it needs cannot be made ideal: their shares
         are NaN, and the coordinate ``reason`` states why.
     weather : Weather, optional
-        Numbers for the models; by default `fife_weather`, which is assumed.
+        Numbers for the models; by default `fife_weather`, which is assumed, with a warning outside the FIFE site.
     realisations : int, optional
         Number of realisations, with different seeds and, if possible, different windows of the grid. For a LAI map, the
         number of windows is the maximum.
@@ -162,7 +162,7 @@ def budget(
     _check_map(scenario)
     warn_of_scenario_pixels(scenario)
     if quantity is not None:
-        target = target_of(quantity, weather)
+        target = target_of(quantity, scenario, weather)
         check_retrieval(retrieval, scenario)
     elif retrieval != "line" or weather is not None:
         raise ValueError("retrieval and weather have an effect only with a quantity: give quantity='gpp' too")

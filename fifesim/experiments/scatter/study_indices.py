@@ -41,7 +41,7 @@ def sensitivity(
     n : int, optional
         Number of points; k parameters take n (k + 2) evaluations. A power of 2 is best.
     weather : Weather, optional
-        Numbers for the models; by default `fife_weather`, which is assumed.
+        Numbers for the models; by default `fife_weather`, which is assumed, with a warning outside the FIFE site.
     each : callable, optional
         Wrapper of the sequence of points to show progress; by default a bar on a terminal or in a notebook.
 
@@ -82,7 +82,7 @@ def sensitivity(
     sets = sobol_points(points(study.sequence, study.seed, _STREAM, n, 2 * len(keys)))
     shares = sets.reshape(-1, len(keys))
     drawn = [one.quantile(column) for one, column in zip(distributions.values(), shares.T, strict=True)]
-    measure = quantity if callable(quantity) else _mean_of(target_of(quantity, weather))
+    measure = quantity if callable(quantity) else _mean_of(target_of(quantity, study.scenario, weather))
     numbers = range(len(shares))
     shown = steps(numbers, "point by point") if each is None else each(numbers)
     found = []

@@ -98,7 +98,17 @@ def origin_text(instrument, quantity, bands=None):
 
 def origins_in_words(instrument, bands=None):
     """Origins of blur, noise and geolocation of some bands, in one line."""
-    return "; ".join(f"{quantity} {origin_text(instrument, quantity, bands)}" for quantity in NUMBER_OF)
+    texts = {each: f"{each} {origin_text(instrument, each, bands)}" for each in NUMBER_OF}
+    if instrument.geolocation is not None:
+        texts["geolocation"] = f"geolocation error {geolocation_in_words(instrument)}"
+    return "; ".join(texts.values())
+
+
+def geolocation_in_words(instrument):
+    """Geolocation error of an instrument with its origin, empty if it is unknown."""
+    if instrument.geolocation is None:
+        return ""
+    return f"{instrument.geolocation:g} m ({origin_text(instrument, 'geolocation')})"
 
 
 def mixed_origins(selected, quantities):
