@@ -36,8 +36,10 @@ ENDTOEND_FILES = ("budget.csv", "budget.png", "report.html", "scenario.toml")
 _DPI = 160
 _COLOURS = {"bias": "#0072B2", "variance": "#E69F00"}
 _LAI = (0.0, 20.0)
+# Relative difference of widths of intervals that is not shown as a map. [1]
+_SAME = 0.1
 LEVEL = 0.95
-"""Level of the interval of retrieved leaf area on the page. [1]"""
+"""Preferred level of the interval of retrieved leaf area on the page, as in the report of a run. [1]"""
 
 
 def endtoend_to_folder(
@@ -122,19 +124,21 @@ def maps_of(case, target, retrieval):
     area = np.clip(lai.values, 0, None)
     model = lai.copy(data=errors.of_pixels(scene, target, errors.mean_canopy(scene), area)).rename(kind)
     word, cell = _word(target), grids.cell_size(grids.geobox(cells))[1]
-    unit = f" {unit_of(cells.assign_attrs(units=target.units))}".rstrip()
+    unit = f" {unit_of(cells.assign_attrs(units=target.units))}".rstrip().replace(" ", "\N{NO-BREAK SPACE}")
     # One range for the maps of a quantity, that of its most variable map.
     limits, lai_limits = percentile_limits(cells), percentile_limits(true_lai)
     known, truth = np.isfinite(lai.values) & np.isfinite(true_lai.values), true_lai.values
     within = np.mean((low.values <= truth)[known] & (truth <= high.values)[known])
     width = lai.copy(data=high.values - low.values).rename("width")
-    text = f"The true LAI is within the {100 * LEVEL:g} % interval of the retrieved LAI in {100 * within:.0f} % of the pixels."
-    if isinstance(retrieval, Retrieval):
-        fourth = value_map(width, f"Width of the {100 * LEVEL:g} % interval of LAI")
+    interval = f"{100 * level_of(retrieval):g} % interval"
+    text = f"The true LAI is within the {interval} of the retrieved LAI in {100 * within:.0f} % of the pixels."
+    narrow, wide = percentile_limits(width)
+    if wide > (1 + _SAME) * narrow:
+        fourth = value_map(width, f"Width of the {interval} of LAI")
     else:
         fourth = value_map(lai.copy(data=lai.values - truth), "Retrieved minus true LAI", "RdBu_r", middle=0.0)
-        text += f" A line on NDVI has one width of this interval, ± {fixed(float(width.median()) / 2)} in LAI."
-    pixel = grids.cell_size(grids.geobox(image))[1]
+        text += f" This interval has nearly the same width in all pixels, ± {fixed(wide / 2)} in LAI."
+    difference, pixel = model.copy(data=model.values - blocks.values), grids.cell_size(grids.geobox(image))[1]
     return [
         image_map(image, f"Image in pixels of {pixel:.3g} m", stretch_of(image)),
         value_map(true_lai, "True LAI, mean over pixels", limits=lai_limits),
@@ -143,22 +147,25 @@ def maps_of(case, target, retrieval):
         value_map(cells, f"True {word} in cells of {cell:.3g} m{unit}", limits=limits),
         value_map(blocks, f"True {word}, mean over pixels{unit}", limits=limits),
         value_map(model, f"{word} from retrieved LAI{unit}", limits=limits),
-        value_map(
-            model.copy(data=model.values - blocks.values), f"Difference of the last two{unit}", "RdBu_r", middle=0.0
-        ),
+        value_map(difference, f"Difference of the last two{unit}", "RdBu_r", middle=0.0),
     ], text
 
 
 def estimated(image, truth, retrieval):
     """Retrieved leaf area and the ends of its interval, dims (y, x). [m2 m-2]"""
     if isinstance(retrieval, Retrieval):
-        level = min(retrieval.levels, key=lambda each: abs(each - LEVEL))
-        found = retrieve(to_reflectance(image), retrieval, [level])
+        found = retrieve(to_reflectance(image), retrieval, [level_of(retrieval)])
         return found["lai"], *(found[name].isel(level=0) for name in ("lai_low", "lai_high"))
     seen = ndvi_of(image)
     line = regress(truth, seen, pair="index")
     ends = line.predict(seen.values), *line.prediction_interval(seen.values, LEVEL)
     return tuple(seen.copy(data=np.clip(each, *_LAI)).rename("lai") for each in ends)
+
+
+def level_of(retrieval):
+    """Level of the interval on the page, of those that a retrieval was calibrated for. [1]"""
+    known = retrieval.levels if isinstance(retrieval, Retrieval) else (LEVEL,)
+    return min(known, key=lambda each: abs(each - LEVEL))
 
 
 def endtoend_page(case, budget, table, target, retrieval, chart, command):

@@ -1,5 +1,7 @@
 """Report page and command of a budget, and budgets of instruments with unknown properties."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -32,6 +34,11 @@ def test_every_stage_belongs_to_one_mechanism():
         assert found == pytest.approx((expected, expected / sum(known.values()), 0), rel=1e-12, abs=1e-12)
 
 
+def row_of(name, text):
+    """Row of a table of inputs."""
+    return f'<tr><th>{name}</th><td class="number">{text}</td></tr>'
+
+
 @pytest.fixture
 def command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -55,7 +62,11 @@ def test_command_writes_table_chart_and_page(command, tmp_path):
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == 1
     total = table[(table["stage"] == "total") & (table["variable"] == "lai")].iloc[0]
-    assert f"{100 * total['share']:.1f}" in page and "<td>Ground</td><td>level</td>" in page
+    assert f"{100 * total['share']:.1f}" in page and row_of("Terrain", "level") in page
+    # A stage without any effect is explained once, instead of rows of 0.
+    assert "noise (none)" in page and not re.search("<td>(noise|clouds|registration)</td>", page)
+    assert [f'<a href="{name}">' in page for name in report.BUDGET_FILES] == [True, True, False, True]
+    assert "fifesim budget scenario.toml -o FOLDER --realisations 2 --cells 333 --seed 7" in page
     first = {name: (tmp_path / "out" / name).read_bytes() for name in report.BUDGET_FILES}
     assert command("mine.toml", "-o", "out", "--realisations", 2).exit_code == 2
     again = command("out/scenario.toml", "-o", "again", "--realisations", 2)
@@ -79,7 +90,7 @@ def test_command_makes_the_budget_of_an_instrument(command, tmp_path):
     assert made.exit_code == 0, made.output
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "only the detector of MSS5, MSS7 is known" in page
-    assert "<td>blur –; noise –; geolocation –</td>" in page
+    assert row_of("Origin of the description", "blur –; noise –; geolocation –") in page
     assert "excludes unknown properties of the instrument: registration, noise" in page
     table = pd.read_csv(tmp_path / "out" / "budget.csv")
     assert table["share_error"].isna().all() and "nan" not in page.split("base64")[0]

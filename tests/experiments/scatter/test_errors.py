@@ -1,14 +1,19 @@
 """Bias and variance of the error of a quantity, by stage, their report, and the sensitivity to parameters."""
 
+import re
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 import fifesim
 from fifesim.analysis.scaling import shapley
 from fifesim.experiments.scatter import endtoend
-from fifesim.experiments.scatter.errors import ERROR_STAGES
+from fifesim.experiments.scatter.errors import ERROR_STAGES, target_of
 from fifesim.experiments.scatter.shares import budget_cases
+from fifesim.output import report
 
 SQUARE = {"west": 707970.0, "north": 4331220.0, "width": 420.0, "height": 420.0}
 BURNED = {"grid": SQUARE, "ground": {"arp": 0.15}, "terrain": {"dem": "flat"}, "sensor": {"offset": [0.3, 0.0]}}
@@ -128,8 +133,51 @@ def test_report_has_the_numbers_of_the_budget(tmp_path):
     np.testing.assert_allclose(table["bias"].drop("total").sum(), table.loc["total", "bias"], rtol=1e-4)
     np.testing.assert_allclose(table["variance"].drop("total").sum(), 100, rtol=1e-4)
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert f"{table.loc['total', 'bias']:+.1f} %" in page and page.count("data:image/png") == 2
+    assert re.search(rf"{re.escape(report.fixed(table.loc['total', 'bias'], 1, True))}<span", page)
+    assert f"Mean {float(found.truth.mean()):.2f} g C m⁻² d⁻¹" in page and "topography (level ground)" in page
+    assert "--quantity gpp --realisations 2 --cells 333 --seed 7" in page
     assert fifesim.scenario.read_scenario(tmp_path / "out" / "scenario.toml").sensor.offset == [0.3, 0.0]
+
+
+def test_maps_of_one_quantity_have_one_range_and_no_map_has_one_colour(retrieval):
+    """Intervals of lines have one width, so the map shows the error of LAI instead; those of a table vary."""
+    (case,) = budget_cases(fifesim.Scenario(**BURNED), realisations=1, cells=333)
+    target = target_of("gpp", case)
+    chip = fifesim.Scenario(grid={"width": 300, "height": 300}, ground={"arp": 0.15}, terrain={"dem": "flat"})
+    study = fifesim.Study(chip, {"visibility": {"uniform": [20, 60]}}, landscapes=10)
+    with pytest.warns(UserWarning, match="few landscapes"):
+        table = fifesim.train(study, "lookup", chips=10)
+    for method, title in (("line", "Retrieved minus"), (retrieval, "Retrieved minus"), (table, "Width of the 95 %")):
+        maps, text = endtoend.maps_of(case, target, method)
+        ticks = [each.bar.ticks if each.bar else None for each in maps]
+        assert ticks[1] == ticks[2] and ticks[4] == ticks[5] == ticks[6] != ticks[1]
+        assert all(len(np.unique(each.pixels.reshape(-1, 3), axis=0)) > 10 for each in maps[1:])
+        assert maps[6].title.split() == ["GPP", "from", "retrieved", "LAI", "[g", "C", "m⁻²", "d⁻¹]"]
+        assert maps[3].title.startswith(title) and ("nearly the same width" in text) is (method is not table)
+    run = fifesim.simulate(case)
+    truth, ndvi = run["truth"]["lai"].values, run["image"]["ndvi"].values
+    both = np.isfinite(ndvi)
+    line = stats.linregress(ndvi[both], truth[both])
+    error = np.abs(truth - line.intercept - line.slope * ndvi)[both]
+    half = 1.96 * np.sqrt((error**2).sum() / (both.sum() - 2))
+    _, text = endtoend.maps_of(case, target, "line")
+    assert f"in {100 * (error < half).mean():.0f} % of the pixels" in text and f"± {half:.1f}" in text
+
+
+def test_weather_outside_the_site_is_assumed_with_a_warning():
+    """Berlin; the scatter of LAI needs no weather, and given weather is taken."""
+    far = BURNED | {
+        "grid": {"crs": "EPSG:32633", "west": 390000.0, "north": 5820000.0, "width": 420.0, "height": 420.0}
+    }
+    far |= {"geometry": {"sza": 30.0, "saa": 150.0}, "atmosphere": {"visibility": 40.0, "altitude": 0.0}}
+    far = fifesim.Scenario(**far)
+    with pytest.warns(UserWarning, match="weather over the scene is unknown.*300 K"):
+        target = target_of("gpp", far)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert target_of("gpp", fifesim.Scenario(**BURNED)).weather == target.weather
+        target_of("lai", far)
+        assert target_of("gpp", far, target.weather.replace(humidity=0.4)).weather.humidity == 0.4
 
 
 def test_sensitivity_matches_a_linear_function():
