@@ -10,7 +10,6 @@ os.environ.setdefault(
 )  # before numpy is loaded: its matrices here are small
 
 from docutils import nodes
-from PIL import Image, ImageChops
 from sphinx.addnodes import pending_xref
 from sphinx.ext import autosummary
 
@@ -23,6 +22,7 @@ import make_bounds
 import make_explorer
 import make_tables
 import make_why_scatter
+import thumbnails
 
 make_api.write()
 make_bounds.write()
@@ -120,6 +120,7 @@ sphinx_gallery_conf = {
     "write_computation_times": False,
     "min_reported_time": 1000,
     "default_thumb_file": None,
+    "image_scrapers": ("thumbnails.scrape",),
 }
 
 # A summary is a first sentence, and these do not end one.
@@ -151,33 +152,14 @@ def _docstring(app, what, name, obj, options, lines):
 
 
 def _thumbnails(app):
-    """Small pictures that show something: the left of each page's first picture, without white margins."""
-    for script in Path(app.srcdir, "gallery_src").rglob("plot_*.py"):
-        images = Path(
-            app.srcdir,
-            "gallery",
-            script.parent.relative_to(Path(app.srcdir, "gallery_src")),
-            "images",
-        )
-        chosen = re.search(
-            r"sphinx_gallery_thumbnail_number = (\d+)", script.read_text("utf-8")
-        )
-        source = images / f"sphx_glr_{script.stem}_{int(chosen[1]) if chosen else 1:03d}.png"
-        if source.exists():
-            _cropped(source).save(images / "thumb" / f"sphx_glr_{script.stem}_thumb.png")
-
-
-def _cropped(source, size=(400, 280)):
-    """A picture without its margins, cut to the proportions of `size`."""
-    picture = Image.open(source).convert("RGB")
-    white = Image.new("RGB", picture.size, "white")
-    picture = picture.crop(ImageChops.difference(picture, white).getbbox())
-    width, height = picture.size
-    if width * size[1] > height * size[0]:
-        picture = picture.crop((0, 0, height * size[0] // size[1], height))
-    else:
-        picture = picture.crop((0, 0, width, width * size[1] // size[0]))
-    return picture.resize(size, Image.Resampling.LANCZOS)
+    """Small pictures of the gallery: one panel of each page."""
+    source = Path(app.srcdir, "gallery_src")
+    for script in source.rglob("plot_*.py"):
+        folder = Path(app.srcdir, "gallery", script.parent.relative_to(source))
+        panel = thumbnails.panel_file(folder, script.stem)
+        if panel.exists():
+            target = folder / "images" / "thumb" / f"sphx_glr_{script.stem}_thumb.png"
+            thumbnails.thumbnail(panel).save(target)
 
 
 def _link_identifiers(app, docname, source):

@@ -1,6 +1,6 @@
 """
-What a composite keeps
-======================
+Errors of four composites
+=========================
 
 A composite chooses one date for each pixel from many dates with clouds, haze and slant views. This page simulates
 14 dates of AVHRR over even grassland, so that every difference from a clear view at nadir is an error, and compares
@@ -15,8 +15,7 @@ import fifesim
 
 # 40 km x 40 km in cells of 1 km, the size of an AVHRR pixel
 grid = fifesim.grid_at("EPSG:26914", 690000, 4310000, 40000, 40000, cell=1000)
-lai = fifesim.cloud_field(grid, 0).optical_thickness * 0 + 1.3
-lai = lai.rename("lai").assign_attrs(units="1", long_name="leaf area index", standard_name="")
+lai = xr.full_like(fifesim.lai_scene(grid), 1.3)
 grass = fifesim.Canopy(
     leaf_optics=fifesim.Leaf(), background=fifesim.Background({"soil_dry": 0.4, "shade": 0.6})
 )
@@ -80,8 +79,10 @@ figure, axes = plt.subplots(
 )
 for axis, (name, values) in zip(axes, composites.items(), strict=True):
     shown = axis.imshow(values - truth, cmap="RdBu_r", vmin=-0.1, vmax=0.1)
-    axis.set(title=name, xticks=[], yticks=[])
-figure.colorbar(shown, ax=axes, label="NDVI less clear nadir view", shrink=0.8)
+    axis.set(title=name.replace("-", " ").capitalize(), xticks=[], yticks=[])
+axes[0].plot([2, 12], [37.5, 37.5], color="black", linewidth=2)
+axes[0].text(7, 36.5, "10 km", ha="center", va="bottom", fontsize=9)
+figure.colorbar(shown, ax=axes, label="NDVI minus clear nadir view", shrink=0.8)
 # sphinx_gallery_end_ignore
 
 # %%
@@ -115,7 +116,7 @@ for count in counts:
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
 left.errorbar(counts, bias, spread, fmt="o-", capsize=2)
 left.axhline(0, color="0.6", linewidth=1)
-left.set(xlabel="dates", ylabel="maximum NDVI less clear nadir view")
+left.set(xlabel="dates", ylabel="maximum NDVI minus clear nadir view")
 right.plot(counts, 100 * np.array(share), "o-", color="#b8860b")
 right.set(xlabel="dates", ylabel="forward views [%]", ylim=(0, 105))
 # sphinx_gallery_end_ignore

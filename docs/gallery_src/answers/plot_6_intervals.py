@@ -1,6 +1,6 @@
 """
-An interval that holds
-======================
+Coverage of intervals of retrieved leaf area
+============================================
 
 The figure shows how often intervals of retrieved leaf area contain the true value, on 40 landscapes that were not used
 for training. Soil, dead leaves, chlorophyll, moisture, texture and haze vary. The images have noise, blur and a

@@ -27,32 +27,27 @@ print(
 )
 
 # %%
-# The lower row shows details of 200 m. The downscaled cells differ from the true cells, which cannot be recovered from
-# the map, but have the same statistics. Pixel borders are not visible.
+# The square on the left is shown in detail (200 m x 200 m). The downscaled cells differ from the true cells, which
+# cannot be recovered from the map, but have the same statistics. Pixel borders are not visible.
 
 # sphinx_gallery_start_ignore
-figure, axes = plt.subplots(2, 3, figsize=(10, 6.2), layout="constrained")
+# thumbnail_panel = 3
+figure, axes = plt.subplots(1, 4, figsize=(12, 3.6), layout="constrained")
+style = {"cmap": "YlGn", "vmin": 0, "vmax": 3.5, "interpolation": "nearest"}
+axes[0].imshow(lai_10m, extent=(0, 3000, 0, 3000), **style)
+axes[0].add_patch(plt.Rectangle((900, 1900), 200, 200, fill=False, edgecolor="black"))
+axes[0].set_title("map, 3 km x 3 km")
 views = {"true ground": ground, "map, 10 m": lai_10m, "downscaled map": fine}
-for column, (title, lai) in zip(axes.T, views.items(), strict=True):
-    for axis, first, last in zip(column, (0, 900), (1500, 1100), strict=True):
-        part = lai[(lai["y"][0] - lai["y"] < last) & (lai["y"][0] - lai["y"] >= first)]
-        part = part[:, (lai["x"] - lai["x"][0] < last) & (lai["x"] - lai["x"][0] >= first)]
-        drawn = axis.imshow(
-            part,
-            cmap="YlGn",
-            vmin=0,
-            vmax=3.5,
-            extent=(first, last, 3000 - last, 3000 - first),
-            interpolation="nearest",
-        )
-        axis.set(xticks=(first, last), yticks=(3000 - last, 3000 - first))
-    column[0].set_title(title)
-    column[0].add_patch(plt.Rectangle((900, 1900), 200, 200, fill=False, edgecolor="black"))
-for axis in axes[1]:
-    axis.set_xlabel("easting [m]")
-for axis in axes[:, 0]:
-    axis.set_ylabel("northing [m]")
-figure.colorbar(drawn, ax=axes, shrink=0.6, label="leaf area index [m² m⁻²]")
+for axis, (title, lai) in zip(axes[1:], views.items(), strict=True):
+    down, across = lai["y"][0] - lai["y"], lai["x"] - lai["x"][0]
+    part = lai[(down >= 900) & (down < 1100)][:, (across >= 900) & (across < 1100)]
+    drawn = axis.imshow(part, extent=(0, 200, 0, 200), **style)
+    axis.set_title(title)
+axes[1].plot([10, 60], [8, 8], color="black", linewidth=2)
+axes[1].text(35, 11, "50 m", ha="center", va="bottom", fontsize=9)
+for axis in axes:
+    axis.set(xticks=[], yticks=[])
+figure.colorbar(drawn, ax=axes, shrink=0.75, label="leaf area index [m² m⁻²]")
 # sphinx_gallery_end_ignore
 
 # %%

@@ -39,20 +39,14 @@ images = {
 }
 for axis, (title, image) in zip(axes, images.items(), strict=True):
     part = image.fifesim.ndvi().sel(x=slice(705000, 705900), y=slice(4334100, 4333200))
-    part.plot.imshow(
-        ax=axis,
-        cmap="viridis",
-        add_labels=False,
-        vmin=0.65,
-        vmax=0.95,
-        add_colorbar=axis is axes[-1],
-    )
-    axis.set(title=f"NDVI, {title}", xticks=[], yticks=[], aspect=1)
+    drawn = axis.imshow(part - part.mean(), cmap="BrBG", vmin=-0.06, vmax=0.06)
+    axis.set(title=f"{title}, mean {float(part.mean()):.3f}", xticks=[], yticks=[])
+figure.colorbar(drawn, ax=axes, label="NDVI minus its mean", shrink=0.8)
 figure.supxlabel("900 m x 900 m", fontsize=9)
 # sphinx_gallery_end_ignore
 
 # %%
-# NDVI of Landsat 5 is lower, because these images are at the top of the atmosphere. The two Landsat images agree.
+# Mean NDVI of Landsat 5 is lower, because these images are at the top of the atmosphere. The two Landsat images agree.
 #
 # **Errors by band.** The next figure compares `adjust_bands`, which uses all bands, with the nearest band. The leaves,
 # leaf angles and soils of this scene are not part of the spectral library.

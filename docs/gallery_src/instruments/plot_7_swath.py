@@ -44,19 +44,28 @@ for axis, west in zip(axes, ends, strict=True):
 # sphinx_gallery_end_ignore
 
 # %%
-# `grid_swath` takes the nearest pixel of each cell (top), or the area-weighted mean of the pixels in a cell (bottom).
+# `grid_swath` takes the nearest pixel of each cell, or the area-weighted mean of the pixels in a cell. A window of 24 km
+# near nadir and its difference:
 
 around = fifesim.grid_at("EPSG:26914", 100e3, 4436e3, 1000e3, 50e3, 2000.0)
+maps = {method: ndvi.fifesim.grid_swath(around, method) for method in ("nearest", "mean")}
 # sphinx_gallery_start_ignore
-figure, axes = plt.subplots(2, 2, figsize=(12, 8), layout="constrained")
-for row, method in zip(axes, ("nearest", "mean"), strict=True):
-    on_map = ndvi.fifesim.grid_swath(around, method)
-    for axis, west in zip(row, ends, strict=True):
-        on_map.fifesim.plot(axes=axis, limits=(0.1, 0.6))
-        axis.set(xlim=(west, west + 60), ylim=(4387, 4435))
-        place = "near nadir" if west == ends[0] else "edge of the swath"
-        axis.set_title(f"{method} pixels on 2 km, {place}", fontsize="medium")
+figure, axes = plt.subplots(1, 3, figsize=(12, 3.9), layout="constrained")
+near = {"x": slice(130e3, 154e3), "y": slice(4424e3, 4400e3)}
+nearest, mean = (each.sel(near).values for each in maps.values())
+extent = (0, 24, 0, 24)
+for axis, values, title in ((axes[0], nearest, "nearest pixel"), (axes[1], mean, "mean of pixels")):
+    drawn = axis.imshow(values, extent=extent, vmin=0.25, vmax=0.45)
+    axis.set_title(f"NDVI, {title}")
+figure.colorbar(drawn, ax=axes[:2], label="NDVI")
+drawn = axes[2].imshow(mean - nearest, extent=extent, cmap="RdBu_r", vmin=-0.05, vmax=0.05)
+axes[2].set_title("mean minus nearest")
+figure.colorbar(drawn, ax=axes[2], label="difference of NDVI")
+for axis in axes:
+    axis.set(xlabel="km", xticks=[0, 12, 24], yticks=[0, 12, 24])
+spread = [f"{method} {float(each.sel(near).std()):.3f}" for method, each in maps.items()]
 # sphinx_gallery_end_ignore
+print("standard deviation of NDVI:", ", ".join(spread))
 
 # %%
 # Near nadir, the mean is smoother than the nearest pixel, because a cell has several pixels. At the edge of the swath
