@@ -16,8 +16,10 @@ from sphinx.ext import autosummary
 import fifesim
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.append(str(Path(__file__).parents[1] / "tests"))  # comparisons with benchmarks
 import docstrings
 import make_api
+import make_benchmark_pictures
 import make_bounds
 import make_explorer
 import make_tables
@@ -25,6 +27,7 @@ import make_why_scatter
 import thumbnails
 
 make_api.write()
+make_benchmark_pictures.write()
 make_bounds.write()
 make_explorer.write()
 make_tables.write()

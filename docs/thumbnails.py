@@ -1,10 +1,10 @@
 """Thumbnails of the gallery: one panel of each page, drawn with the page."""
 
 import re
+from io import BytesIO
 from pathlib import Path
 
 import matplotlib.pyplot as plt
-from matplotlib.transforms import Bbox
 from PIL import Image, ImageChops, ImageOps
 from sphinx_gallery.scrapers import matplotlib_scraper
 
@@ -36,11 +36,17 @@ def panel_file(folder, stem):
 
 def save_panel(figure, panel, path):
     """Save one panel of a figure with its labels."""
-    figure.canvas.draw()
+    whole = BytesIO()
+    figure.savefig(whole, dpi=_DPI, facecolor="white")
     box = figure.axes[panel].get_tightbbox().transformed(figure.dpi_scale_trans.inverted())
+    picture = Image.open(whole).convert("RGB")
+    left, right = _DPI * (box.x0 - _MARGIN), _DPI * (box.x1 + _MARGIN)
+    top, bottom = (
+        picture.height - _DPI * each for each in (box.y1 + _MARGIN, box.y0 - _MARGIN)
+    )
+    inside = max(left, 0), max(top, 0), min(right, picture.width), min(bottom, picture.height)
     path.parent.mkdir(parents=True, exist_ok=True)
-    around = Bbox(box.get_points() + [[-_MARGIN] * 2, [_MARGIN] * 2])
-    figure.savefig(path, dpi=_DPI, bbox_inches=around, facecolor="white")
+    picture.crop(tuple(map(round, inside))).save(path)
 
 
 def thumbnail(panel):

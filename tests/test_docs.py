@@ -7,6 +7,7 @@ from io import StringIO
 from pathlib import Path
 
 import make_api
+import make_benchmark_pictures
 import numpy as np
 import pytest
 import rasterio
@@ -137,7 +138,8 @@ def test_links_between_pages_resolve():
     scripts = (DOCS / "gallery_src").rglob("plot_*.py")
     drawn = {path.relative_to(DOCS / "gallery_src").with_suffix("").as_posix() for path in scripts}
     reference = ("api/functions", "api/functions.rst")
-    made = ("tables/why_scatter.png", "tables/why_pixel.png")
+    made = ["tables/why_scatter.png", "tables/why_pixel.png"]
+    made += [f"tables/benchmark_{name}.png" for name in make_benchmark_pictures.PICTURES]
     built = {"gallery/index", *reference, *made, *(f"gallery/{name}" for name in drawn)}
     absent = ((page, link) for page, link in links if not (page.parent / link).exists())
     missing = [(page.name, link) for page, link in absent if link.removeprefix("../") not in built]

@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 
+import make_benchmark_pictures
 import make_first_picture as picture
 import make_paper
 import make_why_scatter as why
@@ -160,8 +161,8 @@ def test_views_through_the_atmosphere_have_the_sign_of_the_axis(monkeypatch):
 
 
 def test_hot_spot_of_discs_is_drawn_at_the_sun():
-    """Last figure of the script: SAIL and both references."""
-    axes = drawn("answers/plot_5_benchmarks", [0, -1])["axes"]
+    """SAIL and both references."""
+    axes = np.reshape(make_benchmark_pictures.discs().axes, (2, 2))
     assert all(axis.get_xlabel().endswith(SIGNED) for axis in axes[1])
     for axis in axes[0]:
         _, *lines = axis.get_lines()
@@ -218,23 +219,19 @@ def test_table_of_accuracy_agrees_with_the_checks():
     assert cells["two-way transmittance of gases in the TM bands"] == f"{gases:.3f}"
 
 
-def test_unknown_terms_of_an_instrument_are_hatched():
-    """Each cell has a number or hatching; the total has a number only if every term has one."""
-    names = drawn("answers/plot_3_instruments", [0])
-    instruments, columns = names["names"], names["columns"]
-    assert [text.get_text() for text in names["figure"].legends[0].get_texts()] == [
-        "Hatched cells are unknown, not zero."
-    ]
-    for axis in names["axes"]:
-        printed = {tuple(round(at) for at in text.get_position()) for text in axis.texts}
-        hatched = {tuple(round(at + 0.5) for at in patch.get_xy()) for patch in axis.patches if patch.get_hatch()}
-        cells = {(column, row) for column in range(len(columns)) for row in range(len(instruments))}
-        assert printed | hatched == cells and not printed & hatched
-        for row, name in enumerate(instruments):
-            known = names["sizes"].set_index("instrument").loc[name, ["blur", "place", "noise"]]
-            terms = [(columns.index(stage), row) in printed for stage in ("point spread", "registration", "noise")]
-            assert terms == list(known)
-            assert ((columns.index("total"), row) in printed) == all(known)
+def test_bars_of_instruments_are_the_shares_of_their_budgets(monkeypatch):
+    """Two instruments; the parts of a bar sum to its total, and all stages of the budget are in a part."""
+    text = (DOCS / "gallery_src" / "answers" / "plot_3_instruments.py").read_text(encoding="utf-8").split("\n# %%\n")[0]
+    names = {}
+    exec(compile(re.sub(r"names = \(.*\)", 'names = ("TM", "OLI")', text), "instruments", "exec"), names)
+    axis = names["axis"]
+    assert [text.get_text() for text in axis.get_yticklabels()] == ["TM, 30 m", "OLI, 30 m"]
+    for row, found in enumerate(names["budgets"].values()):
+        bars = [patch for patch in axis.patches if round(patch.get_y() + patch.get_height() / 2) == row]
+        assert sum(patch.get_width() for patch in bars) == pytest.approx(100 * float(found.total), rel=1e-9)
+        assert axis.texts[row].get_text() == f"{100 * float(found.total):.0f} %"
+        registration = 100 * float(found.share.sel(stage="registration"))
+        assert bars[0].get_width() == pytest.approx(registration) and registration > 30
 
 
 NUMBERS = json.loads((DOCS / "paper.json").read_text(encoding="utf-8"))

@@ -49,7 +49,9 @@ for row, name in enumerate(names):
         share += float(found["curvature"]) if label == "curved relation" else 0.0
         axis.barh(row, 100 * share, left=100 * left, color=color, label=None if row else label)
         left += share
-    axis.text(100 * left + 1, row, f"{100 * float(found['total']):.0f} %", va="center", fontsize=9)
+    axis.text(
+        100 * left + 1, row, f"{100 * float(found['total']):.0f} %", va="center", fontsize=9
+    )
 sizes = [found.pixel for found in budgets.values()]
 axis.set_yticks(
     range(len(names)), [f"{name}, {size:g} m" for name, size in zip(names, sizes, strict=True)]
@@ -64,9 +66,9 @@ figure.legend(loc="outside upper center", ncols=5, frameon=False, fontsize=9, ha
 # **Registration** has the largest share wherever the geolocation error is a large part of a pixel, because the ground
 # varies over short distances. PRISMA is displaced by three pixels, the error that is required without control points.
 # Large pixels have little variance, so that **noise and digital numbers** weigh more. The **atmosphere** is uniform and
-# has little effect on R², because it mainly changes slope and intercept. EMIT and Landsat MSS are missing, because their
-# geolocation error, and blur and noise of MSS, are unknown; AVHRR is, because `method="analytic"` does not hold for its
-# coarse digital numbers. ``python docs/make_instruments.py`` simulates 19 instruments.
+# has little effect on R², because it mainly changes slope and intercept. EMIT and Landsat MSS are missing: their
+# geolocation error, and blur and noise of MSS, are unknown. AVHRR is missing because `method="analytic"` does not hold
+# for its coarse digital numbers. ``python docs/make_instruments.py`` simulates 19 instruments.
 #
 # The blur of few instruments was measured in flight. Two instruments differ only if the ranges of R², at both ends of
 # the uncertainty of the blur, do not overlap:

@@ -74,6 +74,7 @@ composites = {
 composites["mean-of-clear"] = series.fifesim.composite("mean-of-clear", clear=clear)
 
 # sphinx_gallery_start_ignore
+# thumbnail_panel = 2
 figure, axes = plt.subplots(
     1, 4, figsize=(11, 3.4), layout="constrained", sharex=True, sharey=True
 )

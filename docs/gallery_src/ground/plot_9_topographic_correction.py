@@ -67,7 +67,7 @@ for name, row in table.items():
 # doubled relief.
 
 # sphinx_gallery_start_ignore
-# thumbnail_panel = 1
+# thumbnail_panel = 2
 figure, axes = plt.subplots(1, 3, figsize=(13, 4.4), layout="constrained")
 colours = dict(
     zip(METHODS, ("#b2182b", "#2166ac", "#ef8a62", "#67a9cf", "#4d9221", "0.25"), strict=True)

@@ -44,8 +44,8 @@ for axis, west in zip(axes, ends, strict=True):
 # sphinx_gallery_end_ignore
 
 # %%
-# `grid_swath` takes the nearest pixel of each cell, or the area-weighted mean of the pixels in a cell. A window of 24 km
-# near nadir and its difference:
+# `grid_swath` takes the nearest pixel of each cell, or the area-weighted mean of the pixels in a cell. The figure shows
+# 24 km x 24 km near nadir.
 
 around = fifesim.grid_at("EPSG:26914", 100e3, 4436e3, 1000e3, 50e3, 2000.0)
 maps = {method: ndvi.fifesim.grid_swath(around, method) for method in ("nearest", "mean")}
@@ -54,8 +54,11 @@ figure, axes = plt.subplots(1, 3, figsize=(12, 3.9), layout="constrained")
 near = {"x": slice(130e3, 154e3), "y": slice(4424e3, 4400e3)}
 nearest, mean = (each.sel(near).values for each in maps.values())
 extent = (0, 24, 0, 24)
-for axis, values, title in ((axes[0], nearest, "nearest pixel"), (axes[1], mean, "mean of pixels")):
-    drawn = axis.imshow(values, extent=extent, vmin=0.25, vmax=0.45)
+for axis, values, title in (
+    (axes[0], nearest, "nearest pixel"),
+    (axes[1], mean, "mean of pixels"),
+):
+    drawn = axis.imshow(values, extent=extent, vmin=0.1, vmax=0.6)
     axis.set_title(f"NDVI, {title}")
 figure.colorbar(drawn, ax=axes[:2], label="NDVI")
 drawn = axes[2].imshow(mean - nearest, extent=extent, cmap="RdBu_r", vmin=-0.05, vmax=0.05)

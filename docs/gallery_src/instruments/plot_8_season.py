@@ -62,7 +62,9 @@ for name, of_cover, color in (("wheat", in_field, "#b8860b"), ("grass", ~in_fiel
     for series, style, label in ((cloudless, "o-", "no clouds"), (ndvi, "o:", "with clouds")):
         means = [float(each.where(of_cover).mean()) for each in series]
         face = color if style == "o-" else "white"
-        axis.plot(dates, means, style, color=color, markerfacecolor=face, label=f"{name}, {label}")
+        axis.plot(
+            dates, means, style, color=color, markerfacecolor=face, label=f"{name}, {label}"
+        )
     level = float(clear.fifesim.ndvi().where(of_cover).mean())
     axis.axhline(level, color=color, linewidth=3, alpha=0.35, label=f"{name}, composite")
 axis.set(ylabel="mean NDVI", ylim=(0, 1.05))
