@@ -1,153 +1,200 @@
-"""The picture of the README: docs/_static/scene_and_image.png. Run it after a change that moves the numbers."""
+"""
+The picture of the README and the first page, docs/_static/scene_and_image.png, with its numbers in the metadata.
+
+    python docs/make_picture.py    # five minutes of processor time; run it after a change that moves the numbers
+"""
 
 import io
+import json
 from pathlib import Path
+from typing import NamedTuple
 
+import make_why_scatter
 import matplotlib.pyplot as plt
 import numpy as np
+import xarray as xr
 from matplotlib.patches import ConnectionPatch, Rectangle
-from PIL import Image
+from PIL import Image, PngImagePlugin
 
 import fifesim
-from fifesim.output.maps import image_map, stretch_of
 
-# Extent of the picture on the ground of the default run, and the enlarged part. [m]
-WEST, NORTH, WIDTH, HEIGHT = 706500.0, 4331220.0, 12000.0, 8100.0
-LEFT, TOP, SIDE = 9780.0, 5700.0, 480.0
+FILE = Path(__file__).parent / "_static" / "scene_and_image.png"
 
-_FILE = Path(__file__).parent / "_static" / "scene_and_image.png"
+# Cells of the front scene in the default landscape, and the enlarged part: first row, first column and size. [1, pixel]
+WINDOW = (1800, 3600), (2700, 4500)
+TOP, LEFT, SIDE = 92, 150, 16
+RATIO = 9  # cells along a pixel
+
+# Realisations and cells of `fifesim budget`.
+REALISATIONS, CELLS = 20, 333
 
 
-def run():
-    """Image, its NDVI and the truth of a part of the ground of the default run, and the cells of a part of that."""
-    whole = fifesim.scenario.default_scenario()
-    grid = {"west": WEST, "north": NORTH, "width": WIDTH, "height": HEIGHT}
-    tree = fifesim.simulate(
-        whole.model_copy(update={"grid": whole.grid.model_copy(update=grid)})
+class Front(NamedTuple):
+    """The front scene: the same steps as in the README and in Ten minutes, with the bands of a true colour picture."""
+
+    land: xr.Dataset
+    dem: xr.DataArray
+    toa: xr.DataArray
+    image: xr.DataArray
+    truth: xr.DataArray
+
+    def fit(self, image=None):
+        """Regression of true LAI on the NDVI of an image."""
+        return fifesim.regress(
+            self.truth, (self.image if image is None else image).fifesim.ndvi()
+        )
+
+
+def front(window=WINDOW):
+    """Simulate the front scene."""
+    grid = fifesim.fife_site(cell=30 / RATIO, window=window)
+    dem = fifesim.flint_hills(grid, seed=7)
+    land = fifesim.landscape(grid, dem=dem, seed=7)
+    bands = ["TM1", "TM2", "TM3", "TM4"]
+    toa = land.fifesim.surface_reflectance("TM", bands=bands, dem=dem).fifesim.to_toa()
+    return Front(land, dem, toa, toa.fifesim.sense("TM"), land.lai.fifesim.aggregate(30))
+
+
+def changes(scene):
+    """R² of the front scene, and with a change of one property."""
+    moved = 2 * (fifesim.instrument("TM").geolocation / 30,)
+    haze = fifesim.Atmosphere(visibility=10)
+    light = scene.land.fifesim.surface_reflectance(
+        "TM", bands=["TM3", "TM4"], dem=scene.dem, atmosphere=haze
     )
-    image = tree["image"].to_dataset().compute()
-    return (
-        image["dn"],
-        image["ndvi"],
-        tree["truth"]["lai"].compute(),
-        _part(tree["scene"]["lai"]).compute(),
+    hazy = light.fifesim.to_toa().fifesim.sense("TM")
+    fine = fifesim.compare(scene.land, ["MSI"], fifesim.Setup(bands=None, dem=scene.dem))
+    r2 = {
+        "front": scene.fit().r2,
+        "registration": scene.fit(scene.toa.fifesim.sense("TM", offset=moved)).r2,
+        "noise": scene.fit(scene.toa.fifesim.sense("TM", noise=["all"])).r2,
+        "registration and noise": scene.fit(
+            scene.toa.fifesim.sense("TM", offset=moved, noise=["all"])
+        ).r2,
+        "haze": scene.fit(hazy).r2,
+        "MSI": float(fine.fifesim.comparison_table(truth=scene.land.lai)["r2"]["MSI"]),
+    }
+    ndvi = float((hazy.fifesim.ndvi() - scene.image.fifesim.ndvi()).mean())
+    return r2 | {"change of NDVI in haze": ndvi}
+
+
+def default_run(scenario=None):
+    """R² of `fifesim simulate`."""
+    tree = fifesim.simulate(scenario or fifesim.scenario.default_scenario())
+    return fifesim.regress(tree["truth/lai"], tree["image/ndvi"]).r2
+
+
+def panel():
+    """R² of the last panel of the page on scatter."""
+    return make_why_scatter.panels(make_why_scatter.scenario())[-1].r2
+
+
+def budgets(realisations=REALISATIONS):
+    """R² of the realisations of `fifesim budget`."""
+    found = fifesim.budget(
+        fifesim.scenario.default_scenario(), realisations=realisations, cells=CELLS
     )
+    return (1 - found["total"].sel(variable="lai")).values.tolist()
 
 
-def _part(raster):
-    """Enlarged part."""
-    size = abs(float(raster["x"][1] - raster["x"][0]))
-    starts = {"y": TOP, "x": LEFT}
-    return raster.isel(
-        {
-            axis: slice(round(at / size), round((at + SIDE) / size))
-            for axis, at in starts.items()
-        }
-    )
+def numbers():
+    """Numbers in the metadata of the picture."""
+    with Image.open(FILE) as picture:
+        return json.loads(picture.text["fifesim"])
 
 
-def draw(dn, ndvi, truth, cells_shown):
-    """Landscape, cells and pixels of a part of it, and what NDVI tells."""
-    pixel, cell = (abs(float(each["x"][1] - each["x"][0])) for each in (dn, cells_shown))
-    stretch = stretch_of(dn)
-    figure = plt.figure(figsize=(16.8, 6.1))
-    land, cells, pixels, plot = (
+def draw(scene, fit):
+    """The image in true colour, its NDVI, cells and pixels of a part of it, and leaf area by NDVI."""
+    figure = plt.figure(figsize=(15, 4.75))
+    colour, green, cells, pixels, scatter = (
         figure.add_axes(place)
         for place in (
-            (0.006, 0.085, 0.482, 0.84),
-            (0.508, 0.545, 0.138, 0.38),
-            (0.508, 0.085, 0.138, 0.38),
-            (0.71, 0.13, 0.28, 0.795),
+            (0.006, 0.085, 0.2667, 0.842),
+            (0.284, 0.085, 0.2667, 0.842),
+            (0.574, 0.553, 0.1185, 0.374),
+            (0.574, 0.085, 0.1185, 0.374),
+            (0.782, 0.155, 0.212, 0.772),
         )
     )
-    extent = (0, WIDTH / 1000, 0, HEIGHT / 1000)
-    # The western half in false colour, the eastern half as NDVI.
-    colours, half = image_map(dn, "", stretch).pixels, dn.sizes["x"] // 2
-    land.imshow(
-        colours[:, :half],
-        extent=(0, extent[1] / 2, *extent[2:]),
-        interpolation="nearest",
-        aspect="auto",
-    )
-    land.imshow(
-        ndvi[:, half:],
-        extent=(extent[1] / 2, *extent[1:]),
-        cmap="YlGn",
-        vmin=0.35,
-        vmax=0.75,
-        interpolation="nearest",
-        aspect="auto",
-    )
-    land.axvline(extent[1] / 2, color="white", linewidth=2)
-    land.set(xlim=extent[:2], ylim=extent[2:])
-    corner = LEFT / 1000, (HEIGHT - TOP - SIDE) / 1000
-    land.add_patch(
-        Rectangle(
-            corner, SIDE / 1000, SIDE / 1000, fill=False, edgecolor="black", linewidth=2.2
-        )
-    )
-    land.plot([0.5, 2.5], [0.42, 0.42], color="white", linewidth=3)
-    land.text(1.5, 0.55, "2 km", color="white", ha="center", fontsize=13, weight="bold")
-    drawn = cells.imshow(cells_shown, cmap="YlGn", vmin=0, vmax=4, interpolation="nearest")
-    pixels.imshow(image_map(_part(dn), "", stretch).pixels, interpolation="nearest")
-    _titles(
-        land,
-        cells,
-        pixels,
-        f"Cells of {cell:.2f} m: leaf area",
-        f"Landsat pixels of {pixel:g} m",
-    )
-    beside = figure.add_axes((0.65, 0.545, 0.006, 0.38))
-    figure.colorbar(drawn, cax=beside, ticks=[0, 2, 4]).ax.tick_params(labelsize=11, length=0)
-    for side, (axis, height) in zip((1, 0), ((cells, 1), (pixels, 0)), strict=True):
-        start = corner[0] + SIDE / 1000, corner[1] + side * SIDE / 1000
-        line = {
-            "coordsA": land.transData,
-            "coordsB": axis.transAxes,
-            "color": "#555555",
-            "linewidth": 1,
-        }
-        figure.add_artist(ConnectionPatch(start, (0, height), **line))
-    _scatter(plot, ndvi, truth)
+    ndvi, sharp = scene.image.fifesim.ndvi(), {"interpolation": "nearest"}
+    shades = {"cmap": "YlGn", "vmin": 0.35, "vmax": 0.75, **sharp}
+    colour.imshow(scene.image.fifesim.rgb("natural colour"), **sharp)
+    green.imshow(ndvi, **shades)
+    drawn = cells.imshow(_part(scene.land.lai, RATIO), cmap="YlGn", vmin=0, vmax=4, **sharp)
+    _key(figure, drawn, 0.553, [0, 2, 4])
+    _key(figure, pixels.imshow(_part(ndvi), **shades), 0.085, [0.4, 0.5, 0.6, 0.7])
+    for axis, title in (
+        (colour, "The image in true colour"),
+        (green, "Its NDVI"),
+        (cells, "LAI of 3.33 m cells"),
+        (pixels, "NDVI of 30 m pixels"),
+    ):
+        axis.set_title(title, loc="left", fontsize=13.5)
+        axis.set(xticks=[], yticks=[])
+        axis.spines[:].set_visible(False)
+    _scale(colour)
+    _zoom(green, ((cells, 1), (pixels, 0)))
+    _scatter(scatter, ndvi, scene.truth, fit)
     return figure
 
 
-def _titles(land, cells, pixels, cells_title, pixels_title):
-    land.set_title(
-        "What Landsat 5 would have seen: near infrared, red, green", loc="left", fontsize=15
-    )
-    land.set_title("NDVI, in green", loc="right", fontsize=15)
-    cells.set_title(cells_title, loc="left", fontsize=13)
-    pixels.set_title(pixels_title, loc="left", fontsize=13)
-    for axis in (land, cells, pixels):
-        axis.set(xticks=[], yticks=[])
-        axis.spines[:].set_visible(False)
+def _part(raster, cells=1):
+    """The enlarged part of a raster with so many cells along a pixel."""
+    rows, columns = (slice(start * cells, (start + SIDE) * cells) for start in (TOP, LEFT))
+    return raster.isel(y=rows, x=columns)
 
 
-def _scatter(axis, ndvi, lai):
-    fit = fifesim.regress(lai, ndvi)
-    axis.hexbin(
-        ndvi.values.ravel(),
-        lai.values.ravel(),
-        gridsize=75,
-        mincnt=1,
-        bins="log",
-        cmap="Greens",
-        linewidths=0.1,
-        vmin=0.4,
+def _key(figure, drawn, bottom, ticks):
+    axis = figure.add_axes((0.696, bottom, 0.006, 0.374))
+    figure.colorbar(drawn, cax=axis, ticks=ticks).ax.tick_params(labelsize=11, length=0)
+
+
+def _scale(axis, length=2000):
+    """A scale bar in the lower left corner. [m]"""
+    height = axis.get_ylim()[0] - 8
+    axis.plot([8, 8 + length / 30], [height] * 2, color="white", linewidth=3)
+    middle = 8 + length / 60, height - 3
+    axis.text(
+        *middle, f"{length // 1000} km", color="white", ha="center", fontsize=13, weight="bold"
     )
-    line = np.linspace(float(ndvi.min()), float(ndvi.max()), 50)
+
+
+def _zoom(axis, parts):
+    """The frame of the enlarged part, with lines to a corner of each of its maps."""
+    corner = LEFT - 0.5, TOP - 0.5
+    axis.add_patch(Rectangle(corner, SIDE, SIDE, fill=False, edgecolor="black", linewidth=2))
+    for part, height in parts:
+        start = corner[0] + SIDE, corner[1] + (1 - height) * SIDE
+        where = {"coordsA": axis.transData, "coordsB": part.transAxes}
+        line = ConnectionPatch(start, (0, height), **where, color="#555555", linewidth=1)
+        axis.get_figure().add_artist(line)
+
+
+def _scatter(axis, ndvi, lai, fit):
+    values = ndvi.values.ravel(), lai.values.ravel()
+    cells = {"gridsize": 60, "mincnt": 1, "bins": "log", "cmap": "Greens", "linewidths": 0.1}
+    axis.hexbin(*values, **cells, vmin=0.4)
+    line = np.array([max(float(ndvi.min()), -fit.intercept / fit.slope), float(ndvi.max())])
     axis.plot(line, fit.predict(line), color="#b2182b", linewidth=2.5)
-    axis.set_title(f"What its NDVI tells: R² = {fit.r2:.2f}", loc="left", fontsize=15)
-    axis.set_xlabel("NDVI of the image", fontsize=13)
-    axis.set_ylabel("true leaf area index [m² m⁻²]", fontsize=13)
+    axis.set_title(f"LAI by NDVI: R² = {fit.r2:.2f}", loc="left", fontsize=13.5)
+    axis.set_xlabel("NDVI of a pixel", fontsize=12)
+    axis.set_ylabel("its true LAI [m² m⁻²]", fontsize=12)
+    axis.set_ylim(0, None)
     axis.tick_params(labelsize=11)
     axis.spines[["top", "right"]].set_visible(False)
 
 
+def save(figure, found, file=FILE):
+    """Write a picture with 256 colours, and its numbers."""
+    buffer, text = io.BytesIO(), PngImagePlugin.PngInfo()
+    figure.savefig(buffer, dpi=110)
+    text.add_text("fifesim", json.dumps(found))
+    picture = Image.open(buffer).convert("RGB")
+    picture = picture.quantize(256, method=Image.Quantize.MAXCOVERAGE)
+    picture.save(file, optimize=True, pnginfo=text)
+
+
 if __name__ == "__main__":
-    buffer = io.BytesIO()
-    draw(*run()).savefig(buffer, dpi=100, metadata={"Software": None})
-    Image.open(buffer).convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE).save(
-        _FILE, optimize=True
-    )
+    scene = front()
+    found = changes(scene) | {"run": default_run(), "panel": panel(), "budget": budgets()}
+    save(draw(scene, scene.fit()), found)
