@@ -93,7 +93,7 @@ SEARCH_WORDS = {
     "command_line": ["command", "command line", "cli", "option"],
     "instruments": ["instrument", "which instrument"],
     "scenario_keys": ["key", "scenario key"],
-    "why_scatter": ["scatter", "why scatter"],
+    "why_scatter": ["scatter", "why scatter", "why r2", "r2", "r²"],
     "nomenclature": ["fpar", "symbols", "units"],
 }
 

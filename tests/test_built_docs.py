@@ -34,6 +34,7 @@ ANSWERS = {
     "instruments": "instruments",
     "score": "howto/score",
     "why scatter": "why_scatter",
+    "R2": "why_scatter",
     "FPAR": "nomenclature",
     "regress": "api/names/fifesim.regress",
 }

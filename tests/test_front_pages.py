@@ -63,8 +63,8 @@ def test_picture_shows_image_cells_pixels_and_fit(monkeypatch, tmp_path):
 
 def table_rows(page, start):
     """Cells of the rows of a table after a text of a page, without emphasis and links."""
-    after = text(page).partition(start)[2].partition("\n| ")[2].partition("\n\n")[0]
-    lines = re.sub(r"\[(.*?)\]\(.*?\)|\*\*", r"\1", after).splitlines()[2:]
+    (table, *_) = re.findall(r"(?:^\|.*\n)+", text(page).partition(start)[2], re.MULTILINE)
+    lines = re.sub(r"\[(.*?)\]\(.*?\)|\*\*", r"\1", table).splitlines()[2:]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
 
 
