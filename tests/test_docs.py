@@ -50,7 +50,7 @@ FILES = {"docs/howto/my_map.md": ("lai_500m.tif", write_modis_lai)}
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md")), *sorted((DOCS / "howto").glob("*.md"))]
 
 
-# Pages whose code takes more than 6 s of processor time.
+# Pages, apart from the README, whose code takes more than 6 s of processor time.
 LONG = ("docs/howto/gpp.md", "docs/howto/landscape.md", "docs/howto/processor.md", "docs/howto/train.md")
 CODE = [str(page.relative_to(ROOT)) for page in PAGES if python_blocks(page)]
 
