@@ -142,7 +142,10 @@ def test_ten_minutes_has_the_front_scene_and_no_warning():
     assert f"explains {100 * NUMBERS['front']:.0f} % of the variance" in printed.getvalue()
     lines, curves, deviations = {}, {}, {}
     for name, size in (("TM", 30), ("MSI", 10)):
-        ndvi, truth = names["images"][name]["ndvi"].values, names["land"].lai.fifesim.aggregate(size).values
+        ndvi, truth = (
+            names["images"][name]["dn"].fifesim.ndvi().values,
+            names["land"].lai.fifesim.aggregate(size).values,
+        )
         used = np.isfinite(ndvi) & np.isfinite(truth)
         ndvi, truth = ndvi[used], truth[used]
         lines[name] = np.corrcoef(ndvi, truth)[0, 1] ** 2
