@@ -95,6 +95,10 @@ def test_table_of_r2_states_the_runs():
     expected += [1 - int(percent) / 100, stand]
     rows = table_rows("docs/why_scatter.md", "## Why R² differs between pages")
     assert [row[-1] for row in rows] == [f"{value:.2f}" for value in expected]
+    least, most = re.findall(r"R² of the 20 parts of 1.1 km ranges from (.*?) to (.*?):", text("docs/why_scatter.md"))[
+        0
+    ]
+    assert [least, most] == [f"{end:.2f}" for end in (min(NUMBERS["budget"]), max(NUMBERS["budget"]))]
     moved = f"{fifesim.instrument('TM').geolocation:g} m"
     assert [row[3] for row in rows[:7]] == ["none", "none", moved, "none", moved, "none", "none"]
     assert rows[7][1] == f"mean of {picture.REALISATIONS} parts of {picture.CELLS / 300:.1f} km"
