@@ -61,8 +61,9 @@ print(f"A line on NDVI explains {100 * fit.r2:.0f} % of the variance of leaf are
 # R² of other pages.
 
 # %%
-# **6. Compare instruments over the same ground.** A line explains less of the leaf area of the 10 m pixels of MSI, although
-# these scatter less about a curve: leaf area varies more between small pixels, and NDVI saturates in dense grass.
+# **6. Compare instruments over the same ground.** A line explains less of the leaf area of the 10 m pixels of MSI,
+# although these scatter less about a curve: leaf area varies more between small pixels, and NDVI saturates in dense
+# grass.
 
 images = fifesim.compare(land, ["TM", "MSI"], fifesim.Setup(bands=None, dem=dem))
 print(images.fifesim.comparison_table(truth=land.lai)[["pixel", "ndvi_mean", "r2"]])
