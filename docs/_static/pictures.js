@@ -1,6 +1,6 @@
-// Open a picture of the gallery at full size, which small screens need.
+// Open a picture at full size, which small screens need.
 document.addEventListener("DOMContentLoaded", () => {
-  for (const picture of document.querySelectorAll("img.sphx-glr-single-img, img.sphx-glr-multi-img")) {
+  for (const picture of document.querySelectorAll("img.sphx-glr-single-img, img.sphx-glr-multi-img, article section > p > img, article section > img")) {
     const link = document.createElement("a");
     link.href = picture.src;
     link.title = "Full size";
