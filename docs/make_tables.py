@@ -10,6 +10,7 @@ from types import UnionType
 from typing import Literal, Union, get_args, get_origin
 
 import docstrings
+import pandas as pd
 import typer
 import yaml
 
@@ -36,6 +37,8 @@ def write():
     FOLDER.mkdir(exist_ok=True)
     for table in (scenario_keys, command_line, instruments, citation):
         (FOLDER / f"{table.__name__}.md").write_text(table(), encoding="utf-8")
+    for table in (instrument_bands, instrument_sources):
+        table().to_csv(FOLDER / f"{table.__name__}.csv", index=False, float_format="%.5g")
 
 
 def _table(columns, rows):
@@ -221,62 +224,60 @@ QUANTITIES = {
     "paper_lsf": ("line spread function of Friedl et al. (1995)", None),
     "compression": ("compression of digital numbers", None),
 }
-# Mappings of an instrument that are not columns of its table.
-_TEXTS = ("sources", "references", "not_found")
 # An imaging spectrometer has too many bands for a table.
 _MOST_BANDS = 22
 
 
 def instruments():
-    """What is known of each instrument, and the source of each number."""
+    """What is known of each instrument: names, sampling with the origin of its errors, and bands."""
     items = [instrument(name) for name in instrument_names()]
-    columns = [
-        "instrument",
-        "title",
-        "pixels [m]",
-        "bits",
-        "bands",
-        "blur",
-        "noise",
-        "geolocation error",
-    ]
-    parts = [_table(columns, [_overview(item) for item in items])]
-    if any("origin" in _other_columns(item) for item in items):
-        parts.append(_ORIGINS)
-    return "\n".join([*parts, *(_instrument(item) for item in items)])
+    named = ["instrument", "title", "other names", "altitude [km]", "pixels [m]", "bits"]
+    sampling = ["sampling interval at nadir", "scan", "blur", "noise", "geolocation error"]
+    return "\n".join(
+        [
+            _table(named, map(_overview, items)),
+            f"## Sampling and errors\n\n{_ORIGINS}",
+            _table(["instrument", *sampling], map(_sampling, items)),
+            "## Bands\n\nNames of the bands, each followed by its centre in µm.\n",
+            _table(["instrument", "bands"], map(_bands, items)),
+        ]
+    )
 
 
-_ORIGINS = """A number was measured in flight, measured before launch, required by the mission, or assumed. The
-uncertainty of the line spread function is the largest error of the modulation transfer at the Nyquist frequency, the
-uncertainty of the noise is a factor of its standard deviation. The geolocation error has an uncertainty in metres.
+_ORIGINS = """A number was measured in flight, measured before launch, required by the mission, or assumed. Blur is
+unknown if neither the point spread function nor the modulation transfer was published: then only the footprint of the
+detector is used, and the image is sharper than a real one. With unknown noise you can only add noise that you describe
+yourself. The geolocation error is the error of the gridded product along each axis. It is not applied unless you set
+`offset`.
 """
 
 
 def _overview(item):
     pixels = sorted({item.pixel(band) for band in item.bands})
-    blur = [_state(item, band, "lsf", knows_blur(item, band)) for band in item.bands]
-    noise = [_state(item, band, "noise", band.noise is not None) for band in item.bands]
     return [
-        f"[{item.name}](#{_anchor(item)})",
+        item.name,
         item.title,
+        ", ".join(item.aliases),
+        f"{item.altitude / 1000:g}",
         ", ".join(f"{size:g}" for size in pixels),
         item.bits,
-        len(item.bands),
-        _counted(blur),
-        _counted(noise),
-        "unknown" if item.geolocation is None else f"{item.geolocation:g} m",
     ]
 
 
-def _anchor(item):
-    return "instrument-" + item.name.lower().replace("+", "-plus")
+def _sampling(item):
+    interval = QUANTITIES["interval"][1](item)
+    scan = "" if item.scan is None else _scan(item.scan)
+    blur = [_state(item, band, "lsf", knows_blur(item, band)) for band in item.bands]
+    noise = [_state(item, band, "noise", band.noise is not None) for band in item.bands]
+    place = "unknown" if item.geolocation is None else f"{item.geolocation:g} m"
+    return [item.name, interval, scan, _counted(blur), _counted(noise), place]
 
 
 def _state(item, band, number, is_known):
     """Whether a number of a band is known, or its origin if the file states one."""
     if not is_known:
         return "unknown"
-    return _annotation(item, band, "origin", number).partition(";")[0] or "known"
+    return _origin(item, band, number).partition(";")[0] or "known"
 
 
 def _counted(states):
@@ -288,27 +289,19 @@ def _counted(states):
     )
 
 
-def _instrument(item):
-    """Section of one instrument: quantities with sources, bands, gaps and publications."""
-    also = f" Other names: {', '.join(item.aliases)}." if item.aliases else ""
-    others = _other_columns(item)
-    columns = ["quantity", "value", "source", *(name.replace("_", " ") for name in others)]
+def instrument_sources():
+    """Table of each number of each instrument with its origin, source and publication."""
     rows = []
-    for number in given_numbers(item):
-        rows.append(
-            [*_quantity(item, number), *(_annotations(item, name, number) for name in others)]
-        )
-    parts = [
-        f"({_anchor(item)})=\n## {item.name}\n\n{item.title}.{also}\n",
-        _table(columns, rows),
-        _bands(item),
-    ]
-    parts += [f"Not known: {name}, {text}.\n" for name, text in item.not_found.items()]
-    parts.append(
-        "\n".join(f"- **{key}**: {_words(text)}" for key, text in item.references.items())
-        + "\n"
-    )
-    return "\n".join(parts)
+    for item in map(instrument, instrument_names()):
+        for number in given_numbers(item):
+            keys, *row = _quantity(item, number)
+            published = "; ".join(_words(item.references[key]) for key in keys)
+            rows.append([item.name, *row, _origins(item, number), ", ".join(keys), published])
+        rows += [
+            [item.name, name, "", "unknown", "", text] for name, text in item.not_found.items()
+        ]
+    columns = ["instrument", "quantity", "value", "origin", "source", "publication"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def given_numbers(item):
@@ -326,7 +319,7 @@ def given_numbers(item):
 
 
 def _quantity(item, number):
-    """Words, value and source keys of a number."""
+    """Source keys, words and value of a number."""
     words, value = QUANTITIES.get(number, (number.replace("_", " "), None))
     if number in instrument_file.BAND_NUMBERS or value is None:
         own = getattr(item, number, None)
@@ -335,43 +328,23 @@ def _quantity(item, number):
         shown = value(item)
     keys = [band.sources.get(number) or item.sources.get(number) for band in item.bands]
     keys = [*([item.sources[number]] if number in item.sources else []), *keys]
-    return [words, shown, ", ".join(dict.fromkeys(key for key in keys if key))]
+    return [list(dict.fromkeys(key for key in keys if key)), words, shown]
 
 
-def _other_columns(item):
-    """Names of further mappings by quantity, such as the origin of the values."""
-    found = {}
-    for each in (item, *item.bands):
-        for known in fields(each):
-            value = getattr(each, known.name)
-            if known.name not in _TEXTS and isinstance(value, Mapping) and value:
-                found.setdefault(known.name, set()).update(map(_number_of, value))
-    numbers = {
-        *instrument_file.INSTRUMENT_NUMBERS,
-        *instrument_file.BAND_NUMBERS,
-        *instrument_file.OPTIONAL_NUMBERS,
-    }
-    return [name for name, keys in found.items() if keys <= numbers]
-
-
-def _number_of(quantity):
-    return "lsf" if quantity == "blur" else quantity
-
-
-def _annotations(item, column, number):
-    """Text of a further column for a number, with the names of the bands where it differs."""
+def _origins(item, number):
+    """Origin of a number, with the names of the bands where it differs."""
     found = {}
     for band in item.bands:
-        found.setdefault(_annotation(item, band, column, number), []).append(band.name)
+        found.setdefault(_origin(item, band, number), []).append(band.name)
     return _with_bands(
         item, {text: names for text, names in found.items() if text or len(found) == 1}
     )
 
 
-def _annotation(item, band, column, number):
+def _origin(item, band, number):
     for each in (band, item):
-        for quantity, value in getattr(each, column, {}).items():
-            if _number_of(quantity) == number:
+        for quantity, value in each.origin.items():
+            if ("lsf" if quantity == "blur" else quantity) == number:
                 return _words(value)
     return ""
 
@@ -451,37 +424,40 @@ def _product(product):
 
 
 def _bands(item):
-    """Table of the bands, or their range if they are many."""
-    if len(item.bands) > _MOST_BANDS:
-        centres = sorted(band.wavelength for band in item.bands)
-        return f"{len(centres)} bands with centres from {centres[0]:.3f} to {centres[-1]:.3f} µm.\n"
-    columns = [
-        "band",
-        "centre [µm]",
-        "half maximum [µm]",
-        "radiance of DN 0 and of the largest DN",
+    """Name and bands of an instrument, or their range if they are many."""
+    bands = sorted(item.bands, key=lambda band: band.wavelength)
+    if len(bands) <= _MOST_BANDS:
+        return [item.name, ", ".join(f"{band.name} {band.wavelength:.3f}" for band in bands)]
+    first, last = bands[0], bands[-1]
+    return [
+        item.name,
+        f"{len(bands)} bands, {first.name} {first.wavelength:.3f} to {last.name} {last.wavelength:.3f}",
     ]
-    columns += ["solar irradiance", "noise"]
-    rows = []
-    for band in item.bands:
-        low, high = half_peak(band.response)
-        radiance = f"{band.min_radiance:.4g} to {band.full_scale_radiance:.4g}"
-        noise = "unknown"
-        if band.noise is not None:
-            ratio = band.noise.radiance / band.noise.equivalent_radiance
-            noise = f"SNR {ratio:.3g} at {band.noise.radiance:.3g}"
-        irradiance = f"{band.solar_irradiance:.5g}"
-        rows.append(
-            [
-                band.name,
-                f"{band.wavelength:.3f}",
-                f"{low:.3f}–{high:.3f}",
-                radiance,
-                irradiance,
-                noise,
-            ]
-        )
-    return _table(columns, rows)
+
+
+def instrument_bands():
+    """Table of all bands of all instruments."""
+    items = [instrument(name) for name in instrument_names()]
+    return pd.DataFrame([_band(item, band) for item in items for band in item.bands])
+
+
+def _band(item, band):
+    low, high = half_peak(band.response)
+    row = {
+        "instrument": item.name,
+        "band": band.name,
+        "center_um": round(band.wavelength, 4),
+        "half_maximum_low_um": round(float(low), 4),
+        "half_maximum_high_um": round(float(high), 4),
+        "pixel_m": item.pixel(band),
+        "min_radiance": band.min_radiance,
+        "full_scale_radiance": band.full_scale_radiance,
+        "solar_irradiance": band.solar_irradiance,
+    }
+    if band.noise is not None:
+        row["snr"] = band.noise.radiance / band.noise.equivalent_radiance
+        row["snr_radiance"] = band.noise.radiance
+    return row
 
 
 def citation():

@@ -100,32 +100,35 @@ def test_page_has_every_command_option_and_help_text():
     assert "fifesim rerun [OPTIONS] {file}" in found["rerun"]
 
 
-def test_page_has_a_source_for_every_instrument_value():
-    page = tables.instruments()
-    found = {name.partition("\n")[0]: text for name, text in sections(page).items()}
+def test_table_has_a_source_for_every_instrument_value():
+    known, bands = tables.instrument_sources(), tables.instrument_bands()
     for name in fifesim.sensor.instrument_names():
-        item, text = fifesim.instrument(name), found[name]
-        by_quantity = rows(text)
+        item = fifesim.instrument(name)
+        by_quantity = known[known["instrument"] == name].set_index("quantity")
         for number in tables.given_numbers(item):
-            cells = by_quantity[tables.QUANTITIES.get(number, [number.replace("_", " ")])[0]]
-            keys = {band.sources.get(number) or item.sources.get(number) for band in item.bands}
-            assert all(key in cells[2] for key in keys if key)
-        assert all(f"**{key}**: {publication}" in text for key, publication in item.references.items())
-        assert all(gap in text for gap in item.not_found.values())
-        assert all(band.name in text for band in item.bands if len(item.bands) < 22)
-        assert f"(#{tables._anchor(item)})" in page and f"({tables._anchor(item)})=" in page
+            row = by_quantity.loc[tables.QUANTITIES.get(number, [number.replace("_", " ")])[0]]
+            keys = {band.sources.get(number) or item.sources.get(number) for band in item.bands} - {None}
+            assert keys and all(key in row["source"] for key in keys)
+            assert all(item.references[key] in row["publication"] for key in keys)
+        assert all(by_quantity.loc[gap, "publication"] == text for gap, text in item.not_found.items())
+        assert list(bands.loc[bands["instrument"] == name, "band"]) == [band.name for band in item.bands]
 
 
 def test_values_of_an_instrument():
-    found = sections(tables.instruments())
-    tm, msi = rows(found["TM"]), rows(found["MSI"])
-    assert tm["altitude"][1:3] == ["705 km", "Friedl1995"]
-    assert tm["geolocation error (rms along each axis)"][1:3] == ["8.5 m", "USGS2020"]
-    assert "20 m (MSI5–MSI7, MSI8A, MSI11, MSI12)" in msi["pixel of the gridded product"][1]
-    assert msi["MSI10"][-1] == "SNR 50 at 6" and tm["TM3"][3:5] == ["-1.2 to 204.3", "1536"]
-    overview = rows(tables.instruments().partition("## ")[0])
-    assert overview["[MSS](#instrument-mss)"][2:] == ["60", "6", "4", "unknown", "unknown", "unknown"]
-    assert overview["[L4TM](#instrument-l4tm)"][-3] != "unknown" and overview["[L4TM](#instrument-l4tm)"][-1] == "8.5 m"
+    known = tables.instrument_sources().set_index(["instrument", "quantity"])
+    assert list(known.loc[("TM", "altitude"), ["value", "source"]]) == ["705 km", "Friedl1995"]
+    geolocation = known.loc[("TM", "geolocation error (rms along each axis)")]
+    assert list(geolocation[["value", "source", "origin"]]) == ["8.5 m", "USGS2020", "in-flight; uncertainty 4"]
+    assert "20 m (MSI5–MSI7, MSI8A, MSI11, MSI12)" in known.loc[("MSI", "pixel of the gridded product"), "value"]
+    bands = tables.instrument_bands().set_index(["instrument", "band"])
+    tm = bands.loc[("TM", "TM3"), ["min_radiance", "full_scale_radiance", "solar_irradiance"]]
+    assert list(tm) == [-1.2, 204.3, 1536] and abs(bands.loc[("TM", "TM3"), "center_um"] - 0.661) < 1e-3
+    assert list(bands.loc[("MSI", "MSI10"), ["snr", "snr_radiance"]].round(6)) == [50, 6]
+    overview, errors, names = map(rows, tables.instruments().split("\n## "))
+    assert overview["MSS"][-2:] == ["60", "6"] and errors["MSS"][-3:] == ["unknown"] * 3
+    assert errors["L4TM"][-3:] == ["in-flight", "in-flight", "8.5 m"]
+    assert names["TM"][1].startswith("TM1 0.486, TM2 0.571")
+    assert names["EMIT"][1].startswith("285 bands, EMIT1 0.381 to")
 
 
 def test_citation_page_has_the_software_and_the_paper():
