@@ -1,8 +1,10 @@
 """Sphinx configuration. Build with: sphinx-build -W -b html docs docs/_build/html"""
 
+import multiprocessing
 import os
 import re
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 os.environ.setdefault(
@@ -28,10 +30,7 @@ import thumbnails
 
 make_api.write()
 make_benchmark_pictures.write()
-make_bounds.write()
-make_explorer.write()
 make_tables.write()
-make_why_scatter.write()
 
 project = "fifesim"
 author = "the fifesim developers"
@@ -50,6 +49,7 @@ extensions = [
 exclude_patterns = [
     "_build",
     "bounds.md",
+    "developers/*",
     "gallery_src",
     "paper/*",
     "tables/*",
@@ -197,7 +197,21 @@ def _signature(app, what, name, obj, options, signature, returns):
     return signature and re.sub(r"<(factory|built-in function \w+)>", "...", signature), returns
 
 
+def _compute(app):
+    """Compute long tables and pictures in another process, while this one draws the gallery."""
+    pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
+    jobs = [pool.submit(each.write) for each in (make_why_scatter, make_explorer, make_bounds)]
+
+    def finish(app):
+        for job in jobs:
+            job.result()
+        pool.shutdown()
+
+    app.connect("builder-inited", finish, priority=950)  # after the gallery is drawn
+
+
 def setup(app):
+    _compute(app)
     app.connect("autodoc-process-signature", _signature)
     app.connect("source-read", _link_identifiers)
     app.connect("source-read", _index_words)

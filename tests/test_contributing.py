@@ -1,4 +1,4 @@
-"""The recipes of ``docs/contributing.md`` work in a copy of the package with changes only in the named files."""
+"""The recipes of ``docs/developers/recipes.md`` work in a copy of the package with changes only in the named files."""
 
 import json
 import re
@@ -70,7 +70,7 @@ print(json.dumps({"package": fifesim.__file__, "failed": failed}))
 
 def rows():
     """Rows of the table, by recipe."""
-    page = (ROOT / "docs" / "contributing.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "developers" / "recipes.md").read_text(encoding="utf-8")
     table = page[page.index("| a new | goes into |") :].split("\n\n")[0]
     return dict(re.findall(r"^\| (.+?) \| (.+) \|$", table, re.MULTILINE)[1:])
 
