@@ -94,6 +94,7 @@ SEARCH_WORDS = {
     "instruments": ["instrument", "which instrument"],
     "scenario_keys": ["key", "scenario key"],
     "why_scatter": ["scatter", "why scatter", "why r2", "r2", "r²"],
+    "limits": ["licence", "license", "help", "bug", "support", "scope", "limits"],
     "nomenclature": ["fpar", "symbols", "units"],
 }
 
