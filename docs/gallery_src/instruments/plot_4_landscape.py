@@ -12,11 +12,13 @@ import matplotlib.pyplot as plt
 import fifesim
 
 default = fifesim.scenario.default_scenario().model_dump(exclude_unset=True)
-grid = {"width": 6600.0, "height": 6600.0}
+pixels = {"MSI": 10, "TM": 30, "MODIS": 250, "VIIRS": 375, "AVHRR": 1100}  # m
 
 
 def seen_by(instrument):
     """True leaf area and NDVI of the image of an instrument."""
+    side = 6600 // pixels[instrument] * pixels[instrument]  # whole pixels
+    grid = {"width": side, "height": side}
     scenario = fifesim.Scenario(
         **default | {"grid": grid, "sensor": {"instrument": instrument}}
     )
@@ -24,7 +26,7 @@ def seen_by(instrument):
     return run["truth"]["lai"].compute(), run["image"]["ndvi"].compute()
 
 
-runs = {name: seen_by(name) for name in ("MSI", "TM", "MODIS", "VIIRS", "AVHRR")}
+runs = {name: seen_by(name) for name in pixels}
 
 # sphinx_gallery_start_ignore
 figure, axes = plt.subplots(2, 3, figsize=(11, 7.4), layout="constrained")
