@@ -16,8 +16,27 @@ HTML = Path(os.environ.get("FIFESIM_HTML", DOCS / "_build" / "html"))
 
 pytestmark = pytest.mark.skipif(not (HTML / "searchindex.js").exists(), reason=f"no documentation is built in {HTML}")
 
-# Search queries and the page that should be found first.
+# Search queries and the page that should be found first, among them the questions of a newcomer.
 ANSWERS = {
+    "add sensor noise": "howto/my_sensor",
+    "my own instrument": "howto/my_sensor",
+    "registration error": "howto/my_sensor",
+    "DEM": "howto/my_dem",
+    "Landsat": "howto/my_image",
+    "Sentinel-2": "howto/my_image",
+    "tutorial": "howto/from_geotiff",
+    "cloud shadow": "howto/clouds",
+    "GPP": "howto/gpp",
+    "changelog": "changes",
+    "memory": "large_scenes",
+    "dask": "large_scenes",
+    "jupyter": "howto/paper",
+    "what is arp": "nomenclature",
+    "why is my R2 so low": "why_scatter",
+    "licence": "limits",
+    "license": "limits",
+    "help": "limits",
+    "bug": "limits",
     "noise": "howto/my_sensor",
     "my DEM": "howto/my_dem",
     "accuracy": "benchmarks",

@@ -1,5 +1,6 @@
 """Documentation: code runs, links resolve, and the reference and the metadata of the project are complete."""
 
+import json
 import re
 import tomllib
 from contextlib import redirect_stdout
@@ -51,7 +52,7 @@ PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md")), *sorted((DOCS / "howto"
 
 
 # Pages, apart from the README, whose code takes more than 6 s of processor time.
-LONG = ("docs/howto/gpp.md", "docs/howto/landscape.md", "docs/howto/processor.md", "docs/howto/train.md")
+LONG = tuple(f"docs/howto/{name}.md" for name in ("from_geotiff", "gpp", "landscape", "processor", "train"))
 CODE = [str(page.relative_to(ROOT)) for page in PAGES if python_blocks(page)]
 
 
@@ -95,6 +96,19 @@ def test_page_of_modis_masks_fill_values_and_finds_the_place(tmp_path, monkeypat
     expected = np.array([1 - b, b]) @ corners @ np.array([1 - a, a])
     # LAI changes by 0.2 per cell of the map, and GDAL smooths sheared maps as if they moved by 0.02 cells.
     assert float(smooth[row, column]) == pytest.approx(expected, abs=5e-3)
+
+
+@pytest.mark.slow
+def test_notebook_of_table_2_prints_what_it_shows():
+    notebook = json.loads((DOCS / "notebooks" / "table2.ipynb").read_text(encoding="utf-8"))
+    (cell,) = (cell for cell in notebook["cells"] if cell["cell_type"] == "code")
+    told = StringIO()
+    with redirect_stdout(told):
+        exec(compile("".join(cell["source"]), "table2.ipynb", "exec"), {})
+    assert "".join(cell["outputs"][0]["text"]) == told.getvalue()
+    lai = [line.split() for line in told.getvalue().splitlines() if " lai " in line]
+    found, published = np.array([line[-2:] for line in lai], float).T
+    assert len(lai) == 9 and np.sqrt(np.mean((found - published) ** 2)) == pytest.approx(0.05, abs=0.005)
 
 
 def test_scenario_and_instrument_of_the_pages_are_valid(tmp_path):
