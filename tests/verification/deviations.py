@@ -22,8 +22,3 @@ def rms_percent(found, expected):
 def integral(function, kinks):
     """Integral of a function with kinks, which include both ends."""
     return sum(quad(function, low, high, epsabs=1e-10)[0] for low, high in pairwise(kinks))
-
-
-# Stage of Figure 1 of each area, in processing order.
-AREA_STAGES = dict.fromkeys(("random field", "canopy", "terrain"), "Ground")
-AREA_STAGES |= {"atmosphere": "Atmosphere", "sensor": "Sensor", "analysis": "Analysis"}
