@@ -123,7 +123,7 @@ def to_envi(
 
     See Also
     --------
-    fifesim.exam : scores of what a processor returns.
+    fifesim.exam
 
     Examples
     --------

@@ -119,7 +119,7 @@ def exam(
 
     See Also
     --------
-    fifesim.score : all scores of one estimate.
+    fifesim.score
 
     Examples
     --------

@@ -39,11 +39,11 @@ Images: TypeAlias = Annotated[
     Kind(
         "an image from sense: an xarray.DataArray, or an xarray.DataTree with an image for each pixel size",
         lambda value: is_a(value, "DataArray", "DataTree"),
-    )._replace(stored=True),
+    ),
 ]
 
 Truth: TypeAlias = Annotated[
-    xr.Dataset, Kind("an xarray.Dataset of rasters", lambda value: is_a(value, "Dataset"), numbers=None, stored=True)
+    xr.Dataset, Kind("an xarray.Dataset of rasters", lambda value: is_a(value, "Dataset"), numbers=None)
 ]
 
 # Largest difference between the sun of a scene and of the almanac, below the 2 degrees at which `open_landsat` and
