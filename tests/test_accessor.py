@@ -40,7 +40,7 @@ def test_every_line_of_the_stub_is_read():
     assert sum(len(re.findall(r"\nfrom \.+\w", stub.read_text(encoding="utf-8"))) for stub in stubs) == len(PUBLIC)
     listed = {f"fifesim.{space}.{name}" for space in NAMESPACES for name in dir(getattr(fifesim, space))}
     own = {f"fifesim.{name}" for name in {*fifesim.__all__} - {*NAMESPACES, "__version__"}}
-    assert listed | own == {public.path for public in PUBLIC.values()} and len(own) < 60
+    assert listed | own == {public.path for public in PUBLIC.values()} and len(own) <= 60
 
 
 def test_moved_and_removed_names_state_their_replacement(lai):

@@ -106,11 +106,10 @@ def to_landsat_l1(image: Images, folder: FilePath, *, truth: Truth | None = None
     --------
     >>> from tempfile import mkdtemp
     >>> import fifesim
-    >>> time, grid = "1987-06-06T16:35Z", fifesim.grid_at("EPSG:32614", 704970, 4334220, 1200, 900, cell=30)
+    >>> grid = fifesim.grid_at("EPSG:32614", 704970, 4334220, 1200, 900, cell=30)
     >>> lai = fifesim.lai_scene(grid, seed=7)
-    >>> geometry = fifesim.sun_position(time, latitude=39.1, longitude=-96.6)
-    >>> rho = lai.fifesim.surface_reflectance("TM", geometry=geometry)
-    >>> image = rho.fifesim.to_toa(geometry=geometry).fifesim.sense("TM", time=time)
+    >>> rho = lai.fifesim.surface_reflectance("TM", time="1987-06-06T16:35Z")
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
     >>> product = image.fifesim.to_landsat_l1(mkdtemp(), truth=lai.to_dataset(name="lai"))
     >>> product.name
     'LT05_L1TP_000000_19870606_19870606_02_T2_SIMULATED'
