@@ -152,13 +152,13 @@ def to_envi(
         light = terrain.illumination(height, taken.geometry)
         truth = truth.assign({"slope": slope, "illumination": light} | dict(truth.data_vars))
     bands = matching_bands(image, description)
-    widths = [getattr(band.srf, "width", None) for band in bands]
+    widths = [getattr(band.srf, "width", np.nan) for band in bands]
     spectral = {
         "wavelength": _listed(1000 * band.response.center for band in bands),
         "wavelength_units": "Nanometers",
         "data_units": unit,
     }
-    if all(widths):
+    if np.isfinite(widths).all():
         spectral["fwhm"] = _listed(1000 * width for width in widths)
     name = kind.name.format(pd.Timestamp(taken.time))
     with product_folder(folder, name, truth, overwrite=overwrite) as new:
