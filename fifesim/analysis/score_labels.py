@@ -67,8 +67,8 @@ def score(
         Groups that are scored one by one: a raster of classes, dims of the truth or some of them, or edges of bins of
         the true value.
     landscape : str, optional
-        Dimension or coordinate of the truth that counts independent landscapes. Pixels of one landscape depend on each
-        other; standard errors are computed over landscapes, and NaN with fewer than two.
+        Dimension or coordinate of the truth that counts independent landscapes. Standard errors are computed over
+        landscapes, and NaN with fewer than two.
     pair : {"coordinates", "index"}, optional
         How maps over (y, x) are paired, as in `regress`.
 
@@ -78,20 +78,19 @@ def score(
         ``n``, number of pixels; ``bias`` and ``rmse`` in the unit of the estimate; ``bias_se``, standard error of the
         bias; ``slope`` of truth on estimate, which is 1 for an estimate that is the expected truth. If the estimate has
         intervals, by ``level``: ``coverage``, the share of true values inside, its standard error ``coverage_se``, the
-        mean ``width``, and ``interval_score``. With ``sd`` or members: ``crps``, of a normal
-        distribution or of the ensemble, and ``pit``, the density of the probability integral transform in ten bins,
-        which is 1 for a calibrated estimate. For a mask, ``n``, ``omission``, the share of the true area that it lacks,
-        and ``commission``, the share of it that is wrong. With ``by``, a first dimension of that name. Without,
+        mean ``width``, and ``interval_score``. With ``sd`` or members: ``crps``, of a normal distribution or of the
+        ensemble, and ``pit``, the density of the probability integral transform in ten bins, which is 1 for a
+        calibrated estimate. For a mask, ``n``, ``omission``, the share of the true area that it lacks, and
+        ``commission``, the share of it that is wrong. With ``by``, a first dimension of that name. Without,
         ``bias_by_estimate`` and ``coverage_by_estimate`` for each ``decile`` of the estimate, 1 to 10,
         ``bias_by_truth`` and ``coverage_by_truth`` for each decile of the truth, and their standard errors, whose names
-        end in ``_se``. The same to the bit under any chunking.
+        end in ``_se``.
 
     Warns
     -----
     UserWarning
         If the bias or the coverage of a decile of the estimate misses by more than 0.2 of the RMSE or 0.04, and by more
-        than chance allows: in all deciles and levels together as rarely as a normal value beyond three standard errors.
-        It needs landscapes. Highest values of an estimate that is the truth plus an independent error are too high.
+        than three standard errors over landscapes.
 
     Raises
     ------
@@ -100,11 +99,9 @@ def score(
 
     Notes
     -----
-    A pixel counts if truth, estimate and every given limit and spread are known. The edges of deciles are from a
-    regular subset of at most a million pixels. A lazy estimate is computed twice: for these edges, and for the scores.
+    A pixel counts if truth, estimate and every given limit and spread are known. A lazy estimate is computed twice.
 
-    The bias by decile of the truth is not zero for a good estimate: an estimate under uncertainty is nearer to the mean
-    of its prior than the truth is, so that it is too high in low deciles and too low in high ones.
+    The bias by decile of the truth is not zero for a good estimate, which is nearer to the mean of its prior.
 
     References
     ----------

@@ -144,8 +144,7 @@ def as_seen_by(
     The function applies `adjust_bands`, `to_toa` and `sense` in sequence. Call them separately for further options.
 
     A scene that an instrument recorded is blurred already: only the difference of both blurs is applied, by the ratio
-    of the modulation transfers, with a floor. Details that the source did not record stay missing: ``contrast_left`` is
-    the contrast that remains, and a warning names the bands with less than 0.9 of it.
+    of the modulation transfers, with a floor. A warning names the bands with a ``contrast_left`` below 0.9.
 
     Parameters
     ----------

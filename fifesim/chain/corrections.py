@@ -93,9 +93,7 @@ def topographic_correction(
 
     Notes
     -----
-    At cos i = 0.1, an incidence of 84 degrees, an error of 1 degree of the slope changes a correction by 17 %, and the
-    light of a clear sky, which cos i leaves out, is about as strong as the sunbeam. Below, a quotient of both has no
-    meaning.
+    At cos i = 0.1, an error of 1 degree of the slope changes a correction by 17 %.
 
     See Also
     --------

@@ -93,11 +93,10 @@ def learn_landscape(
     Notes
     -----
     The description has four parts: the distribution of leaf area; the response of its normal scores to forms of the
-    land at several scales (`fifesim.ground.terrain.forms.land_forms`) by a ridge regression; random fields of several
-    spacings, isotropic or along contours, whose variances fit the variogram, by step in elevation, and the spectrum of
-    the residual; and gusts, random fields that make the residual stronger or weaker in places, which gives the
-    kurtosis of differences between neighbours and the variance of the local variance. Blur and noise of the map are
-    applied to trial landscapes before they are compared with it. Lines such as roads are not learned as lines.
+    land (`fifesim.ground.terrain.forms.land_forms`) by a ridge regression; random fields, isotropic or along contours,
+    that fit the variogram and spectrum of the residual; and gusts, random fields that make the residual stronger or
+    weaker in places. Blur and noise of the map are applied to trial landscapes before they are compared with it. Lines
+    such as roads are not learned as lines.
 
     See Also
     --------

@@ -72,15 +72,11 @@ def noise_std(
 
     Notes
     -----
-    *Correlated terms.* Errors of different bands are independent, so that NDVI has no covariance term. Shot noise,
-    thermal noise and rounding are also independent from pixel to pixel: in a mean of n pixels they are smaller by
-    :math:`\sqrt{n}`. The fixed pattern is common to all pixels of a detector (a row in an image of a scanner, a column
-    in one of an array), and does not become smaller in means along its line. Common errors of all pixels, such as the
-    absolute calibration, are no noise and are not included.
+    Errors of different bands are independent, and errors of different pixels except for the fixed pattern, which is
+    common to all pixels of a detector. Errors of the absolute calibration are not included.
 
-    *Validity.* The noise is taken at the radiance of the image itself. Compared with Monte Carlo, the result is within
-    2 % if the noise is below 5 % of the sum of both reflectances and above half of a step. It does not hold for
-    saturated pixels, nor for images that were resampled after they were recorded.
+    Compared with Monte Carlo, the result is within 2 % if the noise is below 5 % of the sum of both reflectances and
+    above half of a step. It does not hold for resampled images.
 
     References
     ----------

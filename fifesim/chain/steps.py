@@ -535,8 +535,7 @@ def to_toa(
     Without ``elevation`` the whole scene is at the altitude of the atmosphere. A height difference of 100 m changes the
     molecular optical depth by 1 %, and the reflectance by 0.001 in the blue and less at longer wavelengths.
 
-    Clouds lie above the atmosphere except for its ozone; shadows keep the skylight. Light that leaves the sides of
-    clouds is not simulated.
+    Clouds lie above the atmosphere except for its ozone; shadows keep the skylight.
 
     References
     ----------

@@ -273,11 +273,9 @@ def gpp(
 
     Notes
     -----
-    A day is the sum over 16 Gauss points between sunrise and sunset, within 0.5 % of 144 steps; morning and afternoon
-    are alike. Light, net radiation and heat flux into the ground follow the photosynthetically active light under the
-    clear atmosphere, with the daily sums of the weather; its diffuse fraction varies likewise. Temperature and humidity
-    are constant. Below an elevation of 15 degrees, the air is as transparent as there. With ``fpar``, one evaluation
-    at the means of the weather is exact.
+    A day is the sum over 16 Gauss points between sunrise and sunset, within 0.5 % of 144 steps. Radiation follows the
+    light under the clear atmosphere, with the daily sums of the weather; temperature and humidity are constant. With
+    ``fpar``, one evaluation at the means of the weather is exact.
 
     References
     ----------

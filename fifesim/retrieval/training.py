@@ -59,9 +59,8 @@ def train(
     """
     Train a retrieval of leaf area and related quantities; computes.
 
-    The method is fitted to the chips of the part ``train`` of a dataset. Its intervals are then stretched so that they
-    contain the stated share of the pixels of the part ``validation``, and it is scored on the part ``test``. No
-    landscape is in two parts.
+    The method is fitted to the part ``train`` of the chips, its intervals are stretched to hold on ``validation``, and
+    it is scored on ``test``.
 
     Parameters
     ----------
@@ -70,10 +69,8 @@ def train(
     method : {"quantiles", "lookup", "line", "optimal-estimation"}, optional
         "quantiles" is a network trained for quantiles; "lookup" weights at most 20,000 simulated pixels by their
         likelihood, with the covariance of noise, blur and registration found in the chips; "line" is a regression on
-        NDVI, whose intervals are not stretched. "optimal-estimation" finds the most probable LAI together with the soil
-        brightness, soil moisture, share of dead leaves, chlorophyll and logarithm of the aerosol optical depth that the
-        study draws, from a table of uniform ground of a single stand. It needs the study, or a dataset from
-        `fifesim.dataset`.
+        NDVI, whose intervals are not stretched. "optimal-estimation" finds the most probable LAI together with the
+        other quantities that the study draws, for one stand; it needs the study, or a dataset from `fifesim.dataset`.
     landscape : str or path, optional
         Learned landscape of which the chips of the study are made, instead of the leaf area of its scenario: "konza",
         or a file of `fifesim.ground.Landscape.save`. Its leaf area is the prior.
@@ -86,9 +83,9 @@ def train(
         ``toa_reflectance``. It is corrected with an aerosol optical depth whose error has a standard deviation of 0.05
         + 0.15 times the depth [Levy2010]_, unless the dataset has a variable ``surface_reflectance`` of your processor.
     pixels : {"chain", "uniform"}, optional
-        Pixels to which the method is fitted: images of the whole chain, or uniform ground with the same true
-        properties, to which errors with the covariance of the effects of the chain are added. Intervals and scores are
-        from the chain in both cases. "uniform" needs the study, or a dataset from `fifesim.dataset`.
+        Pixels to which the method is fitted: images of the whole chain, or uniform ground with errors of the same
+        covariance. Intervals and scores are from the chain. "uniform" needs the study, or a dataset from
+        `fifesim.dataset`.
     levels : sequence of float, optional
         Levels of the central intervals. [1]
     chips : int, optional
@@ -105,8 +102,7 @@ def train(
     Warns
     -----
     UserWarning
-        If a part has fewer than 10 landscapes, as in the example below, or if bias or coverage in a decile of the
-        estimate are significantly wrong on the part ``test``, see `fifesim.score`.
+        If a part has fewer than 10 landscapes, or `fifesim.score` warns of the part ``test``.
 
     Raises
     ------

@@ -77,16 +77,14 @@ def budget(
     r"""
     Attribute the scatter of LAI and FPAR on NDVI, or the error of a quantity, to the stages of a scenario.
 
-    Without ``quantity``, scatter is :math:`v = 1 - R^2`, the variance of the truth not explained by a line on NDVI. It
-    is computed for each subset of stages, with the other stages ideal, from the same random numbers. The share of a
-    stage is its Shapley value: its contribution averaged over all orders of adding the stages. Shares and curvature sum
-    to the scatter. A share is negative if the stage makes the relation more linear.
+    Without ``quantity``, scatter is :math:`v = 1 - R^2`, the variance of the truth not explained by a line on NDVI. The
+    share of a stage is its Shapley value: its contribution averaged over all orders of adding the stages to ideal ones.
+    Shares and curvature sum to the scatter. A share is negative if the stage makes the relation more linear.
 
     With ``quantity``, the error is the quantity of the leaf area that is retrieved from the image, minus the mean of
     the quantity over the cells of the pixel. Its bias and variance over the pixels are attributed in the same way to
-    these stages and two more, with Shapley values that sum to the total: "retrieval", with the ideal that the leaf area
-    of the footprint is known; and "scaling", with the ideal that the model at the mean leaf area of the pixel is the
-    truth.
+    these stages, "retrieval" (ideal: the leaf area of the footprint) and "scaling" (ideal: the model at the mean leaf
+    area).
 
     Parameters
     ----------

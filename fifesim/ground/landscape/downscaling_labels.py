@@ -206,9 +206,8 @@ def downscale(
     Returns
     -------
     lai : xarray.DataArray, dims ([time], y, x)
-        NaN in NaN pixels and outside the map, 0 in pixels of 0. The result depends only on map, seed and position, so a
-        window equals a slice of the whole, for any chunks. The attribute ``cv_within_pixels`` is the realised
-        coefficient of variation [1], for results in memory. [m2 m-2]
+        NaN in NaN pixels and outside the map, 0 in pixels of 0. A window equals a slice of the whole. The attribute
+        ``cv_within_pixels`` is the realised coefficient of variation [1], for results in memory. [m2 m-2]
 
     Warns
     -----
@@ -228,18 +227,12 @@ def downscale(
     Notes
     -----
     The mean of the cells of each pixel is exact to rounding (1e-12), and no cell is negative. For a map of means of the
-    model, semivariances over one and two cells agree with the model within 0.3 % (0.7 % for a cv of 0.4), both within
-    pixels and across their borders. Errors increase for wider distributions. The model is a log-normal field for `cv`,
-    and a transformed normal field for `distribution`; cells may exceed the ends of a distribution by 0.1 %. For `cv`,
-    the coefficient of variation is the root mean of variance over squared mean of the pixels. Further variation of the
-    map is treated as a trend, estimated from second differences of the pixels around each tile and interpolated. If the
-    map is smoother than the model, cells vary less: for a uniform map with 3 x 3 cells per pixel and a cv of 0.1,
-    semivariances of neighbours across a border are 0.88, 0.80 and 0.53 times the model at arp 0, 0.15 and 0.24, and
-    1.00, 0.97 and 0.72 times within a pixel.
+    model, semivariances over one and two cells agree with the model within 0.3 % (0.7 % for a cv of 0.4), and errors
+    increase for wider distributions. The model is a log-normal field for `cv`, and a transformed normal field for
+    `distribution`; cells may exceed the ends of a distribution by 0.1 %. If the map is smoother than the model, cells
+    vary less.
 
-    The field of cells is the field of `fifesim.lai_scene` for the same seed. A tile of cells has at least 8 pixels
-    along an axis and a margin of 12. Pixels of 150 x 150 cells therefore take 1.7 GB, and much more time per cell than
-    pixels of 3 x 3.
+    The field of cells is the field of `fifesim.lai_scene` for the same seed. Pixels of 150 x 150 cells take 1.7 GB.
 
     References
     ----------

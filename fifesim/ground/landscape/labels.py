@@ -170,10 +170,8 @@ def landscape(
 
     Notes
     -----
-    All variables depend only on seed and position, so a window equals a slice of the whole, for any chunks. The leaf
-    area of all classes is derived from one white noise field, filtered with the arp of each class and mapped to its
-    distribution. Patterns therefore continue across class borders, where only distribution and texture change.
-    Landscapes with the same seed differ only through their classes.
+    All variables depend only on seed and position, so a window equals a slice of the whole, for any chunks. All classes
+    share one noise field: patterns continue across their borders, where only distribution and texture change.
 
     References
     ----------

@@ -141,11 +141,10 @@ class Landscape(Described, frozen=True):
 
         Notes
         -----
-        All variables depend only on seed, position and the elevation within 1 km, so that a window equals a slice of
-        the whole, for any chunks. Properties have a normal score that is a sum of the residual of leaf area, forms of
-        the land and own random fields; fractions have a beta distribution and the brightness of the soil a normal one.
-        Nothing varies within half a cell of the map from which the landscape was learned. Fields that are finer than
-        the cells are averaged before scores become leaf area.
+        A window equals a slice of the whole, for any chunks. Properties have a normal score that is a sum of the
+        residual of leaf area, forms of the land and random fields; fractions have a beta distribution and the
+        brightness of the soil a normal one. Nothing varies within half a cell of the map from which the landscape was
+        learned. Fields that are finer than the cells are averaged before scores become leaf area.
         """
         grid, seed = grids.check_grid(grid), check_seed(seed)
         history = f"landscape: learned from {in_a_line(self.source, 100)}, seed {seed}"
@@ -190,8 +189,8 @@ class Landscape(Described, frozen=True):
         -----
         Scores of `simulate` are replaced by the map at scales larger than a pixel, by block kriging with the fields of
         level ground, as in `fifesim.ground.downscale`. The mean of the known cells of each pixel is exact to rounding.
-        A window equals a slice of the whole, for any chunks, if it has the same map and elevation. The map does not
-        tell where gusts are: the standard deviation within the highest tenth of the pixels is 3 to 13 % too small.
+        The map does not tell where gusts are: the standard deviation within the highest tenth of the pixels is 3 to 13
+        % too small.
 
         See Also
         --------

@@ -137,9 +137,8 @@ def fine_dem(
     Notes
     -----
     Both methods recover planes exactly. "lowpass" recovers waves longer than five source cells within 1e-3 of their
-    amplitude, "linear" within a fifth. Next to a step, "lowpass" overshoots by up to 13 % of its height: a step from 0
-    to 5 m gives -0.62 to 5.62 m. Source cells smaller than two thirds of the grid cells are first averaged. The
-    vertical datum is not changed.
+    amplitude, "linear" within a fifth. Next to a step, "lowpass" overshoots by up to 13 % of its height. Source cells
+    smaller than two thirds of the grid cells are first averaged. The vertical datum is not changed.
 
     See Also
     --------

@@ -362,9 +362,9 @@ def open_landsat(
     path : str or path
         Folder of the unpacked product, or its metadata file ``*_MTL.txt``, ``.json`` or ``.xml``.
     bands : str or sequence of str, optional
-        Names of the instrument's bands, such as ``["TM3", "TM4"]``, or other names: ``["B4", "B5"]``,
-        ``["red", "nir"]``. By default all bands that show the ground at the common pixel size, 30 m (MSS: 60 m). The
-        panchromatic band has its own grid, and OLI's cirrus band shows no ground. Thermal bands are not read.
+        Names of the instrument's bands, such as ``["TM3", "TM4"]``, or other names: ``["B4", "B5"]``, ``["red",
+        "nir"]``. By default all bands that show the ground at the common pixel size, 30 m (MSS: 60 m). The panchromatic
+        band has its own grid, and OLI's cirrus band shows no ground.
     angles : "centre" or "pixel", optional
         "centre" uses sun and view of the scene centre, which all steps support. The view is from nadir; for a scene
         that was acquired off nadir, it follows from ROLL_ANGLE. With "pixel", angles by pixel from the files
