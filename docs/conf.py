@@ -167,9 +167,9 @@ def _cite(name, rawtext, text, lineno, inliner, options=None, content=None):
 
 def _skip(app, what, name, obj, skip, options):
     """Leave out what a class has by its making: unexplained tuple fields, a model's configuration."""
-    made = name in ("model_config", "model_post_init") or str(getattr(obj, "__doc__", "")).startswith(
-        "Alias for field number"
-    )
+    made = name in ("model_config", "model_post_init") or str(
+        getattr(obj, "__doc__", "")
+    ).startswith("Alias for field number")
     return True if made else None
 
 

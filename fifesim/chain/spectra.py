@@ -83,9 +83,7 @@ def canopy_spectra(
     Notes
     -----
     SAIL and PROSPECT-D are evaluated for every canopy. Derivatives use the complex-step method and are exact to
-    rounding. The effect of ``soil`` and ``moisture`` on the background is differentiated with a five-point formula. As
-    a function of zenith angle, the reflectance has weak kinks where both leaf sides of an angle class become visible.
-    Crowns have a kink where sun and view zenith angles are equal. The derivative at a kink is one-sided.
+    rounding. The reflectance has weak kinks as a function of zenith angle, at which the derivative is one-sided.
 
     References
     ----------

@@ -532,8 +532,8 @@ def to_toa(
 
     Notes
     -----
-    Without ``elevation`` the whole scene is at the altitude of the atmosphere. A height difference of 100 m changes the
-    molecular optical depth by 1 %, and the reflectance by 0.001 in the blue and less at longer wavelengths.
+    Without ``elevation`` the whole scene is at the altitude of the atmosphere; 100 m change the reflectance by 0.001 in
+    the blue.
 
     Clouds lie above the atmosphere except for its ozone; shadows keep the skylight.
 

@@ -246,7 +246,7 @@ def sense(
     scaling : "detector" or "product", optional
         Scaling of digital numbers: counts of the detector over its range of radiance, or numbers of the Level-1
         product, which are scaled to reflectance (OLI, OLI2; MSI and MSI-B with the offset of processing baseline
-        04.00). Product numbers have smaller steps than the detector; its quantisation is not simulated for them.
+        04.00).
     min_valid : float, optional
         Minimum fraction of the footprint on valid cells; below it the pixel is no data. [1]
     geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional

@@ -246,9 +246,8 @@ def cast_clouds(
 
     Notes
     -----
-    Clouds are a thin layer at the middle of base and top. The nearest cell of the field is read, so positions are right
-    to half a cell, and a cloud of n cells has a shadow of n cells on level ground. Rasters of base and top are divided
-    into layers, at most 64, between which displacements differ by one cell; behind each other, their thicknesses add.
+    Clouds are a thin layer at the middle of base and top. Positions are right to half a cell. Rasters of base and top
+    are divided into layers, at most 64, whose thicknesses add.
 
     See Also
     --------

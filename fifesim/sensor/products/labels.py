@@ -139,9 +139,9 @@ def calibrate(
     nodata : int, optional
         Digital number of no data, in addition to the fill value that the raster declares.
     saturated : int, "largest" or None, optional
-        Digital number of saturated pixels, which become no data, as in `open_landsat`. By default the largest number
-        of the instrument's bits, such as 255 for TM; with `gain` and `offset`, 255 for instruments of up to 8 bits and
-        rasters of one byte, 65535 otherwise. None keeps saturated pixels: their radiance is a lower limit.
+        Digital number of saturated pixels, which become no data, as in `open_landsat`. By default the largest number of
+        the instrument's bits, such as 255 for TM; with `gain` and `offset`, 255 for instruments of up to 8 bits and
+        rasters of one byte, 65535 otherwise. None keeps them.
 
     Returns
     -------
