@@ -8,7 +8,7 @@ pixels have the sampling interval of Table 1 and drift from the ground blocks; *
 the text of the paper suggests. :doc:`/paper` states which agreement is found, fitted or assumed.
 """
 
-# sphinx_gallery_thumbnail_number = 6
+# sphinx_gallery_thumbnail_number = 1
 import json
 from pathlib import Path
 
