@@ -59,5 +59,4 @@ for name, (lai, ndvi) in runs.items():
     print(f"{name:6} {fit.n:7} pixels, R² = {fit.r2:.2f}")
 
 # %%
-# With few large pixels, R² is uncertain. See :ref:`sphx_glr_gallery_answers_plot_2_landscape_budget.py` for the sources
-# of the scatter.
+# With few large pixels, R² is uncertain. See :doc:`/why_scatter` for the sources of the scatter.
