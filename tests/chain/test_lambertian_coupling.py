@@ -1,4 +1,4 @@
-"""Errors of the equation for a Lambertian surface over canopies, which docs/physics.md states."""
+"""Errors of the equation for a Lambertian surface over canopies, which pages of the documentation state."""
 
 import re
 from functools import cache
@@ -22,8 +22,8 @@ from fifesim.base.geometry import scattering_angle_cosine
 from fifesim.ground.canopy.sail_model import sail, with_background
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "physics.md").read_text(encoding="utf-8")
-TEXT = " ".join(PAGE.split())
+PAGE = (ROOT / "docs" / "developers" / "physics_checks.md").read_text(encoding="utf-8")
+TEXT, SUMMARY = (" ".join(text.split()) for text in (PAGE, (ROOT / "docs" / "physics.md").read_text(encoding="utf-8")))
 
 # Leaf reflectance, transmittance and background of the paper, at the centre of the band [um].
 BANDS = {"TM3": (0.66, 0.07, 0.04, 0.15), "TM4": (0.83, 0.45, 0.42, 0.19)}
@@ -152,14 +152,21 @@ def test_production_uses_one_reflectance_factor_for_sunlight_and_skylight():
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row[0]}-{row[1]}")
-def test_errors_at_nadir_match_the_physics_page(row):
+def test_errors_at_nadir_match_the_table(row):
     visibility, sza, *printed = row
     found, ndvi = errors(float(visibility), float(sza))
     for text, values, digit in zip(printed, (*found, ndvi), (0.1, 0.1, 0.001), strict=True):
         np.testing.assert_allclose(numbers(text), [values.min(), values.max()], rtol=0, atol=0.6 * digit)
 
 
-def test_errors_in_the_hot_spot_match_the_physics_page():
+def test_errors_at_nadir_of_the_physics_page_are_those_of_the_table():
+    text = re.search(r"at nadir is at most ([\d.]+) %, in haze .+? ([\d.]+) %, and ([\d.]+) in NDVI", SUMMARY)
+    largest = {row[:2]: [np.abs(numbers(each)).max() for each in row[2:]] for row in ROWS}
+    clear, hazy = largest["45", "28.5"], largest["15", "60"]
+    assert [float(each) for each in text.groups()] == [max(clear[:2]), max(hazy[:2]), hazy[2]]
+
+
+def test_errors_in_the_hot_spot_match_the_pages():
     text = re.search(
         r"the equation is ([\d.]+) to ([\d.]+) % too bright at 45 km and ([\d.]+) to ([\d.]+) % at 15 km", TEXT
     )
@@ -171,6 +178,8 @@ def test_errors_in_the_hot_spot_match_the_physics_page():
         found += [inside.min(), inside.max()]
         around.append(np.abs(errors(visibility, 30.0, 36.0, **case)[0]).max())
     np.testing.assert_allclose([float(each) for each in text.groups()], found, rtol=0, atol=0.06)
+    summary = re.search(r"In the hot spot, the equation is ([\d.]+) to ([\d.]+) % too bright", SUMMARY)
+    np.testing.assert_allclose([float(each) for each in summary.groups()], [min(found), max(found)], rtol=0, atol=0.06)
     assert max(around) == pytest.approx(beside, abs=0.06)
 
 
@@ -184,7 +193,7 @@ def test_integration_agrees_with_eradiate_and_the_equation_is_biased():
 
 
 @pytest.mark.slow
-def test_errors_compared_with_eradiate_match_the_physics_page():
+def test_errors_compared_with_eradiate_match_the_page():
     text = re.search(r"is ([\d.]+) % too bright there on average .+ and ([\d.]+) % within 8° of the hot spot", TEXT)
     views, *_, equation = over_rpv()
     near = [raa == 0 and abs(vza - benchmarks.RAMI_SZA) <= 8 for vza, raa in views]

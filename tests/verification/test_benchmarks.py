@@ -70,8 +70,9 @@ def test_flat_discs_without_size_have_no_hot_spot():
     assert back == pytest.approx(1 - np.exp(-2.0), rel=1e-6)
 
 
-def test_errors_of_crowns_match_the_physics_page():
-    page = (Path(__file__).parents[2] / "docs" / "physics.md").read_text(encoding="utf-8")
+def test_errors_of_crowns_match_the_pages():
+    docs = Path(__file__).parents[2] / "docs"
+    page = (docs / "developers" / "physics_checks.md").read_text(encoding="utf-8")
     row = r"^\| (HET0\d).* \| ([\d.]+)(?:, .+)? \| (.+) % \| (.+) % \| (.+) % \|$"
     rows = re.findall(row, page, re.MULTILINE)
     cases = [f"{scene} {cover}" for scene, cover, *_ in rows]
@@ -80,6 +81,11 @@ def test_errors_of_crowns_match_the_physics_page():
         _, error = canopy.crown_errors(scene, float(cover))
         found = error.mean(), error.min(), error.max()
         assert [f"{each:+.0f}".replace("-", "−") for each in found] == printed
+    summary = " ".join((docs / "physics.md").read_text(encoding="utf-8").split())
+    means = re.search(
+        r"is (\S+) % for spheres \(HET01\) and (\S+) % for .+ \(HET04\); without gaps it is (\S+) %", summary
+    )
+    assert list(means.groups()) == [rows[number][2] for number in (0, 1, 3)]
     low, high = map(int, re.search(r"crowns are not round to be (\d+) to (\d+) % too dark", page).groups())
     errors = (canopy.crown_errors("HET04", cover) for cover in (0.2989, 0.2592))
     slant = [error[abs(vza) >= 45] for vza, error in errors]
