@@ -69,7 +69,7 @@ def value_in_words(value):
 
 def html_table(title, rows, text="", defaults=()):
     """HTML table of a description for notebooks: rows of name, value and meaning; rows of defaults are folded."""
-    # Without colours, so that those of a dark notebook stay.
+    # Without colours, so that a dark notebook keeps its colours.
     more = f"<details><summary>defaults</summary>{_html_rows(defaults)}</details>" if defaults else ""
     return f"<div><strong>{escape(title)}</strong><div>{escape(text)}</div>{_html_rows(rows)}{more}</div>"
 

@@ -128,9 +128,10 @@ def exam(
     >>> import fifesim
     >>> import numpy as np
     >>> import xarray as xr
+    >>> from odc.geo.xr import wrap_xr
     >>> grid = fifesim.grid_at("EPSG:32614", 705000, 4330000, width=600, height=600, cell=30)
-    >>> cosine = fifesim.lai_scene(grid, seed=7) * 0 + np.linspace(0.1, 1, 20)
-    >>> truth = xr.Dataset({"red": cosine * 0 + 0.1, "illumination": cosine})
+    >>> cosine = wrap_xr(np.tile(np.linspace(0.1, 1, 20), (20, 1)), grid)
+    >>> truth = xr.Dataset({"red": xr.full_like(cosine, 0.1), "illumination": cosine})
     >>> found = fifesim.exam((truth["red"] + 0.02 * (cosine < 0.5)).rename("red"), truth)
     >>> found["illumination"]["bias"].squeeze().values.round(3)
     array([0.02, 0.02, 0.02, 0.02, 0.01, 0.  , 0.  , 0.  , 0.  , 0.  ])

@@ -6,7 +6,6 @@ import importlib.metadata
 import json
 import os
 import re
-import shutil
 import tempfile
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -310,16 +309,15 @@ def product_folder(folder, name, truth=None, *, overwrite=False):
         yield new
         (new / MARK).write_text(f"{simulation_statement()}.\nThe truth is in the folder truth.\n", encoding="utf-8")
         flush(*(path for path in new.rglob("*") if path.is_file()))
-        if os.path.lexists(target):
-            os.replace(target, old)
         try:
+            if os.path.lexists(target):
+                os.replace(target, old)
             os.replace(new, target)
-        except BaseException:
-            if old.exists():
+        finally:
+            # After an error or an interruption, the earlier product is moved back.
+            if old.exists() and not os.path.lexists(target):
                 os.replace(old, target)
-            raise
         flush(target.parent)
-        shutil.rmtree(old, ignore_errors=True)
 
 
 def _check_replaceable(target, overwrite):

@@ -1,6 +1,7 @@
 """Products of simulated scenes: readers return the scene, its angles, masks and truth, and wrong scenes are refused."""
 
 import json
+import os
 import re
 import tarfile
 from fnmatch import fnmatchcase
@@ -495,3 +496,23 @@ def test_eoreader_opens_both_products(tmp_path):
         azimuth, zenith = product.get_mean_sun_angles()
         assert angle_between(zenith, azimuth, given.sza.item(), given.saa.item()) < 0.01
         assert pd.Timestamp(product.datetime) == pd.Timestamp(TIMES[name]).floor("s")
+
+
+def test_earlier_product_is_restored_if_the_new_one_cannot_be_moved(tmp_path, monkeypatch):
+    with simulated_product.product_folder(tmp_path, "product") as new:
+        (new / "first").touch()
+    move = os.replace
+
+    def failing(source, target):
+        if Path(target) == tmp_path / "product" and (Path(source) / "second").exists():
+            raise OSError("no space")
+        move(source, target)
+
+    monkeypatch.setattr(os, "replace", failing)
+    with (
+        pytest.raises(OSError, match="no space"),
+        simulated_product.product_folder(tmp_path, "product", overwrite=True) as new,
+    ):
+        (new / "second").touch()
+    assert [path.name for path in tmp_path.iterdir()] == ["product"]
+    assert sorted(path.name for path in (tmp_path / "product").iterdir()) == ["SIMULATED.txt", "first"]
