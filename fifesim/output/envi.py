@@ -35,7 +35,7 @@ from fifesim.sensor.response.scan import EARTH_RADIUS
 
 class _Spectrometer(NamedTuple):
     mission: str
-    first: str  # date of the launch
+    first: str  # date of the launch, recalled
     name: str  # of the product, from which ISOFIT reads the time
 
 

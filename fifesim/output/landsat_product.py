@@ -18,8 +18,9 @@ from fifesim.output.simulated_product import Images, Truth, write_raster
 from fifesim.sensor.labels import scale
 from fifesim.sensor.products.landsat_labels import LANDSAT_INSTRUMENTS
 
-# By instrument: beginning of the product's name, and date of the last images (USGS, Landsat satellite missions: TM of
-# Landsat 4 and 5 stopped in December 1993 and November 2011, ETM+ in January 2024); None for active missions.
+# By instrument: beginning of the product's name, and last date of routine images; None for active missions. USGS,
+# Landsat missions: TM of Landsat 4 and 5 stopped in December 1993 and November 2011 (days recalled), ETM+ on 19 January
+# 2024.
 _MISSIONS = {
     "L4TM": ("LT04", "1993-12-14"),
     "TM": ("LT05", "2011-11-18"),
