@@ -330,6 +330,7 @@ def test_warning_is_one_line(invoke, small, monkeypatch):
     assert result.stderr == "fifesim: warning: the sun is taken for that of June\\x1b[31m\n"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device that takes nothing is Linux's")
 def test_full_standard_output_is_a_one_line_error():
     """Commands run one after the other in one process, which imports their modules once."""

@@ -119,6 +119,7 @@ def failed(tmp_path_factory):
     return found["failed"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RECIPES)
 def test_recipe_works(failed, name):
     assert name not in failed, failed[name]

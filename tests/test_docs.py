@@ -51,12 +51,14 @@ FILES = {"docs/howto/my_map.md": ("lai_500m.tif", write_modis_lai)}
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md")), *sorted((DOCS / "howto").glob("*.md"))]
 
 
-# Pages, apart from the README, whose code takes more than 6 s of processor time.
-LONG = tuple(f"docs/howto/{name}.md" for name in ("from_geotiff", "gpp", "landscape", "processor", "train"))
+# Pages, apart from the README, whose code takes more than 2 s of processor time.
+LONG = ("budget", "elsewhere", "from_geotiff", "gpp", "landscape", "my_map", "processor", "score", "swath", "train")
 CODE = [str(page.relative_to(ROOT)) for page in PAGES if python_blocks(page)]
 
 
-@pytest.mark.parametrize("page", [pytest.param(each, marks=[pytest.mark.slow] * (each in LONG)) for each in CODE])
+@pytest.mark.parametrize(
+    "page", [pytest.param(each, marks=[pytest.mark.slow] * (Path(each).stem in LONG)) for each in CODE]
+)
 def test_code_of_a_page_runs(page, tmp_path, monkeypatch):
     """Blocks run in order in one namespace."""
     monkeypatch.chdir(tmp_path)

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -111,10 +112,23 @@ def resumed(scenario, folder):
     return contents(folder), [json.loads(line) for line in done.stdout.splitlines()]
 
 
-@pytest.mark.slow
-def test_killed_run_resumes_to_the_same_files(scenario, whole, tmp_path):
-    out = tmp_path / "out"
+@pytest.fixture(scope="module")
+def killed_once(scenario, tmp_path_factory):
+    """Folder of a run that was killed after its first block."""
+    out = tmp_path_factory.mktemp("killed") / "out"
     assert signalled(signal.SIGKILL, scenario, "-o", out, "--threads", 1).returncode == -signal.SIGKILL
+    return out
+
+
+@pytest.fixture
+def killed(killed_once, tmp_path):
+    """A copy of the folder of a killed run."""
+    return shutil.copytree(killed_once, tmp_path / "out")
+
+
+@pytest.mark.slow
+def test_killed_run_resumes_to_the_same_files(scenario, whole, killed):
+    out = killed
     assert [path.name for path in out.iterdir()] == [UNFINISHED]
     files, lines = resumed(scenario, out)
     assert files == whole
@@ -135,7 +149,7 @@ def whole_scene(scenario, tmp_path_factory):
 
 
 # Options of killed runs, and the earliest time of the kill as a fraction of the duration.
-WAYS = ((("--workers", 2), 0.0), (("--scene",), 0.0), ((), 0.8), (("--scene",), 0.8))
+WAYS = ((("--workers", 2), 0.0), (("--scene",), 0.0), (("--scene",), 0.8))
 
 
 @pytest.mark.slow
@@ -178,21 +192,19 @@ def test_one_of_two_concurrent_runs_completes(scenario, whole, tmp_path, option,
 def test_processes_sharing_an_empty_kernel_cache_give_the_same_files(tmp_path):
     (tmp_path / "small.toml").write_text("[grid]\nwidth = 300\nheight = 300\n")
     new = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    commands = [[*COMMAND, str(tmp_path / "small.toml"), "-o", str(tmp_path / str(number))] for number in range(4)]
+    commands = [[*COMMAND, str(tmp_path / "small.toml"), "-o", str(tmp_path / str(number))] for number in range(2)]
     processes = [subprocess.Popen(command, env=new, stderr=subprocess.PIPE, text=True) for command in commands]
     said = [process.communicate(timeout=PATIENCE)[1] for process in processes]
-    assert [process.returncode for process in processes] == [0] * 4, said
-    assert all(contents(tmp_path / str(number)) == contents(tmp_path / "0") for number in range(4))
+    assert [process.returncode for process in processes] == [0] * 2, said
+    assert contents(tmp_path / "0") == contents(tmp_path / "1")
     assert any((tmp_path / "cache").rglob("*.nbc"))
 
 
 @pytest.mark.slow
-def test_truncated_block_is_recomputed(scenario, whole, tmp_path):
-    out = tmp_path / "out"
-    assert signalled(signal.SIGKILL, scenario, "-o", out, "--threads", 1).returncode == -signal.SIGKILL
-    block = saved(out)[0]
+def test_truncated_block_is_recomputed(scenario, whole, killed):
+    block = saved(killed)[0]
     os.truncate(block, block.stat().st_size - 100)
-    assert resumed(scenario, out)[0] == whole
+    assert resumed(scenario, killed)[0] == whole
 
 
 @pytest.mark.slow
@@ -237,7 +249,7 @@ visibility = { uniform = ["10 km", 60] }
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay", [0.0, 0.3, 0.5, 0.9, 1.5, 2.4])
+@pytest.mark.parametrize("delay", [0.0, 0.3, 0.9, 2.4])
 def test_ctrl_c_ends_all_processes_of_a_dataset_with_one_line(tmp_path, delay):
     """The signal reaches every process of the group, at any time after the first child has started."""
     (tmp_path / "study.toml").write_text(STUDY)
@@ -320,14 +332,13 @@ def test_unreadable_dem_error_names_the_file(scenario, broken_dem, tmp_path):
 
 
 @pytest.mark.slow
-def test_other_scenario_cannot_resume_a_run(scenario, tmp_path):
-    out = tmp_path / "out"
-    assert signalled(signal.SIGKILL, scenario, "-o", out, "--threads", 1).returncode == -signal.SIGKILL
+def test_other_scenario_cannot_resume_a_run(scenario, killed, tmp_path):
+    out = killed
     other = tmp_path / "other.toml"
     other.write_text(SCENARIO.replace("seed = 3", "seed = 4"))
-    done = run(other, "-o", out, "--resume")
-    assert done.returncode == 2
+    done = run_here(other, "-o", out, "--resume")
+    assert done.exit_code == 2
     assert "seed = 3" in done.stderr and "--overwrite" in done.stderr
     assert saved(out)
-    refused = run(scenario, "-o", out)
-    assert refused.returncode == 2 and "--resume" in refused.stderr
+    refused = run_here(scenario, "-o", out)
+    assert refused.exit_code == 2 and "--resume" in refused.stderr

@@ -52,7 +52,7 @@ def write(path, values=(3,), *, names=(), scales=1.0, offset=0.0, gcps=(), units
                 sink.colorinterp = colours
             cells = np.broadcast_to(np.reshape(values, (-1, 1, 1)), (len(values), 60, 60))
             sink.write(cells.astype(profile["dtype"]))
-            sink.scales, sink.offsets = np.broadcast_to(scales, len(values)).tolist(), [offset] * len(values)
+            sink.scales, sink.offsets = (np.broadcast_to(each, len(values)).tolist() for each in (scales, offset))
             sink.descriptions, sink.units = names or [None] * len(values), units or [""] * len(values)
             if gcps:
                 points = [GroundControlPoint(*each) for each in gcps]
@@ -221,7 +221,7 @@ def test_band_is_the_only_one_that_names_the_quantity(tmp_path, name):
 
 def test_scale_and_unit_are_of_the_band_of_the_quantity(tmp_path):
     """A band of transparency is no band of data."""
-    scaled, path = {"dtype": "int16", "scales": [1.0, 0.1]}, tmp_path / "map.tif"
+    scaled, path = {"dtype": "int16", "scales": [1.0, 0.1], "offset": [5.0, 0.0]}, tmp_path / "map.tif"
     write(path, [7, 25], names=["Lai_QC", "Lai_500m"], units=["%", "m2/m2"], **scaled)
     np.testing.assert_allclose(fifesim.open_lai(path, GRID), 2.5, rtol=1e-6)
     write(path, [1, 4000], names=["NDVI", "elevation"], units=["1", "m"], **scaled)

@@ -110,6 +110,8 @@ def test_photosynthesis_of_two_leaves_has_the_right_limits():
     capacity = leaves.capacity_sun + leaves.capacity_shade
     bright = capacity * (ci - 3.69) / (ci + 40.4 * (1 + 20.5 / 24.8))
     np.testing.assert_allclose(farquhar_canopy(lai, 1e6, 0.2, sza, 298.15), bright, rtol=1e-12)
+    # At 35 degC the compensation point is 3.69 + 0.188 * 10 + 0.0036 * 10**2 Pa.
+    np.testing.assert_allclose(farquhar_canopy(lai, 1000.0, 0.2, sza, 308.15, ci_pa=5.93), 0, rtol=0, atol=1e-9)
     # At high CO2, electron transport limits, with its maximum at the optimum temperature of the two energies.
     kelvin = np.linspace(295, 315, 2001)
     transport = farquhar_canopy(3.0, 1e9, 0.2, sza, kelvin, ci_pa=1e7)

@@ -142,6 +142,7 @@ def fluxes(lai, fpar, sza, weather, light, sky):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("date", NOON)
 @pytest.mark.parametrize("latitude", [0.5, 39.0, 60.0])
 def test_day_equals_the_sum_over_144_steps(absorbed, latitude, date):

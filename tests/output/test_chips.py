@@ -205,6 +205,7 @@ def test_jobs_are_ordered_by_shard_and_hills_are_computed_once_for_several_shard
         assert [len(job) for job in jobs] == [4] * 6 + [1] * 6
 
 
+@pytest.mark.slow
 def test_killed_process_is_reported(chips_on):
     chips = chips_on(7)
     shards, said = list_shards(3, 7), "ended unexpectedly, perhaps from lack of memory"

@@ -61,7 +61,7 @@ def test_single_band_has_a_report_without_ndvi(tmp_path):
     assert f'<th>Blur</th><td class="number">modulation transfer at the Nyquist frequency {said}' in page
 
 
-HILLS = {"grid": {"width": 4500, "height": 3900}, "ground": {"seed": 3}, "terrain": {"horizon_reach": 600}}
+HILLS = {"grid": {"width": 3600, "height": 3510}, "ground": {"seed": 3}, "terrain": {"horizon_reach": 600}}
 
 
 @pytest.fixture(scope="module")

@@ -269,6 +269,7 @@ def test_uniform_ground_is_corrected_exactly(chips):
     np.testing.assert_allclose(Driver(setup).corrected(toa).reshape(3, -1).T, expected.reflectance, rtol=0, atol=2e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["quantiles", "optimal-estimation"])
 def test_training_at_the_surface_or_on_uniform_ground_is_as_accurate(chips, trained, image, light, method):
     """The RMSE of these retrievals is at most 1.5 times the RMSE at the top of the atmosphere."""

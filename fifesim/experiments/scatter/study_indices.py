@@ -70,7 +70,8 @@ def sensitivity(
     >>> import fifesim
     >>> chip = fifesim.Scenario(base="paper", grid={"width": 90, "height": 90}, terrain={"dem": "flat"})
     >>> study = fifesim.Study(chip, {"brown": {"uniform": [0, 0.5]}, "soil": {"uniform": [-0.05, 0.05]}})
-    >>> fifesim.experiments.sensitivity(study, n=32).total.round(1).values.tolist()
+    >>> indices = fifesim.experiments.sensitivity(study, lambda each: each.ground.brown + each.ground.soil, n=32)
+    >>> indices.total.round(1).values.tolist()
     [1.0, 0.0]
     """
     if n < 2:

@@ -24,7 +24,7 @@ from fifesim.grids.warp import onto_grid
 from fifesim.ground.canopy.leaf_area import check_share
 from fifesim.ground.canopy.soil import check_brightness
 from fifesim.ground.landscape import distribution
-from fifesim.ground.landscape.autoregression import FIELD_TILE, check_arp, streaming_field
+from fifesim.ground.landscape.autoregression import FIELD_TILE, check_arp, check_streaming_arp, streaming_field
 from fifesim.ground.landscape.classes import CoverClass, Field, class_table, fife_classes, read_table, table_text
 from fifesim.ground.landscape.cover import Patches, patch_classes
 from fifesim.ground.landscape.field_labels import drawn_field
@@ -280,9 +280,9 @@ def _lai(grid, cover, table, arp, seed):
     # The last entry is for cells without a class.
     tables = np.stack([*(_quantiles(each.lai) for each in table), np.full(distribution.QUANTILE_NODES, np.nan)])
     arps = [arp if each.arp is None else each.arp for each in table]
-    # Errors of streaming_field are raised before anything lazy is built.
+    # Errors are raised before anything lazy is built.
     for of_class in arps:
-        streaming_field(seed, of_class, 0, 0, (0, 0))
+        check_streaming_arp(of_class)
     plain = cover.copy(deep=False)
     plain.attrs = {}
     kernel = partial(_leaf_area, codes, tables, arps, seed, grids.lattice_position(grid))

@@ -20,6 +20,7 @@ from fifesim.output.chips import store
 from fifesim.output.chips.makers import made_shards, processes, workers_of
 from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, errors_with_their_file, results
 from fifesim.output.progress import Progress
+from fifesim.output.terminal import interrupts_blocked
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.studies import Study, StudyLike, read_study
@@ -111,7 +112,9 @@ def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, wo
     own = workers is not None and workers > 1
     client = None if own else client or found_client()
     with processes(workers) if own else workers_of(client) if client else nullcontext() as makers:
-        chips = chips_of(study, count)
+        # Compiled code of scipy that draws the values loses an exception raised in it.
+        with interrupts_blocked():
+            chips = chips_of(study, count)
         _look_at(chips)
         _warn_of_empty_parts(chips)
         layout = store.layout_of(chips)

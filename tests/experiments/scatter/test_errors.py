@@ -185,13 +185,13 @@ def test_sensitivity_matches_a_linear_function():
     chip = fifesim.Scenario(grid={"width": 120, "height": 120}, ground={"arp": 0.15}, terrain={"dem": "flat"})
     study = fifesim.Study(chip, {"brown": {"uniform": [0, 0.2]}, "moisture": {"uniform": [0, 0.4]}})
     found = fifesim.experiments.sensitivity(
-        study, lambda each: each.ground.brown + each.ground.moisture, n=256, each=iter
+        study, lambda each: each.ground.brown + each.ground.moisture, n=64, each=iter
     )
     assert found.parameter.values.tolist() == ["ground.brown", "ground.moisture"]
     np.testing.assert_allclose(found["first"], [0.2, 0.8], atol=0.02)
     np.testing.assert_allclose(found["total"], [0.2, 0.8], atol=0.02)
     # Only green leaves produce, and soil hardly affects the light that they absorb.
-    gpp = fifesim.experiments.sensitivity(study, "gpp", n=16, each=iter)
+    gpp = fifesim.experiments.sensitivity(study, "gpp", n=8, each=iter)
     assert gpp["first"].sel(parameter="ground.brown") > 0.95
     with pytest.raises(ValueError, match="must return a number for a scenario, it returns list"):
         fifesim.experiments.sensitivity(study, lambda scenario: [1, 2], n=4, each=iter)

@@ -195,6 +195,7 @@ def test_realisations_are_adjacent_and_have_different_seeds(scenario):
     assert len({case.grid.west for case in scatter.budget_cases(scenario(), realisations=3, cells=333)}) == 1
 
 
+@pytest.mark.slow
 def test_ground_of_an_image_is_learned_for_its_budget(tmp_path):
     """The scenario covers the largest square with known elevation; the results have a copy of the landscape."""
     grid = fifesim.fife_site(10.0, window=((0, 60), (0, 60)))

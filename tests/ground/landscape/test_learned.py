@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from lazy import no_compute
+from scipy import ndimage
 from scipy.interpolate import BSpline
 
 import fifesim
@@ -106,6 +107,16 @@ def test_a_hollow_is_convergent_and_low():
     np.testing.assert_allclose([bowl[150, 100], bowl[100, 50]], expected, rtol=0.01)
 
 
+def test_positions_agree_with_smoothing_without_coarse_squares():
+    """The interpolation between squares of 40 m, a triangle, differs from a Gaussian most at the smallest scale."""
+    ground = ndimage.gaussian_filter(np.random.default_rng(1).normal(400.0, 50.0, (500, 500)), 6)
+    forms, inner = land_forms(ground, 10.0), (slice(120, 380),) * 2
+    for scale, largest in ((80, 0.04), (160, 0.01), (320, 0.005)):
+        expected = (ground - ndimage.gaussian_filter(ground, scale / 10, truncate=5))[inner]
+        found = forms[f"position_{scale}"][inner]
+        assert abs(found - expected).max() < largest * expected.std()
+
+
 def test_forms_depend_on_elevation_within_reach_only():
     ground = np.random.default_rng(0).normal(400.0, 5.0, (260, 262))
     margin, start = forms_reach(10.0), 2 * COARSE
@@ -121,6 +132,7 @@ def _within(values, ratio):
     return (parts - parts.mean((1, 3), keepdims=True)).reshape(values.shape)
 
 
+@pytest.mark.slow
 def test_conditioned_cells_have_the_means_of_the_map_and_the_structure_of_the_landscape():
     ratio, grid = 6, fifesim.grid_at("EPSG:32614", 707600.0, 4331900.0, 3000.0, 3000.0, 10.0)
     dem = fifesim.flint_hills(fifesim.grid_at("EPSG:32614", 705500.0, 4334000.0, 7200.0, 7200.0, 10.0), seed=3)
