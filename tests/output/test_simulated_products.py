@@ -277,22 +277,23 @@ def broken(monkeypatch):
 @pytest.mark.parametrize("write", ["to_landsat_l1", "to_sentinel2_l1c"])
 def test_product_appears_when_it_is_complete(tmp_path, monkeypatch, write):
     name, size = ("OLI", 30) if write == "to_landsat_l1" else ("MSI", 10)
-    product = getattr(scene(name, size).fifesim, write)(tmp_path)
+    folder = tmp_path / "new" / "folder"
+    product = getattr(scene(name, size).fifesim, write)(folder)
     files = {path: path.read_bytes() for path in product.rglob("*") if path.is_file()}
     other = getattr(scene(name, size, seed=2).fifesim, write)
     with pytest.raises(FileExistsError, match="overwrite=True"):
-        other(tmp_path)
+        other(folder)
     with monkeypatch.context() as patch:
         broken(patch)
         with pytest.raises(OSError, match="no space"):
-            other(tmp_path, overwrite=True)
+            other(folder, overwrite=True)
     assert {path: path.read_bytes() for path in product.rglob("*") if path.is_file()} == files
-    assert [path.name for path in tmp_path.iterdir()] == [product.name]
-    assert other(tmp_path, overwrite=True) == product
+    assert [path.name for path in folder.iterdir()] == [product.name]
+    assert other(folder, overwrite=True) == product
     assert {path: path.read_bytes() for path in product.rglob("*") if path.is_file()} != files
     (product / "SIMULATED.txt").unlink()
     with pytest.raises(FileExistsError, match=r"no SIMULATED\.txt"):
-        other(tmp_path, overwrite=True)
+        other(folder, overwrite=True)
 
 
 def no_utm(array):
