@@ -201,6 +201,19 @@ def test_table_of_optimal_estimation_agrees_with_the_chain(chips):
         assert slopes[:, :, at] == pytest.approx((ends[0] - ends[1]) / 2e-5, abs=1e-7)
 
 
+def test_table_of_varying_angles_agrees_with_the_chain(chips):
+    """Between the nodes of sun and relative azimuth; the view zenith is the same in all chips."""
+    study, axes = training.study_of(chips, "test"), {"lai": (0.0, 4.0), "sza": (20.0, 40.0), "raa": (0.0, 180.0)}
+    light, values = inversion.simulated_tables(study, "surface", ("MSI4", "MSI8"), ("lai",), axes, (30.0, 10.0, 50.0))
+    rng, ends = np.random.default_rng(5), np.array(list(axes.values()))
+    places = rng.uniform(*ends.T, (10, 3))
+    found = inversion.interpolated(light, ends, places[:, :1], places[:, 1:])[0]
+    for spectrum, (lai, sza, raa) in zip(found, places, strict=True):
+        scenario = CHIP.replace(sza=sza, saa=0.0, vza=10.0, vaa=raa)
+        assert spectrum == pytest.approx(Driver(setup_of(scenario)).reflectance(np.array([[lai]]))[1:, 0, 0], rel=5e-3)
+    assert inversion.interpolated(values, ends, places[:, :1], places[:, 1:])[0][:, 0] == pytest.approx(places[:, 0])
+
+
 def test_remainder_and_spread_of_optimal_estimation_agree_with_the_posterior_of_normal_distributions(monkeypatch):
     """
     Two unknowns and two quantities: the first state itself, and one with a remainder that follows state and error.
