@@ -290,19 +290,28 @@ def test_error_message_is_short_and_has_no_control_characters(invoke, tmp_path):
         assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", result.output + result.stderr), arguments
 
 
-@pytest.mark.parametrize("command", ["reproduce", "budget", "endtoend", "verify", "simulate"])
-def test_ctrl_c_exits_with_130_and_one_line(invoke, tmp_path, monkeypatch, command):
+# Commands and the functions that do their work.
+REPORTS = {
+    "reproduce": "experiments.friedl1995.report.reproduce_to_folder",
+    "budget": "experiments.scatter.report.budget_to_folder",
+    "endtoend": "experiments.scatter.endtoend.endtoend_to_folder",
+}
+LONG = REPORTS | {"verify": "experiments.verification.verify", "simulate": "output.run_folder.simulate_to_folder"}
+
+
+@pytest.mark.parametrize("command", REPORTS)
+def test_reports_list_their_files(invoke, monkeypatch, command):
+    monkeypatch.setattr(f"fifesim.{REPORTS[command]}", lambda *arguments, **options: ["out/table.csv"])
+    *files, last = invoke(command, "-o", "out").stdout.splitlines()
+    assert files == ["out/table.csv"] and last.endswith("open out/report.html in a browser")
+
+
+@pytest.mark.parametrize("command", LONG)
+def test_ctrl_c_exits_with_130_and_one_line(invoke, monkeypatch, command):
     def pressed(*arguments, **options):
         raise KeyboardInterrupt
 
-    called = {
-        "reproduce": "experiments.friedl1995.report.reproduce_to_folder",
-        "budget": "experiments.scatter.report.budget_to_folder",
-        "endtoend": "experiments.scatter.endtoend.endtoend_to_folder",
-        "verify": "experiments.verification.verify",
-        "simulate": "output.run_folder.simulate_to_folder",
-    }
-    monkeypatch.setattr(f"fifesim.{called[command]}", pressed)
+    monkeypatch.setattr(f"fifesim.{LONG[command]}", pressed)
     result = invoke(command)
     assert result.exit_code == 130
     assert "interrupted; nothing was written" in result.stderr and "Traceback" not in result.stderr

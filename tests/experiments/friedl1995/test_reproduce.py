@@ -198,6 +198,8 @@ def test_densities_integrate_to_one_and_end_at_their_bounds(folders):
     for values in own:
         known = values.dropna("leaf_area")
         assert np.trapezoid(known, known["leaf_area"]) == pytest.approx(1, abs=0.005)
+    # The curves of the two others begin at bare ground.
+    assert np.isfinite(own.isel(leaf_area=0)).values.tolist() == [True, False, True]
     ungrazed = own.sel(distribution="burned-ungrazed").dropna("leaf_area")
     assert float(ungrazed["leaf_area"][0]) == pytest.approx(0.475, abs=0.003)
     files = {str(name): str(folders["densities"] / f"{name}.csv") for name in own["distribution"].values}
