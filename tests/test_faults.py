@@ -128,9 +128,8 @@ def killed(killed_once, tmp_path):
 
 @pytest.mark.slow
 def test_killed_run_resumes_to_the_same_files(scenario, whole, killed):
-    out = killed
-    assert [path.name for path in out.iterdir()] == [UNFINISHED]
-    files, lines = resumed(scenario, out)
+    assert [path.name for path in killed.iterdir()] == [UNFINISHED]
+    files, lines = resumed(scenario, killed)
     assert files == whole
     assert 0 < lines[0]["cells_done"] < lines[0]["cells"]
 
@@ -333,12 +332,11 @@ def test_unreadable_dem_error_names_the_file(scenario, broken_dem, tmp_path):
 
 @pytest.mark.slow
 def test_other_scenario_cannot_resume_a_run(scenario, killed, tmp_path):
-    out = killed
     other = tmp_path / "other.toml"
     other.write_text(SCENARIO.replace("seed = 3", "seed = 4"))
-    done = run_here(other, "-o", out, "--resume")
+    done = run_here(other, "-o", killed, "--resume")
     assert done.exit_code == 2
     assert "seed = 3" in done.stderr and "--overwrite" in done.stderr
-    assert saved(out)
-    refused = run_here(scenario, "-o", out)
+    assert saved(killed)
+    refused = run_here(scenario, "-o", killed)
     assert refused.exit_code == 2 and "--resume" in refused.stderr

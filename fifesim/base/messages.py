@@ -18,7 +18,7 @@ PARTS: dict = {}
 """Names of a description and of its fields by the argument that takes it, for messages."""
 
 
-# Names in PROSAIL, PROSPECT, 6S and other programs of what has these names here.
+# Names of the same quantities in PROSAIL, PROSPECT, 6S and other programs.
 _ELSEWHERE = {
     "structure": "n", "chlorophyll": "cab chl", "carotenoids": "car cxc", "anthocyanins": "ant canth",
     "water": "cw ewt", "dry_matter": "cm lma", "brown": "cbrown cbp fb", "hotspot": "hspot",

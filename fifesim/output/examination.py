@@ -1,4 +1,4 @@
-"""Exam of a processor: errors of what it returned by terrain, edges, haze and class, as a table and one HTML page."""
+"""Exam of a processor: errors of its result by terrain, edges, haze and class, as a table and one HTML page."""
 
 from __future__ import annotations
 

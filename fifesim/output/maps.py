@@ -18,7 +18,6 @@ from PIL import Image
 
 from fifesim.base.arguments import NAMES, FilePath, Kind
 from fifesim.base.bands import COMPOSITES, colour_composite
-from fifesim.base.caches import cached
 from fifesim.base.files import in_a_line
 from fifesim.grids import cf, chunks, swaths
 from fifesim.grids import grid as grids
@@ -350,21 +349,15 @@ def write_style(path: FilePath, *, overwrite: bool = False) -> Path:
 
 def rendered(template, filters=MappingProxyType({}), **values):
     """Text of a template with values; it may include other templates of this folder."""
-    environment = _environment(template.parent)
-    environment.filters |= filters
-    return environment.get_template(template.name).render(**values)
-
-
-@cached(4, "templates of reports")
-def _environment(folder):
-    """Environment of the templates of a folder, which compiles each of them once."""
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader([folder, Path(__file__).parent]),
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader([template.parent, Path(__file__).parent]),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
+    environment.filters |= filters
+    return environment.get_template(template.name).render(**values)
 
 
 def _composite(source):

@@ -202,7 +202,11 @@ def test_table_of_optimal_estimation_agrees_with_the_chain(chips):
 
 
 def test_table_of_varying_angles_agrees_with_the_chain(chips):
-    """Between the nodes of sun and relative azimuth; the view zenith is the same in all chips."""
+    """
+    Between the nodes of sun and relative azimuth; the view zenith is the same in all chips.
+
+    Five nodes in azimuth and four in sun zenith interpolate to 0.2 %.
+    """
     study, axes = training.study_of(chips, "test"), {"lai": (0.0, 4.0), "sza": (20.0, 40.0), "raa": (0.0, 180.0)}
     light, values = inversion.simulated_tables(study, "surface", ("MSI4", "MSI8"), ("lai",), axes, (30.0, 10.0, 50.0))
     rng, ends = np.random.default_rng(5), np.array(list(axes.values()))
@@ -210,7 +214,7 @@ def test_table_of_varying_angles_agrees_with_the_chain(chips):
     found = inversion.interpolated(light, ends, places[:, :1], places[:, 1:])[0]
     for spectrum, (lai, sza, raa) in zip(found, places, strict=True):
         scenario = CHIP.replace(sza=sza, saa=0.0, vza=10.0, vaa=raa)
-        assert spectrum == pytest.approx(Driver(setup_of(scenario)).reflectance(np.array([[lai]]))[1:, 0, 0], rel=5e-3)
+        assert spectrum == pytest.approx(Driver(setup_of(scenario)).reflectance(np.array([[lai]]))[1:, 0, 0], rel=4e-3)
     assert inversion.interpolated(values, ends, places[:, :1], places[:, 1:])[0][:, 0] == pytest.approx(places[:, 0])
 
 

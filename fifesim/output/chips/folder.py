@@ -112,7 +112,7 @@ def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, wo
     own = workers is not None and workers > 1
     client = None if own else client or found_client()
     with processes(workers) if own else workers_of(client) if client else nullcontext() as makers:
-        # Compiled code of scipy that draws the values loses an exception raised in it.
+        # The compiled Sobol generator of scipy swallows KeyboardInterrupt.
         with interrupts_blocked():
             chips = chips_of(study, count)
         _look_at(chips)

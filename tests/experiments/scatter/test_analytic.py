@@ -178,8 +178,9 @@ def _landscape(**sensor):
 
 
 @pytest.mark.slow
-def test_budget_of_a_learned_landscape_agrees_with_simulation():
-    scenario = _landscape(offset=[0.2, 0.1])
+@pytest.mark.parametrize("name", ["TM", "MSI"])
+def test_budget_of_a_learned_landscape_agrees_with_simulation(name):
+    scenario = _landscape(instrument=name, offset=[0.2, 0.1])
     found = fifesim.budget(scenario, method="analytic", cells=1215).isel(realisation=0)
     drawn = fifesim.budget(scenario, realisations=4, cells=1215)
     for key in ("total", "curvature", "share", "first"):

@@ -108,7 +108,11 @@ def test_a_hollow_is_convergent_and_low():
 
 
 def test_positions_agree_with_smoothing_without_coarse_squares():
-    """The interpolation between squares of 40 m, a triangle, differs from a Gaussian most at the smallest scale."""
+    """
+    The interpolation between squares of 40 m, a triangle, differs from a Gaussian most at the smallest scale.
+
+    Differences are 0.031, 0.0065 and 0.0029 standard deviations; with the wrong sign of the blur, 0.21 and 0.025.
+    """
     ground = ndimage.gaussian_filter(np.random.default_rng(1).normal(400.0, 50.0, (500, 500)), 6)
     forms, inner = land_forms(ground, 10.0), (slice(120, 380),) * 2
     for scale, largest in ((80, 0.04), (160, 0.01), (320, 0.005)):
